@@ -138,13 +138,16 @@ def variant(folder: Path, text: str) -> Path:
             r"variant\.toml:5: device\.e\.full_v is 5; expected more than empty_v, 7 V$",
         ),
         (
-            "".join(f"[device.l{i}]\ntype = 'laser_range_finder'\nposition_m = [0, 0]\n" for i in range(2)),
-            r"variant\.toml:5: device\.l1 is a second laser_range_finder; expected one$",
+            "".join(f"[device.e{i}]\ntype = 'energy'\n" for i in range(2)),
+            r"variant\.toml:4: device\.e1 is a second energy; expected one$",
         ),
         (
-            "".join(f"[device.w{i}]\ntype = 'touch_whisker'\nroot_m = [0, 0]\ntip_m = [1, 0]\n" for i in range(24)),
-            r"variant\.toml:\d+: device\.w\d+ is one sensor too many; expected at most 24$",
+            "scheme = 'arsmi'",
+            r"variant\.toml:2: scheme is 'arsmi'; expected one of kit, arsim; did you mean 'arsim'\?$",
         ),
+        ("scheme = 1", r"variant\.toml:2: scheme is 1; expected one of kit, arsim$"),
+        ("schema = 'arsim'", r"variant\.toml:2: there is no key 'schema' here; .*did you mean 'scheme'\?$"),
+        ("scheme = 'arsim'\nbody = 3", r"variant\.toml:3: body: expected object, got int$"),
     ],
 )
 def test_wrong_descriptions_get_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:

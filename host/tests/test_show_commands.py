@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -87,6 +88,18 @@ def test_robot_is_shown_with_its_wiring(
     code, out, err = boebot(capsys, "robot", "shieldbot", "--out", "it.svg")
     assert (code, err) == (0, "") and "buzzer (off)" in out
     assert "ping" in texts(Path("it.svg")) and "buzzer" not in texts(Path("it.svg"))
+
+
+@pytest.mark.parametrize("robot", ["arsim-1.2", "own.v2.toml"])
+def test_robot_by_arsims_scheme_is_shown_with_it_under_its_whole_name(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, robot: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("own.v2.toml").write_text('extends = "arsim-1.2"\n')
+    code, out, err = boebot(capsys, "robot", robot)
+    assert (code, err) == (0, "") and re.search(r"^ scheme +arsim *$", out, re.MULTILINE)
+    assert Path(f"robot-{robot.removesuffix('.toml')}.svg").is_file()
+    assert "scheme" not in boebot(capsys, "robot", "arsim")[1]
 
 
 def test_robot_as_json(capsys: pytest.CaptureFixture[str]) -> None:

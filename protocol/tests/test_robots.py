@@ -130,6 +130,7 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
             "remove = ['light_right']\n[device.whisker_left]\npin = 6",
             "whisker_left is whisker on pin 6, but in the firmware for pin map 'shieldbot' it is whisker on pin 5",
         ),
+        ("scheme = 'arsim'", r"variant\.toml:\d+: scheme is 'arsim', which only a robot without a board can have$"),
         ("pin_map = 'shieldbot-quad'", "device.encoder_left is encoder on pin A2, but in the firmware"),
     ],
 )
@@ -153,7 +154,7 @@ def test_device_may_be_switched_off(tmp_path: Path) -> None:
 
 def test_unknown_robot_names_the_known_ones() -> None:
     with pytest.raises(
-        RobotError, match="there is no robot 'dalek'; expected one of arsim, boebot, roller, shieldbot, "
+        RobotError, match=r"there is no robot 'dalek'; expected one of arsim, arsim-1\.2, boebot, roller, shieldbot, "
     ):
         load_robot("dalek")
 

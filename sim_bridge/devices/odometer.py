@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from boebot.devices.odometer import Odometer
+from sim_bridge._core import lib
 from sim_bridge.devices.catalogue import modelled
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, Range
@@ -21,10 +22,12 @@ ODOMETER = SensorKind(
 
 @modelled(Odometer)
 def odometer(device: Odometer, name: str, model: VehicleModel) -> None:
-    """Calibrated once at the start."""
+    """Calibrated once at the start. ARSim lays off a whole step at the heading after it."""
+    by_arsim = model.robot is not None and model.robot.scheme == "arsim"
     model.sensor(
         "odometer",
         name,
+        rule=lib.ODOMETER_NEW_HEADING if by_arsim else lib.ODOMETER_MIDPOINT,
         sigma_step=device.sigma_step_m,
         factor_left=device.factor_left,
         factor_right=device.factor_right,

@@ -17,7 +17,9 @@ vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
 }
 
 void vehicle_model_destroy(vehicle_model *self) {
-  for (size_t i = 0; self != NULL && i < self->sensors_count; i++) free(self->sensors[i].made);
+  if (self == NULL) return;
+  for (size_t i = 0; i < self->sensors_count; i++) free(self->sensors[i].made);
+  free(self->sensors);
   free(self);
 }
 
@@ -42,7 +44,8 @@ double vehicle_model_euler_limit(const vehicle_model *self) {
   const body_parameters *b = &self->body;
   const double steeper = slope(self, 0) > slope(self, 1) ? slope(self, 0) : slope(self, 1);
   const double along = (2.0 * body_a(b) * steeper / b->wheel_radius + b->linear_damping) / b->mass;
-  const double around = (2.0 * body_b(b) * steeper * b->half_track / b->wheel_radius + b->angular_damping) / b->inertia;
+  const double axis = body_axis_half_track(b) / b->wheel_radius;
+  const double around = (2.0 * body_b(b) * steeper * axis + b->angular_damping) / b->inertia;
   const double rate = along > around ? along : around;
   if (isnan(along + around)) return 0.0; /* numbers that no arithmetic holds: no step is small enough */
   return rate > 0.0 ? 2.0 / rate : INFINITY;
@@ -116,9 +119,16 @@ int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy) 
 
 size_t vehicle_model_readings(const vehicle_model *self) { return self->readings; }
 
+/* Key of the noise of a kind's `number`-th sensor: a block of 64 for each kind, and the next 64 of all kinds above them. */
+static uint32_t device_of(const sensor_kind *kind, uint32_t number) {
+  return kind->noise * 64u + number % 64u + (number / 64u << 16);
+}
+
 int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *parameters, double period) {
-  if (self->sensors_count == VEHICLE_SENSORS) return VEHICLE_TOO_MANY;
   if (!(period >= 0.0) || !isfinite(period)) return VEHICLE_BAD_NUMBER;
+  vehicle_sensor *sensors = realloc(self->sensors, (self->sensors_count + 1) * sizeof *sensors);
+  if (sensors == NULL) return VEHICLE_NO_MEMORY;
+  self->sensors = sensors;
   void *made = calloc(1, kind->size);
   if (made == NULL) return VEHICLE_NO_MEMORY;
   const size_t readings = kind->make(made, parameters);
@@ -129,7 +139,7 @@ int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *
   uint32_t number = 0;
   for (size_t i = 0; i < self->sensors_count; i++) number += self->sensors[i].kind == kind;
   self->sensors[self->sensors_count++] = (vehicle_sensor){.kind = kind,
-                                                          .device = kind->noise * 64u + number,
+                                                          .device = device_of(kind, number),
                                                           .first = self->readings,
                                                           .numbers = self->numbers,
                                                           .period = period,

@@ -17,15 +17,13 @@
 #include "../world/servo_motor.h"
 #include "../world/supply.h"
 
-#define VEHICLE_SENSORS 24
-
 /* python: begin */
 enum {
   VEHICLE_OK = 0,
   VEHICLE_BAD_NUMBER = -1, /* not finite, or outside its range */
   VEHICLE_BAD_STEP = -2,   /* dt <= 0 or not finite, or at or beyond the motors' Euler limit */
   VEHICLE_NOT_FREE = -3,   /* the start is not free space */
-  VEHICLE_TOO_MANY = -4,   /* sensors, or a second drive or battery */
+  VEHICLE_TOO_MANY = -4,   /* a second drive or battery */
   VEHICLE_NO_MEMORY = -5,
   VEHICLE_BAD_SNAPSHOT = -6, /* of another size, or with a number that no world comes to */
   VEHICLE_NOT_PLACED = -7,   /* a world that is not there or without an arena, or a model without a drive */
@@ -89,7 +87,7 @@ struct vehicle_model {
   int noise, ends_at_collision;
   size_t sensors_count, readings;
   size_t numbers; /* that all sensors keep */
-  vehicle_sensor sensors[VEHICLE_SENSORS];
+  vehicle_sensor *sensors;
 };
 
 #endif

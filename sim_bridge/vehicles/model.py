@@ -22,7 +22,6 @@ from sim_bridge.robots.outline import collision_outline
 from sim_bridge.saved import fingerprint_of
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct, values_of
 
-SENSORS_MAXIMUM: Final = 24
 SIDES: Final = ("left", "right")
 MOUNTS: Final = {"left": 1, "right": -1}  # of servos: which way drives forward
 
@@ -245,6 +244,4 @@ class VehicleModel:
             raise RobotError(f"vehicle: a sensor's name is {shown(name)}; expected a text")
         if name in self.names:
             raise RobotError(f"vehicle: two sensors named {shown(name)}; expected different names")
-        if len(self.names) >= SENSORS_MAXIMUM:
-            raise RobotError(f"vehicle: no room for sensor {shown(name)}; expected at most {SENSORS_MAXIMUM}")
         return f"vehicle: sensor {shown(name)}"

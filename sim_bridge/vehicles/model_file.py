@@ -51,6 +51,8 @@ def vehicle_model(
     described = idealised(described, without)
     draw = imperfections.Draw(0, noise, without=without)
     body = _body(described.body) | {"grip": draw.own("TYRE_GRIP", described.body.tyre_grip)}
+    if described.scheme == "arsim":
+        body["axis_half_track"] = body["half_track"] / 2  # as its UpdateMotorAxisAngularSpeed has it
     if described.body.tyre_slip:
         body["slip"] = int(draw["TYRE_SLIP"])
     if described.body.outline_m:

@@ -19,7 +19,7 @@ int vehicles_send(vehicles *self, size_t i, double left, double right) {
 /* Torques of both wheels for the next step. */
 static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   vehicle_state *s = &w->state;
-  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
+  const double rims[2] = {body_axis_left(&w->body), body_axis_right(&w->body)};
   if (m->drive == DRIVE_DC) {
     for (int side = 0; side < 2; side++) {
       const motor_dc_parameters *motor = &m->dc[side];

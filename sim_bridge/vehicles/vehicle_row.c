@@ -11,8 +11,6 @@
 #include "../world/sensors/odometer.h"
 #include "sense.h"
 
-#define DRAWS (VEHICLE_SENSORS + 1u) /* sensors draw one number each, an odometer two */
-
 /* ---- moving -------------------------------------------------------------------------------------------------------- */
 
 static void dc_torques(const vehicle_model *m, vehicle *const worlds[], double left[], double right[]) {
@@ -24,8 +22,8 @@ static void dc_torques(const vehicle_model *m, vehicle *const worlds[], double l
   for (size_t k = 0; k < ROW; k++) {
     signals[0][k] = worlds[k]->state.signals[0];
     signals[1][k] = worlds[k]->state.signals[1];
-    rims[0][k] = worlds[k]->body.state.rim_left;
-    rims[1][k] = worlds[k]->body.state.rim_right;
+    rims[0][k] = body_axis_left(&worlds[k]->body);
+    rims[1][k] = body_axis_right(&worlds[k]->body);
   }
   for (size_t k = 0; k < ROW; k++)
     left[k] = vehicle_dc_torque(&motors[0], radius, signals[0][k], rims[0][k], stopping[0]);
@@ -67,7 +65,7 @@ static void move(vehicles *self, const size_t row[], vehicle *const worlds[]) {
 
 /* ---- sensing ------------------------------------------------------------------------------------------------------- */
 
-/* Worlds that sense, and their draws: as many rows of them as the sensors that are read together take. */
+/* Worlds that sense, and the draws of the sensor that is read. */
 typedef struct {
   vehicles *all;
   const size_t *row;
@@ -75,7 +73,7 @@ typedef struct {
   viewpoint from[ROW];
   sensor_slot *slots[ROW]; /* of the first sensor */
   double *readings[ROW];
-  double draws[DRAWS][ROW];
+  double draws[2][ROW]; /* sensors take one number each, an odometer two */
 } sensing_row;
 
 /* How many normal draws a sensor takes of which the whole row is read at once; 0: it is read for each world alone. */
@@ -86,17 +84,13 @@ static unsigned draws_of(const vehicle_sensor *sensor) {
   return sensor->kind == odometer_sensor && odometer_is_plain(sensor->made) ? 2 : 0;
 }
 
-/* All draws that the row's sensors take together; 0 without noise. */
-static void draw(sensing_row *s) {
-  const vehicle_model *m = s->all->model;
-  unsigned count = 0;
-  for (size_t number = 0; number < m->sensors_count; number++) {
-    const unsigned draws = draws_of(&m->sensors[number]);
-    for (unsigned i = 0; i < draws; i++, count++) {
-      for (size_t k = 0; k < ROW; k++) {
-        const uint64_t step = noise_first(s->worlds[k]->state.step) + i;
-        s->draws[count][k] = m->noise ? noise_normal_of(hash_mix(s->slots[k][number].key ^ step)) : 0.0;
-      }
+/* A sensor's draws in each world of the row; 0 without noise. */
+static void draw(sensing_row *s, size_t number, unsigned draws) {
+  const int noise = s->all->model->noise;
+  for (unsigned i = 0; i < draws; i++) {
+    for (size_t k = 0; k < ROW; k++) {
+      const uint64_t step = noise_first(s->worlds[k]->state.step) + i;
+      s->draws[i][k] = noise ? noise_normal_of(hash_mix(s->slots[k][number].key ^ step)) : 0.0;
     }
   }
 }
@@ -115,7 +109,7 @@ static void finish_eyes(const infrared_proximity *eye, const double (*distances)
   memcpy(readings, seen, sizeof seen);
 }
 
-static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor) {
   const infrared_proximity *eye = sensor->made;
   fan_question asked[ROW];
   double distances[ROW][BEAM_RAYS];
@@ -125,18 +119,18 @@ static void read_eyes(const sensing_row *s, const vehicle_sensor *sensor, const 
   for (size_t k = 0; k < ROW; k++) {
     if (s->from[k].around->movers_count > 0) scene_fan_movers(s->from[k].around, &asked[k], s->from[k].id);
   }
-  finish_eyes(eye, (const double(*)[BEAM_RAYS])distances, draws, readings);
+  finish_eyes(eye, (const double(*)[BEAM_RAYS])distances, s->draws[0], readings);
   for (size_t k = 0; k < ROW; k++) s->readings[k][sensor->first] = readings[k];
 }
 
-static void read_compasses(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+static void read_compasses(const sensing_row *s, const vehicle_sensor *sensor) {
   double readings[ROW];
   for (size_t k = 0; k < ROW; k++) readings[k] = s->from[k].heading;
-  for (size_t k = 0; k < ROW; k++) readings[k] = compass_of(sensor->made, readings[k], draws[k]);
+  for (size_t k = 0; k < ROW; k++) readings[k] = compass_of(sensor->made, readings[k], s->draws[0][k]);
   for (size_t k = 0; k < ROW; k++) s->readings[k][sensor->first] = readings[k];
 }
 
-static void read_odometers(const sensing_row *s, const vehicle_sensor *sensor, const double draws[]) {
+static void read_odometers(const sensing_row *s, const vehicle_sensor *sensor) {
   const odometer_parameters parameters = *(const odometer_parameters *)sensor->made;
   const odometer_parameters *p = &parameters; /* here, where no result can be */
   const size_t number = (size_t)(sensor - s->all->model->sensors);
@@ -158,8 +152,8 @@ static void read_odometers(const sensing_row *s, const vehicle_sensor *sensor, c
     distance[k] = states[k]->distance;
   }
   for (size_t k = 0; k < ROW; k++) {
-    left[k] = odometer_travel(p, left[k], p->factor_left) + spread * draws[k];
-    right[k] = odometer_travel(p, right[k], p->factor_right) + spread * draws[ROW + k];
+    left[k] = odometer_travel(p, left[k], p->factor_left) + spread * s->draws[0][k];
+    right[k] = odometer_travel(p, right[k], p->factor_right) + spread * s->draws[1][k];
     odometer_lay_off(p->half_track, share, left[k], right[k], &x[k], &y[k], &heading[k], &distance[k]);
   }
   for (size_t k = 0; k < ROW; k++) {
@@ -185,18 +179,15 @@ static void sense(vehicles *self, const size_t row[], vehicle *const worlds[]) {
     s.slots[k] = &self->slots[row[k] * m->sensors_count];
     s.readings[k] = &self->readings[row[k] * m->readings];
   }
-  draw(&s);
-  unsigned count = 0;
   for (size_t number = 0; number < m->sensors_count; number++) {
     const vehicle_sensor *sensor = &m->sensors[number];
-    const double *draws = s.draws[count];
-    const unsigned needed = draws_of(sensor);
-    count += needed;
-    for (size_t k = 0; k < ROW && needed == 0; k++) vehicle_sense_one(self, row[k], number, &s.from[k]);
-    if (needed == 0) continue;
-    if (sensor->kind == infrared_proximity_sensor) read_eyes(&s, sensor, draws);
-    if (sensor->kind == compass_sensor) read_compasses(&s, sensor, draws);
-    if (sensor->kind == odometer_sensor) read_odometers(&s, sensor, draws);
+    const unsigned draws = draws_of(sensor);
+    for (size_t k = 0; k < ROW && draws == 0; k++) vehicle_sense_one(self, row[k], number, &s.from[k]);
+    if (draws == 0) continue;
+    draw(&s, number, draws);
+    if (sensor->kind == infrared_proximity_sensor) read_eyes(&s, sensor);
+    if (sensor->kind == compass_sensor) read_compasses(&s, sensor);
+    if (sensor->kind == odometer_sensor) read_odometers(&s, sensor);
   }
   for (size_t k = 0; k < ROW; k++) worlds[k]->state.sensed = worlds[k]->state.step + 1;
 }

@@ -146,7 +146,7 @@ double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].
 void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
   const vehicle_model *m = self->model;
   const vehicle *w = &self->worlds[i];
-  const double rims[2] = {w->body.state.rim_left, w->body.state.rim_right};
+  const double rims[2] = {body_axis_left(&w->body), body_axis_right(&w->body)};
   for (int side = 0; side < 2; side++) {
     currents[side] = 0.0;
     if (m->drive != DRIVE_DC) continue;

@@ -18,6 +18,7 @@ const char *body_parameters_wrong(const body_parameters *p) {
       {"inertia", p->inertia, 0},
       {"radius", body_reach_of(p), 0},
       {"half_track", p->half_track, 0},
+      {"axis_half_track", p->axis_half_track, 1},
       {"wheel_radius", p->wheel_radius, 0},
       {"wheel_mass", p->wheel_mass, 1},
       {"wheel_inertia", p->wheel_inertia, 1},
@@ -44,6 +45,10 @@ double body_b(const body_parameters *p) { /* (2.30) */
   return 1.0 / (r / half + 2.0 * (p->wheel_inertia * half / (p->inertia * r) + p->wheel_mass * half * r / p->inertia));
 }
 
+double body_axis_half_track(const body_parameters *p) {
+  return p->axis_half_track > 0.0 ? p->axis_half_track : p->half_track;
+}
+
 void body_init(body *self, const body_parameters *parameters, double reach) {
   const body_parameters *p = parameters;
   memset(self, 0, sizeof *self);
@@ -55,6 +60,7 @@ void body_init(body *self, const body_parameters *parameters, double reach) {
   self->torque_gain = body_b(p) / p->inertia;
   self->turn_drag = p->angular_damping / p->inertia;
   self->per_radius = 1.0 / p->wheel_radius;
+  self->axis_offset = p->half_track - body_axis_half_track(p);
   self->spin = p->wheel_inertia * self->per_radius * self->per_radius;
   const double least = SPIN_SHARE * p->mass;
   self->slip_spin = p->spin_inertia > 0.0 ? p->spin_inertia * self->per_radius * self->per_radius

@@ -25,6 +25,7 @@ typedef struct {
   double radius;               /* of the collision circle, m; with an outline not used */
   const body_outline *outline; /* collision polygon, NULL: the circle */
   double half_track;           /* R, m */
+  double axis_half_track;      /* by which a turn reaches the motors' axes, m; 0: R. ARSim takes R / 2 */
   double wheel_radius;         /* r, m */
   double wheel_mass;           /* m, kg */
   double wheel_inertia;        /* I_w, kg m^2, about the axle */
@@ -62,6 +63,9 @@ const char *body_parameters_wrong(const body_parameters *p);
 /* A of (2.26) and B of (2.30). */
 double body_a(const body_parameters *p);
 double body_b(const body_parameters *p);
+
+/* Half track by which a turn reaches the motors' axes, m. */
+double body_axis_half_track(const body_parameters *p);
 /* python: end */
 
 #define BODY_EDGES_CAPACITY 24u
@@ -90,6 +94,7 @@ typedef struct {
   double torque_gain;   /* B / I */
   double turn_drag;     /* beta / I */
   double per_radius;    /* 1 / r */
+  double axis_offset;   /* R - axis_half_track, m: of a turn, what the motors' axes do not see */
   double spin;          /* I_w / r^2: mass of a wheel's turning at the rim */
   double slip_spin;     /* the same of a slipping wheel */
   double mass, inertia; /* of body and wheels without the wheels' turning: what a force on a slipping body meets */
@@ -124,6 +129,14 @@ static inline double body_left_speed(const body *self) {
 }
 static inline double body_right_speed(const body *self) {
   return self->state.speed + self->parameters.half_track * self->state.turn_rate;
+}
+
+/* Speeds of the rims as the motors' axes see them: those of the wheels, unless the body has ARSim's half of R. */
+static inline double body_axis_left(const body *self) {
+  return self->state.rim_left + self->axis_offset * self->state.turn_rate;
+}
+static inline double body_axis_right(const body *self) {
+  return self->state.rim_right - self->axis_offset * self->state.turn_rate;
 }
 
 /* How far its middle goes within `dt` by the speeds that it has, m. */

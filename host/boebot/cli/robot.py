@@ -40,13 +40,14 @@ def robot(
 
     described = load_robot(robot)
     if out is None and not json:
-        out = Path(f"robot-{Path(robot).stem}.svg")
+        out = Path(f"robot-{Path(robot).name.removesuffix('.toml')}.svg")
     picture = None if out is None else robot_picture.write(described, out)
     body = described.body
     values: dict[str, Any] = {
         "name": described.name,
         "title": described.title,
         "board": described.board,
+        "scheme": None if described.scheme == "kit" else described.scheme,
         "pin_map": described.pin_map or None,
         "mass_kg": body.mass_kg,
         "radius_m": body.radius_m,

@@ -21,7 +21,6 @@ from boebot.devices.battery import Energy
 from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_number
 from boebot.devices.encoder import WheelEncoder
 from boebot.devices.equipment import RENAMED
-from boebot.devices.laser import Laser
 from boebot.devices.motor import Motor
 from boebot.errors import RobotError
 from boebot.robot import Robot
@@ -30,7 +29,12 @@ Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 
 OUTLINE_CORNERS_MAXIMUM = 32
-VEHICLE_SENSORS_MAXIMUM = 24
+
+Scheme = Literal["kit", "arsim"]
+SCHEME_BODIES: dict[str, dict[str, float]] = {
+    "arsim": {"linear_damping_n_s_m": 15.0, "angular_damping_n_m_s": 0.78},  # alpha, beta of ARSim 1.2
+}
+"""Keys of [body] that a file has by naming a scheme; those that it gives itself win."""
 
 
 class Body(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -91,6 +95,9 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     board: str
     body: Body
     device: dict[str, AnyDevice]
+    scheme: Scheme = "kit"
+    """of a robot without a board; "arsim": as the notes' simulator computes it, with R / 2 in the speeds of the motors'
+    axes, each step of the odometer laid off at the heading after it, and the damping of ARSim 1.2."""
     pin_map: str = ""  # of the board's firmware
     supply: Supply | None = None  # of the board; a robot without a board has none
     unit: Annotated[int, msgspec.Meta(ge=0, lt=1 << 32)] | None = None
@@ -136,6 +143,9 @@ def load_robot(robot: str | Path) -> RobotDescription:
         raise RobotError(f"{toml_files.where(table, path.name, place)}: body.outline_m{fault}")
     _check_devices(description, table, path.name)
     if description.has_board:
+        if description.scheme != "kit":
+            at = f"{toml_files.where(table, path.name, 'scheme')}: scheme"
+            raise RobotError(f"{at} is {description.scheme!r}, which only a robot without a board can have")
         _check_supply(description, path.name)
         _check_pins(description, path.name)
         _check_image(description, path)
@@ -148,6 +158,7 @@ def load_robot(robot: str | Path) -> RobotDescription:
 def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     """The file's table, laid over the robot that it extends."""
     table = toml_files.read(path, RobotError)
+    _add_scheme(table)
     base_name = table.pop("extends", None)
     removed = table.pop("remove", [])
     if not isinstance(table.get("device", {}), dict):
@@ -166,6 +177,13 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
         if base.get("device", {}).pop(name, None) is None:
             raise RobotError(f"{path.name} removes device {name!r}, which {base_name!r} does not have")
     return toml_files.overlaid(_overlay(base, table), table, base)
+
+
+def _add_scheme(table: dict[str, Any]) -> None:
+    """Gives a table that names a scheme the keys that come with it."""
+    scheme, body = table.get("scheme"), table.get("body", {})
+    if isinstance(scheme, str) and scheme in SCHEME_BODIES and isinstance(body, dict):
+        table["body"] = SCHEME_BODIES[scheme] | body
 
 
 def _overlay(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
@@ -259,19 +277,11 @@ def _check_vehicle(robot: RobotDescription, file: str) -> None:
 
 
 def _check_vehicle_devices(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
-    """Refuses what no model of a vehicle takes: keys that do not fit each other, too many sensors."""
-    sensors: list[VehicleDevice] = []
-    for name, device in robot.device.items():
-        if not isinstance(device, VehicleDevice) or not device.on:
-            continue
-        if isinstance(device, Motor):
-            continue
-        at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
-        if isinstance(device, (Laser, Energy)) and any(type(other) is type(device) for other in sensors):
-            raise RobotError(f"{at} is a second {device.__struct_config__.tag}; expected one")
-        sensors.append(device)
-        if len(sensors) > VEHICLE_SENSORS_MAXIMUM:
-            raise RobotError(f"{at} is one sensor too many; expected at most {VEHICLE_SENSORS_MAXIMUM}")
+    """Refuses a second battery: a robot has one energy, which its devices empty."""
+    batteries = [name for name, device in robot.device.items() if isinstance(device, Energy) and device.on]
+    if len(batteries) > 1:
+        place = f"device.{batteries[1]}"
+        raise RobotError(f"{toml_files.where(table, file, place)}: {place} is a second energy; expected one")
 
 
 _ALWAYS = ("servo_left", "servo_right", "uart")  # in every firmware image

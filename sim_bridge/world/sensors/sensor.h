@@ -32,7 +32,7 @@ typedef struct {
 } sensor_memory;
 
 typedef struct sensor_kind {
-  uint32_t noise; /* part of the key of its draws, different for each kind, less than 2^26 */
+  uint32_t noise; /* part of the key of its draws, different for each kind, less than 1000 */
   size_t size;    /* bytes of a made sensor */
   size_t numbers; /* that it keeps */
 
