@@ -10,26 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.navigation import Scan
-from boebot.navigation.exploration_graph import ExplorationGraph, Placement, joined
-
-
-def test_paths_after_a_move_as_in_the_notes() -> None:
-    """From 1 to 4: (1, 2) becomes (4, 1, 2); and where two paths part, the way goes back only to there."""
-    assert joined([1, 4], [1, 2]) == [4, 1, 2] and joined([1, 4], [1, 3]) == [4, 1, 3]
-    assert joined([1, 4, 6], [1, 4, 7]) == [6, 4, 7]
-    assert joined([1, 4], [1, 4, 6]) == [4, 6]
-
-
-def test_nodes_of_the_notes_scan() -> None:
-    """Fig. 6.1: 181 rays from -90 to 90 degrees; the interval of 88 and 89 degrees is too narrow for a node."""
-    degrees = np.arange(-90, 91)
-    distances = np.full(181, 0.8)
-    for first, last, far in ((-70, -31, 2.0), (-10, 84, 1.6), (88, 89, 3.0)):
-        distances[(degrees >= first) & (degrees <= last)] = far
-    scan = Scan(distances, (-math.pi / 2, math.pi / 2), 4.0)
-    placement = Placement(distance=1.0, margin=0.3, least_angle=0.35, least_distance=0.75)
-    assert np.degrees(placement.intervals(scan)) == pytest.approx(np.array([(-70, -31), (-10, 84), (88, 89)]))
-    assert np.degrees(placement.bearings(scan)) == pytest.approx([-50.5, 13.5, 60.5])
+from boebot.navigation.exploration_graph import ExplorationGraph, Placement
 
 
 def test_no_return_is_free() -> None:

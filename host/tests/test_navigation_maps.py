@@ -13,8 +13,8 @@ from PIL import Image
 
 from boebot.arenas import load_arena
 from boebot.errors import BrainError
-from boebot.navigation import Cells, Lattice, LineMap, OccupancyMap, search, tightened
-from boebot.navigation.tighten import length, segment_distance
+from boebot.navigation import Cells, Lattice, LineMap, OccupancyMap, search
+from boebot.navigation.tighten import segment_distance
 
 RADIUS, MARGIN = 0.07, 0.05
 BEGIN, END = (-2.5, -1.5), (2.2, 1.2)
@@ -110,18 +110,6 @@ def test_cells_are_convex_cover_all_and_give_a_path(office: LineMap, lattice: La
         segment_distance(office, one, other) >= RADIUS + MARGIN - 0.06 for one, other in itertools.pairwise(path)
     )
     assert cells.with_places((-10.0, 0.0))[1] == [-1]
-
-
-def test_path_is_tightened_and_keeps_its_distance(office: LineMap, lattice: Lattice) -> None:
-    """Fig. 6.6: shorter, and with few waypoints."""
-    start, target = (lattice.nearest_free(*place, within=0.2) for place in (BEGIN, END))
-    assert start is not None and target is not None
-    raw = [lattice.centre(cell) for cell in search(lattice, start, target).path]
-    path = tightened(raw, office, RADIUS + MARGIN)
-    assert (path[0], path[-1]) == (raw[0], raw[-1]) and len(path) < len(raw) / 5
-    lines, _ = geometry(office)
-    assert shapely.distance(lines, shapely.LineString(path)) >= RADIUS + MARGIN - 1e-9
-    assert math.dist(path[0], path[-1]) <= length(path) < length(raw)
 
 
 def test_segments_distance_agrees_with_shapely(office: LineMap) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -23,44 +22,6 @@ START, TARGET = (5, 3), (6, 17)
 def open_map() -> np.ndarray:
     """Of 20 x 12 cells."""
     return np.ones((12, 20), dtype=np.bool_)
-
-
-def c_wall() -> np.ndarray:
-    """The same with a wall like a C that is open to the left."""
-    free = open_map()
-    free[3, 9:15] = free[8, 9:15] = False
-    free[3:9, 14] = False
-    return free
-
-
-@pytest.mark.parametrize(
-    ("free", "diagonal", "walk", "greedy", "best"),
-    [
-        (open_map(), False, 15.0, 15.0, 15.0),
-        (open_map(), True, 13 + math.sqrt(2), 13 + math.sqrt(2), 13 + math.sqrt(2)),
-        (c_wall(), False, 39.0, 31.0, 21.0),
-        (c_wall(), True, None, 13 + 4 * math.sqrt(2), 9 + 6 * math.sqrt(2)),
-    ],
-)
-def test_costs_on_the_maps_of_the_notes(
-    free: np.ndarray, diagonal: bool, walk: float | None, greedy: float, best: float
-) -> None:
-    """Figs. 6.8 and 6.10; by hand: 14 columns and one row apart; around the C the way is 6 longer."""
-    lattice = Lattice(free, diagonal=diagonal)
-    found = {method: search(lattice, START, TARGET, method) for method in METHODS}
-    assert found["dijkstra"].cost == pytest.approx(best)
-    assert found["astar"].cost == pytest.approx(found["dijkstra"].cost, abs=1e-9)
-    assert found["greedy"].cost == pytest.approx(greedy)
-    if walk is not None:
-        assert found["walk"].cost == pytest.approx(walk)
-    assert len(found["astar"].expanded) < len(found["dijkstra"].expanded)
-
-
-def test_dijkstra_expands_in_all_directions_and_greedy_straight_on() -> None:
-    lattice = Lattice(open_map(), diagonal=False)
-    greedy, all_around = (search(lattice, START, TARGET, method) for method in ("greedy", "dijkstra"))
-    assert greedy.cost == all_around.cost and 8 * len(greedy.expanded) <= len(all_around.expanded)
-    assert len(all_around.expanded) >= 0.75 * lattice.free.sum()
 
 
 def costs(lattice: Lattice, start: tuple[int, int]) -> np.ndarray:
@@ -108,23 +69,6 @@ def test_random_maps_agree_with_scipy(blocked: np.ndarray, diagonal: bool, data:
             assert found.cost == pytest.approx(best, abs=1e-9)
     dijkstras, stars = (search(lattice, start, target, method) for method in ("dijkstra", "astar"))
     assert len(set(stars.expanded)) == len(stars.expanded) <= max(len(dijkstras.expanded), 1)
-
-
-def test_costs_that_are_not_uniform_are_heeded() -> None:
-    """A graph of one's own: the longer way in nodes is the shorter one."""
-
-    class Three:
-        WAYS: ClassVar[dict[str, list[tuple[str, float]]]] = {"a": [("c", 5.0), ("b", 1.0)], "b": [("c", 1.0)], "c": []}
-
-        def neighbours(self, node: str) -> list[tuple[str, float]]:
-            return self.WAYS[node]
-
-        def distance(self, node: str, other: str) -> float:
-            return 0.0
-
-    for method in ("dijkstra", "astar"):
-        found = search(Three(), "a", "c", method)
-        assert (found.path, found.cost) == (["a", "b", "c"], 2.0)
 
 
 def test_there_is_no_path_and_no_such_search() -> None:
