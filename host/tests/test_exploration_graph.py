@@ -1,4 +1,4 @@
-"""Nodes of an exploration: the notes' examples, and what must hold for paths however nodes are reached and blocked."""
+"""Nodes of an exploration: what must hold for paths however nodes are reached and blocked. The notes' example: E36."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maps of lines, lattices, convex cells, tightened paths and ROS's maps, against shapely and by hand."""
+"""Maps of lines, lattices, convex cells and ROS's maps, against shapely and by hand."""
 
 from __future__ import annotations
 
