@@ -1,4 +1,4 @@
-"""Localization by scans: (6.8), the notes' random search, the particle filter, and the behavior on a robot."""
+"""Localization by scans: (6.8), estimators, and the behavior on a robot. The notes' random search: experiment E54."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from boebot.navigation import (
     tightened,
 )
 from boebot.navigation.frames import Pose, composed, inverse, placed
-from boebot.navigation.match import search_pose
 
 HALF_TURN = (-math.pi / 2, math.pi / 2)
 REACH, RAYS = 4.0, 120
@@ -62,10 +61,7 @@ def test_poses_are_composed_and_taken_apart() -> None:
 
 
 def test_scan_error_is_that_of_the_equation(office: LineMap, places: list[Pose]) -> None:
-    """(6.8): none without noise; with 1 % noise the root mean square of 120 relative deviations is near 1 %."""
-    exact = [scan_at(office, pose, 0.0).errors(office, [pose])[0] for pose in places]
-    noisy = [scan_at(office, pose, 0.01, k).errors(office, [pose])[0] for k, pose in enumerate(places)]
-    assert max(exact) < 1e-12 and 0.008 < np.mean(noisy) < 0.012 and max(noisy) <= 0.015
+    """(6.8), by hand 5 cm away."""
     scan, here = scan_at(office, places[0], 0.0), (0.05, 0.0, 0.0)
     moved = composed(places[0], here)
     (expected,) = office.scans([moved], HALF_TURN, RAYS, REACH)
@@ -93,21 +89,6 @@ def test_few_rays_are_those_of_all(office: LineMap, places: list[Pose]) -> None:
     whole = scan_at(office, places[0], 0.0)
     few = whole.thinned(30)
     assert len(few.distances) == 30 and few.errors(office, [places[0]])[0] < 1e-12
-
-
-def test_random_search_finds_what_is_near(office: LineMap, places: list[Pose]) -> None:
-    """Fig. 6.18: 200 tries from 0.1 m, 0.1 m and 0.1 rad off; ε never grows, and the box goes with what is better."""
-    found = []
-    for number, pose in enumerate(places):
-        start = pose[0] + 0.1, pose[1] - 0.1, pose[2] + 0.1
-        match = search_pose(scan_at(office, pose, seed=number), office, start, random.Random(number))
-        errors = [error for _, error in match.steps]
-        assert errors == sorted(errors, reverse=True) and len(set(errors)) == len(errors)
-        for (one, _), (other, _) in zip(match.steps, match.steps[1:], strict=False):
-            assert np.abs(np.subtract(one, other)).max() <= 0.05 + 1e-12
-        found.append((math.dist(match.pose[:2], pose[:2]), abs(match.pose[2] - pose[2]), errors[0] / match.error))
-    way, turn, gain = np.median(found, axis=0)
-    assert way < 0.02 and turn < 0.01 and gain > 10
 
 
 @pytest.mark.parametrize("kind", [RandomSearch, ParticleFilter])
