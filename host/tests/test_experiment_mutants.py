@@ -7,24 +7,17 @@ it raises instead is no success: whoever reads its figures would not learn what 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import pytest
+from mutants import Mutant
+from mutants_of_navigation import NAVIGATION
 
 from boebot.behaviors import ChargeBattery, Phototaxis, RunAndTumble, Wander
 from boebot.brain import utility
 from boebot.experiments import all_experiments, chemotaxis, economics, evolution, kinesis, predator, utility_theory
 
 pytestmark = pytest.mark.soak
-
-
-class Mutant(NamedTuple):
-    """An experiment, what is taken away from it, and how."""
-
-    experiment: str
-    taken_away: str
-    patch: Callable[[pytest.MonkeyPatch], None]
 
 
 # ---- section 7.1: utility theory -------------------------------------------------------------------------------------
@@ -145,9 +138,6 @@ OLD = [
     Mutant("robot-economics", "the way to the station", station_not_sought),
 ]
 """Of the experiments E17 to E35 and E56 to E68, and of those that have a name only."""
-
-NAVIGATION: list[Mutant] = []
-"""Of the experiments E36 to E55."""
 
 
 @pytest.mark.parametrize("mutant", [*OLD, *NAVIGATION], ids=lambda mutant: f"{mutant.experiment} {mutant.taken_away}")
