@@ -19,7 +19,7 @@ import pytest
 
 import boebot
 from boebot.boards import Truth
-from boebot.experiments.contract import FORBIDDEN, ROOMS, Met, imported, imports, is_within, walk
+from boebot.experiments.contract import FORBIDDEN, ROOMS, Met, forbidden, imported, imports, is_within, walk
 from boebot.robot import Robot
 
 IMPORTS = """
@@ -52,8 +52,8 @@ def test_the_test_of_imports_sees_what_it_looks_for() -> None:
 
 def test_no_module_of_brains_imports_a_forbidden_one_even_when_called() -> None:
     found = imports()
-    assert "boebot.behaviors.avoid" in found
-    assert [name for names in found.values() for name in names if is_within(name, FORBIDDEN)] == []
+    assert "boebot.behaviors.avoid" in found and forbidden(found) == []
+    assert forbidden({"boebot.brains.wander": {"boebot.arenas.arena"}}) != [], "a map is for authors to give"
 
 
 def test_imports_for_type_checkers_do_not_count() -> None:

@@ -1,6 +1,6 @@
 """Visit three rooms of the office again and again, and charge when the battery is low (chapters 6 and 8 of the notes).
 
-    boebot run rounds --robot roller --arena office --seconds 400
+    boebot run rounds --robot roller-charging --arena office --seconds 400
     boebot run rounds --robot shieldbot-turret --arena office --seconds 900
 
 Utilities decide, with E the battery's level and low = 1 - E:

@@ -78,8 +78,8 @@ class Scan:
         return np.where(np.isinf(nearest), -1.0, nearest)
 
     def errors(self, plan: LineMap, poses: ArrayLike) -> Floats:
-        """ε at each pose, shape (n,); infinite where too few rays are known on both sides: less than 20, or than 40 %
-        of a sweep that has few."""
+        """ε at each pose, shape (n,); infinite where too few rays are known on both sides: less than 20 (40 % of one
+        with few rays), or than half of those that have met something."""
         expected = self.expected(plan, poses)
         both = self.known & (expected >= 0.0)
         count = both.sum(axis=1)
@@ -87,11 +87,9 @@ class Scan:
         squares = np.where(both, 1.0 - expected / measured, 0.0) ** 2
         left_out = int(self.doubtful * len(self.distances))
         kept = np.sort(squares, axis=1)[:, : len(self.distances) - left_out]
-        return np.where(
-            count >= min(LEAST, 0.4 * len(self.distances)),
-            np.sqrt(kept.sum(axis=1) / np.maximum(count - left_out, 1)),
-            np.inf,
-        )
+        least = max(min(LEAST, 0.4 * len(self.distances)), 0.5 * self.known.sum())
+        error = np.sqrt(kept.sum(axis=1) / np.maximum(count - left_out, 1))
+        return np.where(count >= least, error, np.inf)
 
 
 def heard(ranges: Floats, step: float, grazing: float) -> Floats:

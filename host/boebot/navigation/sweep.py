@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 AWAY_S = 1.0  # without a call, and the next one begins anew
 
 
-def laser_scan(robot: Robot, device: str = "laser", place: Point = (0.0, 0.0), reach: float = 4.0) -> Scan | None:
-    """The newest sweep of a laser range finder; None: there is none yet."""
+def laser_scan(
+    robot: Robot, device: str = "laser", place: Point = (0.0, 0.0), reach: float = 4.0, doubtful: float = 0.0
+) -> Scan | None:
+    """The newest sweep of a laser range finder; None: there is none yet. Terms are those of `Scan`."""
     sweep = getattr(robot, device)
     if not sweep.valid:
         return None
     distances = np.array(sweep.distances, dtype=np.float64)
-    return Scan(distances, (sweep.angles[0], sweep.angles[-1]), reach, place)
+    return Scan(distances, (sweep.angles[0], sweep.angles[-1]), reach, place, doubtful=doubtful)
 
 
 @dataclass
@@ -89,6 +91,9 @@ class Sweep:
     """By the robot's laser, or where it has none by the sonar on its turret. Is called as a `TurretScan` is."""
 
     turret: TurretScan = field(default_factory=TurretScan)
+    doubtful: float = 0.1
+    """share of the laser's rays, those that fit worst, that do not count: beside an edge a ray is off by metres where
+    the pose is off by little"""
 
     def __call__(self, robot: Robot) -> Scan | None:
         """The sweep; None: it is not done yet.
@@ -96,4 +101,4 @@ class Sweep:
         Raises:
             BrainError: the robot has neither.
         """
-        return laser_scan(robot) if robot.has("laser") else self.turret(robot)
+        return laser_scan(robot, doubtful=self.doubtful) if robot.has("laser") else self.turret(robot)

@@ -1,0 +1,184 @@
+"""Exploration and driving to places on a map, on the robot with a laser and on the Shield-Bot with a sonar on a turret.
+
+The figures, hundreds of runs, are in test_navigation_figures.py.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import boebot
+from boebot.brain import Brain, CognitiveProcess, Utility
+from boebot.cognition import Odometry
+from boebot.errors import BrainError
+from boebot.experiments.exploring import explored, explorer, starts
+from boebot.navigation import Coverage, Explore, GoTo, LineMap, Localization, Scan, TurretScan
+from boebot.navigation.corridor import is_clear
+from boebot.navigation.scan_error import heard
+
+HALF_TURN = (-math.pi / 2, math.pi / 2)
+
+
+@pytest.fixture(scope="module")
+def office() -> LineMap:
+    return LineMap.of("office")
+
+
+# ---- what is seen ----------------------------------------------------------------------------------------------------
+
+
+def test_corridor_is_as_wide_and_as_long_as_it_says() -> None:
+    """A wall 1 m ahead and a post 0.3 m to the left of the way."""
+    angles = np.linspace(*HALF_TURN, 181)
+    distances = np.where(np.abs(angles) < 0.05, 1.0, -1.0)
+    distances[np.abs(angles - math.atan2(0.3, 0.5)).argmin()] = math.hypot(0.3, 0.5)
+    scan = Scan(distances, HALF_TURN, 4.0)
+    assert is_clear(scan, 0.0, 0.95, 0.25) and not is_clear(scan, 0.0, 1.05, 0.25)
+    assert not is_clear(scan, 0.0, 0.95, 0.35) and is_clear(scan, 0.0, 0.45, 0.35)
+    assert is_clear(scan, -1.0, 4.0, 0.2)
+
+
+def test_coverage_is_the_part_of_the_floor_in_the_fan() -> None:
+    """In the middle of a square of 2 m: half a turn sees one half, two of them all, short rays half a disc."""
+    square = [[[-1, -1], [1, -1]], [[1, -1], [1, 1]], [[1, 1], [-1, 1]], [[-1, 1], [-1, -1]]]
+    plan = LineMap.from_lines(square)
+    half, near = Coverage(plan), Coverage(plan)
+    half.add((0.0, 0.0, 0.0), HALF_TURN, 181, 4.0)
+    assert half.share == pytest.approx(0.5, abs=0.02)
+    half.add((0.0, 0.0, math.pi), HALF_TURN, 181, 4.0)
+    assert half.share == 1.0
+    near.add((0.0, 0.0, 1.0), HALF_TURN, 181, 0.5)
+    assert near.share == pytest.approx(math.pi * 0.5**2 / 2 / 4, abs=0.01)
+
+
+def test_what_a_wall_hides_is_not_covered() -> None:
+    """A wall across a room of 2 m by 1 m: from the left half the right one is not seen."""
+    outline = [[[0, 0], [2, 0]], [[2, 0], [2, 1]], [[2, 1], [0, 1]], [[0, 1], [0, 0]]]
+    coverage = Coverage(LineMap.from_lines([*outline, [[1, 0], [1, 1]]]))
+    coverage.add_path([(0.5, 0.5, heading) for heading in np.linspace(-math.pi, math.pi, 25)], HALF_TURN, 181, 4.0)
+    assert coverage.share == pytest.approx(0.5, abs=0.03)
+
+
+def test_sonar_hears_a_wall_up_to_the_grazing_angle() -> None:
+    """Of a wall 1 m away a ray at ψ to its normal ends after 1 / cos ψ; beyond 45 degrees nothing comes back."""
+    angles = np.radians(np.arange(-80, 81, 5))
+    rays = heard(1 / np.cos(angles)[None, :], math.radians(5), math.radians(45))[0]
+    silent = np.abs(np.degrees(angles)) > 48
+    assert np.isinf(rays[silent]).all() and np.isfinite(rays[np.abs(np.degrees(angles)) < 42]).all()
+
+
+def test_beam_hears_the_nearest_surface_in_it() -> None:
+    """A beam of 40 degrees, 1 m from a wall: within 20 degrees of its normal it hears the foot of the normal."""
+    plan = LineMap.from_lines([[[1, -5], [1, 5]]])
+    scan = Scan(np.ones(19), HALF_TURN, 2.5, beam=math.radians(40), grazing=math.radians(45))
+    (expected,) = scan.expected(plan, [(0.0, 0.0, 0.0)])
+    for degrees, distance in zip(range(-90, 91, 10), expected, strict=True):
+        nearest = max(0, abs(degrees) - 20)
+        wanted = 1 / math.cos(math.radians(nearest)) if nearest <= 45 else -1.0
+        assert distance == pytest.approx(wanted, rel=0.01), degrees
+
+
+@pytest.mark.parametrize("on", ["native", "avr"])
+def test_turret_scan_is_what_the_map_lets_expect(on: str, office: LineMap) -> None:
+    """Through board, line and host, with the imperfections of a real Ping: the directions that fit, fit to some %."""
+    pose = (-0.7, 1.2, 0.3)
+    sweeps: list[Scan] = []
+    scan = TurretScan()
+
+    def step(robot: boebot.Robot) -> None:
+        robot.stop()
+        if (sweep := scan(robot)) is not None:
+            sweeps.append(sweep)
+
+    boebot.run(step, robot="shieldbot-turret", arena="office", pose=pose, on=on, seconds=4.5, record=False)
+    assert len(sweeps) == 1
+    there, beside = sweeps[0].errors(office, [pose, (pose[0] + 0.1, pose[1] + 0.1, pose[2] + 0.2)])
+    assert there < 0.03 and beside > 3 * there
+
+
+def test_robot_without_range_finder_is_one_sentence() -> None:
+    brain = Brain([Odometry(), Explore()])
+    with pytest.raises(BrainError, match="turret"):
+        boebot.run(brain, robot="arsim", arena="room", seconds=2, record=False)
+
+
+# ---- exploration -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arena", ["exploration", "exploration-block"])
+def test_rooms_are_explored(arena: str) -> None:
+    seen = LineMap.of("exploration")
+    (start,) = starts(arena, 5, 1)
+    run = explored(arena, seen, start, 1, explorer())
+    assert run.share >= 0.995 and run.is_complete and not run.trial.has_collided
+
+
+# ---- driving to places -----------------------------------------------------------------------------------------------
+
+
+class Errand(CognitiveProcess):
+    """Says once where to go."""
+
+    goal = (0.0, 0.0)
+
+    def step(self, robot: boebot.Robot) -> None:
+        if self.other(GoTo).goal is None:
+            self.other(GoTo).go(self.goal)
+
+
+def errand(plan: LineMap, start: tuple[float, float, float], goal: tuple[float, float]) -> tuple[Brain, GoTo]:
+    """A brain that goes to a place, and what drives there."""
+    due = Utility(b=-1.0, w={"due": 3.0}, tau=0.05)
+    localization = Localization(plan=plan, start=start, every=8.0, utility=due)
+    go, order = GoTo(localization=localization, speed=0.25, turn_speed=0.1, utility=Utility(b=0.5)), Errand()
+    order.goal = goal
+    return Brain([Odometry(), localization, order, go], [localization.due_variable]), go
+
+
+def test_way_leads_there_and_a_scan_says_so(office: LineMap) -> None:
+    start, goal = (-2.5, 0.0, 0.0), (1.2, 1.3)
+    brain, go = errand(office, start, goal)
+    result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=45)
+    assert result.true_pose is not None
+    assert go.arrived and math.dist((result.true_pose.x[-1], result.true_pose.y[-1]), goal) < 0.12
+    assert result.true_contacts == 0
+    way = [begin + share * (end - begin) for begin, end in _legs(go.way) for share in np.linspace(0, 1, 50)]
+    assert office.distance(way).min() >= 0.15 + go.margin - 1e-9
+
+
+def _legs(way: list[tuple[float, float]]) -> list[tuple[np.ndarray, np.ndarray]]:
+    return [(np.array(one), np.array(other)) for one, other in itertools.pairwise(way)]
+
+
+@pytest.mark.parametrize("goal", [(1.9, -1.35), (9.0, 0.0)], ids=["in a table", "outside"])
+def test_no_path_is_said_and_the_robot_stands(goal: tuple[float, float], office: LineMap) -> None:
+    start = (-2.5, 0.0, 0.0)
+    brain, go = errand(office, start, goal)
+    result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=3)
+    assert go.no_path and not go.arrived and result.true_distance == pytest.approx(0.0, abs=0.01)
+
+
+def test_map_of_another_arena_makes_it_lost() -> None:
+    """Two scans that fit nowhere: it stops, and says so."""
+    start = (-2.5, 0.0, 0.0)
+    brain, go = errand(LineMap.of("maze"), start, (0.0, 0.0))
+    result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=40)
+    assert result.true_pose is not None
+    last = np.asarray(result.series.time) >= 36.0
+    assert go.lost and not go.arrived and np.ptp(result.true_pose.x[last]) < 0.005
+
+
+# ---- whole brains ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", ["roller-charging", "shieldbot-turret"])
+def test_rounds_visits_rooms(robot: str) -> None:
+    result = boebot.run("rounds", robot=robot, arena="office", seconds=60)
+    assert result.true_pose is not None and result.true_contacts == 0
+    rooms = [(-0.7, 1.2), (1.2, 1.3), (-1.5, -1.2)]
+    path = np.column_stack((result.true_pose.x, result.true_pose.y))
+    assert np.hypot(*(path - rooms[0]).T).min() < 0.12
