@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import subprocess
 import sys
@@ -33,6 +34,16 @@ def test_terminal_with_ascii_only_is_given_the_nearest_characters() -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "100"}
     table = subprocess.run([*BOEBOT, "parameters", "list"], capture_output=True, env=environment, check=True)
     assert b" 0 ... 4095" in table.stdout and table.stdout.isascii() and table.stderr == b""
+
+
+def test_json_stands_alone_however_a_brain_prints(tmp_path: Path) -> None:
+    lines = ["print('a')", "os.write(1, b'b')", "sys.__stdout__.write('c')", "os.system('echo d')"]
+    (tmp_path / "prints.py").write_text(f"import os, sys\ndef step(robot):\n    {'; '.join(lines)}\n")
+    done = subprocess.run(
+        [*BOEBOT, "run", "prints.py", "--seconds", "0.05", "--json"], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert json.loads(done.stdout)["ended"] == "complete" and done.returncode == 0
+    assert sorted("".join(done.stderr.split())) == ["a", "b", "c", "d"]
 
 
 def test_brain_may_print_any_character_to_a_terminal_with_ascii_only(tmp_path: Path) -> None:

@@ -5,13 +5,11 @@ Exit codes: 0 it is bit-equal; 1 it differs; 2 it cannot be repeated.
 
 from __future__ import annotations
 
-import contextlib
-import sys
 from pathlib import Path
 
 import typer
 
-from boebot.cli import output
+from boebot.cli import output, streams
 from boebot.errors import BoebotError
 from boebot.running.again import Repetition, again, recorded
 
@@ -23,7 +21,7 @@ def run_again(folder: Path, as_json: bool) -> None:
     try:
         run = recorded(folder)
         with (
-            contextlib.redirect_stdout(sys.stderr),  # the brain may print; the answer stands alone
+            streams.kept_for_the_answer(),
             output.progress_bar(f"{folder} again", run.seconds) as bar,
             output.step_watch(bar) as progress,
         ):

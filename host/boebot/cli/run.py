@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import math
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from boebot.brains import bundled
-from boebot.cli import completion, options, output, quantity
+from boebot.cli import completion, options, output, quantity, streams
 from boebot.cli.again import run_again
 from boebot.cli.ending import end
 from boebot.cli.run_table import detail
@@ -103,7 +102,7 @@ def run(
     ] = False,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Where to write run.csv, run.png, replay.html and raw bytes."),
+        typer.Option(metavar="DIR", help="Where to write record.mcap, run.png, replay.html and summary.json."),
     ] = None,
     repeated: Annotated[
         Path | None,
@@ -152,7 +151,7 @@ def run(
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
             if json:  # it stands alone on standard output, whatever a brain prints
-                shown.enter_context(contextlib.redirect_stdout(sys.stderr))
+                shown.enter_context(streams.kept_for_the_answer())
             bar = shown.enter_context(output.progress_bar(name if on is None else f"{name} on {on}", seconds, quiet))
             progress = shown.enter_context(output.step_watch(bar))
 

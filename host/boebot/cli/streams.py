@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import io
 import os
 import sys
 import unicodedata
+from collections.abc import Iterator
 
 _IN_ASCII = {
     "µ": "u",
@@ -22,6 +24,7 @@ _IN_ASCII = {
     "≥": ">=",
 }
 _OTHER = "?"
+_STDOUT, _STDERR = 1, 2  # file descriptors
 
 
 def accept_all_characters() -> None:
@@ -42,6 +45,27 @@ def _in_ascii(error: UnicodeError) -> tuple[str, int]:
 def _decomposed(char: str) -> str:
     """Without accents and the like, as "e" of "é" and "..." of "…"."""
     return "".join(part for part in unicodedata.normalize("NFKD", char) if part.isascii()) or _OTHER
+
+
+@contextlib.contextmanager
+def kept_for_the_answer() -> Iterator[None]:
+    """What a brain prints meanwhile goes to standard error: also what it prints by the system, or by a program that it
+    starts. Standard output is left to the answer that follows."""
+    with contextlib.redirect_stdout(sys.stderr):
+        try:
+            own = os.dup(_STDOUT)
+        except OSError:  # it is closed
+            yield
+            return
+        try:
+            with contextlib.suppress(OSError):
+                os.dup2(_STDERR, _STDOUT)
+            yield
+        finally:
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                sys.__stdout__.flush()  # type: ignore[union-attr]
+            os.dup2(own, _STDOUT)
+            os.close(own)
 
 
 def finish() -> None:
