@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
-from boebot.errors import BoardError
+from boebot.errors import BoardError, did_you_mean
 from boebot.link.ports.holders import holder_of as holder_of  # for those who serve boards
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import open_serial
@@ -426,6 +426,7 @@ def _unknown(url: str) -> str:
     return (
         f"there is no board {url!r}; expected an emulated board ({emulated}), "
         "a port such as /dev/ttyACM0 or serial:PORT, socket://HOST:PORT, or rfc2217://HOST:PORT"
+        + did_you_mean(url, kinds)
     )
 
 

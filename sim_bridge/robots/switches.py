@@ -16,7 +16,7 @@ import msgspec
 
 from boebot.description import robots
 from boebot.devices.device import VehicleDevice
-from boebot.errors import BoardError
+from boebot.errors import BoardError, did_you_mean
 from sim_bridge.devices import catalogue
 from sim_bridge.devices.catalogue import Switch, off
 
@@ -43,6 +43,7 @@ def neutral(without: Iterable[str]) -> dict[str, float]:
         if name not in switches():
             raise BoardError(
                 f"there is no imperfection {name!r} to switch off; expected some of {', '.join(switches())}"
+                + did_you_mean(name, switches())
             )
         values |= switches()[name].neutral
     return values

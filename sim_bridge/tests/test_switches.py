@@ -449,7 +449,9 @@ def test_one_robot_of_several() -> None:
 
 @pytest.mark.parametrize("robot", ["shieldbot", "arsim"])
 def test_unknown_names_get_a_sentence(robot: str) -> None:
-    with pytest.raises(BoardError, match=r"no imperfection 'slipp' to switch off; expected some of .*sampling$"):
+    with pytest.raises(
+        BoardError, match=r"no imperfection 'slipp' to switch off; expected some of .*sampling; did you mean 'slip'\?$"
+    ):
         boebot.run("wander", robot=robot, seconds=1, without=("slip", "slipp"))
     for wrong in ("slip", 3, [3]):
         with pytest.raises(BoebotError, match=r"without is .*; expected a list of names"):

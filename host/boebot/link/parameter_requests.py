@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, did_you_mean
 from boebot.link import messages, mismatch
 from boebot.link.line import Line
 from boebot.link.requests import RequestKind, check
@@ -23,7 +23,10 @@ def parameter_spec(name: str) -> messages.ParameterSpec:
     """
     spec = messages.PARAMETERS.get(name)
     if spec is None:
-        raise BoebotError(f"there is no parameter {name!r}; expected one of {', '.join(messages.PARAMETERS)}")
+        raise BoebotError(
+            f"there is no parameter {name!r}; expected one of {', '.join(messages.PARAMETERS)}"
+            + did_you_mean(name, messages.PARAMETERS)
+        )
     return spec
 
 
