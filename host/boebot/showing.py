@@ -122,7 +122,8 @@ class Showing:
                 self._tell("names", f"the brain shows more than {NAMES} values: {name!r} and others are left out")
                 return
         if isinstance(value, str):
-            self.values[name] = value if len(value) <= LETTERS else value[: LETTERS - 1] + "…"
+            text = value if len(value) <= LETTERS else value[: LETTERS - 1] + "…"
+            self.values[name] = text.encode(errors="replace").decode()  # as undecodable bytes of a file name
             return
         try:
             self.values[name] = float(value)  # type: ignore[arg-type]
@@ -154,7 +155,8 @@ class Showing:
     def take(self) -> list[ShownRow]:
         """What is to be kept, since this was last asked. It is taken from here, for a brain reaches its robot, and no
         way may lead from there to the record, which has the world's truth."""
-        taken, self._rows = self._rows, []
+        taken = self._rows[:]
+        del self._rows[: len(taken)]  # the brain may add one meanwhile, in another thread
         return taken
 
     def end(self) -> None:
@@ -214,7 +216,7 @@ def _check_name(call: str, name: object) -> None:
 
 
 def _points(layer: str, what: str, points: ArrayLike) -> bytes:
-    """Those that are numbers, as float32."""
+    """Those that are numbers, and fit into float32."""
     try:
         pairs = np.asarray(points, dtype=np.float64)
     except (TypeError, ValueError):
@@ -223,7 +225,8 @@ def _points(layer: str, what: str, points: ArrayLike) -> bytes:
         return b""
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise BrainError(f"sketch({layer!r}): {what} expects pairs, as in [(0.1, 0.2), (0.3, 0.4)], in m")
-    return pairs[np.isfinite(pairs).all(axis=1)].astype("<f4").tobytes()
+    known = np.isfinite(pairs) & (np.abs(pairs) <= np.finfo(np.float32).max)
+    return pairs[known.all(axis=1)].astype("<f4").tobytes()
 
 
 def _lines(layer: str, lines: object) -> list[bytes]:

@@ -222,6 +222,16 @@ def test_brain_that_never_stops_showing_is_bounded_and_told_once() -> None:
     assert any("more than 50 kB in a second" in sentence for sentence in notices)
 
 
+def test_what_no_file_can_hold_is_replaced_or_left_out() -> None:
+    def odd(robot: boebot.Robot) -> None:
+        robot.show("name", "a\udcff")  # as of a file whose name is no UTF-8
+        robot.sketch("far", points=[(1e39, 0.0), (1.0, 2.0)])
+
+    result = boebot.run(odd, robot="arsim", arena="empty", seconds=0.1)
+    assert [*result.shown.texts["name"]][-1] == "a?"
+    assert result.layers[0].sketches[-1].points == np.array([1, 2], "<f4").tobytes()
+
+
 def test_run_says_what_was_left_out() -> None:
     def many(robot: boebot.Robot) -> None:
         for index in range(40):
