@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import subprocess
 import sys
 import time
@@ -105,6 +107,25 @@ def test_what_is_no_record_is_one_sentence(tmp_path: Path, name: str, content: b
     assert done.returncode == 1 and sentence in done.stderr and len(done.stderr.splitlines()) == 1
 
 
+def test_record_goes_on_while_a_step_lasts(tmp_path: Path) -> None:
+    kept: list[tuple[float, int]] = []  # last value that was shown (s), steps
+
+    def step(robot: library.Robot) -> None:
+        robot.show("time_s", robot.time)
+        until = time.monotonic() + 8 * (robot.time > 0.975)
+        while not kept and time.monotonic() < until:
+            time.sleep(0.05)
+            with contextlib.suppress(library.BoebotError):  # it has hardly begun
+                cut = read(tmp_path)
+                kept.extend([(float(cut.shown.time[-1]), cut.steps)] if cut.ticks else [])
+
+    whole = library.run(step, robot="arsim", seconds=2, out=tmp_path)
+    ((shown_s, steps),) = kept
+    assert shown_s == pytest.approx(0.95) and steps == 20
+    assert whole.record.count("command") == whole.steps == 40
+    assert whole.shown.time[-1] == pytest.approx(1.95)
+
+
 @pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a small disk")
 def test_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path: Path) -> None:
     disk = tmp_path / "disk"
@@ -115,6 +136,10 @@ def test_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path: Path) -> None:
     if mounted.returncode:
         pytest.skip("a small disk cannot be mounted")
     try:
+        done = boebot("run", "wander", "--seconds", "1e6", "--out", str(disk / "run"), "--json")
+        figures = json.loads(done.stdout)
+        assert figures["run_time_s"] > 1  # its first second was too much for the disk: nothing is known of it
+        assert all(figures[name] is None for name in ("true_distance_m", "odometry_distance_m", "whisker_touches"))
         (tmp_path / "slow.py").write_text("import time\ndef step(robot):\n    time.sleep(0.01)\n")
         done = boebot("run", str(tmp_path / "slow.py"), "--seconds", "1e6", "--out", str(disk / "run"))
         assert done.returncode == 1

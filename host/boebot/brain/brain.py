@@ -162,9 +162,10 @@ class Brain:
         """The steps and switches of that robot's run since this was last asked; they are forgotten here."""
         if robot is not self._robot:
             return [], []
-        taken = self.steps, self.switches
-        self.steps, self.switches = [], []
-        return taken
+        steps, switches = self.steps[:], self.switches[:]
+        del self.steps[: len(steps)]  # the brain may add one meanwhile, in another thread
+        del self.switches[: len(switches)]
+        return steps, switches
 
     def is_active(self, process: Process) -> bool:
         """Whether one of the brain's processes is active."""

@@ -109,5 +109,6 @@ def _row(number: int, robot: RunResult) -> tuple[str, ...]:
     """Of one of several, under `HEADER`."""
     table = robot.table()
     ended = "complete" if robot.error is None else "ended early"
-    cells = (figures.text(table[name]) for name in ("true_distance_m", "true_contacts", "whisker_touches"))
+    values = (table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches"))
+    cells = ("-" if value is None else figures.text(value) for value in values)
     return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}"

@@ -37,7 +37,7 @@ class Overview:
         odometry: at these ticks, as seen from the start; None: the robot has none.
         contact: at these ticks, whether the body touches something.
         true_distance, odometry_distance: path lengths. None: as above.
-        true_contacts, whisker_touches: how many. None: nobody knows; the robot has no whiskers.
+        true_contacts, whisker_touches: how many. None: nobody knows, or the robot has none.
         contact_places, touch_places: where the robot was at them, shape (n, 2).
         overruns, dead_man_stops, fallback_takeovers: counted.
         slow_reading_age: the greatest that a slow device's reading had at a step of the brain; None: none had one.
@@ -268,7 +268,7 @@ def overview(
         true_distance=true_walk.length if has_truth and ticks else None,
         odometry_distance=odometry_walk.length if has_odometry and ticks else None,
         true_contacts=contacts.places.count if has_truth and ticks else None,
-        whisker_touches=counts.touches if whiskers else None,
+        whisker_touches=counts.touches if whiskers and ticks else None,
         contact_places=contacts.places.found,
         touch_places=touches.found,
         overruns=counts.overruns,

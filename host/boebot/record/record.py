@@ -99,6 +99,10 @@ class Record:
             self._counted(rows)
             self._keeper.write(rows, time_s)
 
+    def recount(self) -> None:
+        """Some of the rows that were handed over could not be kept; they do not count."""
+        self._counts = None
+
     def _counted(self, rows: Rows) -> None:
         if self._counts is not None:
             self._counts.update({stream: len(some) for stream, some in rows.items()})

@@ -15,6 +15,7 @@ import msgspec
 from boebot.errors import BoebotError
 from boebot.record.keepers import Keeper, OnDisk, Shared, Temporary
 from boebot.record.record import Record, Unrecorded
+from boebot.record.record_file import RecordError
 from boebot.record.run_folder import FORMAT, RECORD, RunFolder
 
 if TYPE_CHECKING:
@@ -67,14 +68,17 @@ class Recording:
 
     def end(self, results: Sequence[RunResult]) -> BoebotError | None:
         """Nothing comes any more. Returns why the record is not whole. `results`: what is known at the run's end."""
-        if self._disk is None:
-            return None
-        try:
-            self._disk.writer.attach(END, say(results), JSON)
-            self._disk.finish()
-        except BoebotError as error:
-            return error
-        return None
+        failure: BoebotError | None = None
+        if self._disk is not None:
+            try:
+                self._disk.writer.attach(END, say(results), JSON)
+                self._disk.finish()
+            except BoebotError as error:
+                failure = error
+        if failure is not None or any(isinstance(result.error, RecordError) for result in results):
+            for record in self.records:
+                record.recount()
+        return failure
 
 
 def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None) -> bytes:

@@ -202,7 +202,12 @@ def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> 
     """The whole run, from the robot made ready to its result; `unended` gets one that cannot be returned."""
     error: BaseException | None = None
     times = StepTimes()
+    time_s = 0.0
     started = wall.perf_counter()
+
+    def keep_due() -> None:
+        if task.record.is_due():
+            keep_rows(driver, task, time_s)
 
     def take_over() -> None:
         driver.end()
@@ -212,10 +217,9 @@ def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> 
     try:
         driver.begin()
         started = wall.perf_counter()
-        with StepWatch(driver.step_limit, take_over) as watch:
-            for time_s in driver.steps():
-                if task.record.is_due():
-                    keep_rows(driver, task, time_s)
+        with StepWatch(driver.step_limit, take_over, keep_due) as watch:
+            for time_s in driver.steps():  # noqa: B007 (keep_due needs it)
+                keep_due()
                 if task.brain.is_over:
                     break
                 step_once(driver.robot, task.brain, watch, times)

@@ -12,6 +12,7 @@ ends the process.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import signal
 import sys
@@ -25,7 +26,7 @@ from typing import Any, NamedTuple
 from boebot import brains
 from boebot.brain.pausable_thread import throw
 from boebot.brains import LoadedBrain
-from boebot.errors import BrainError
+from boebot.errors import BoebotError, BrainError
 from boebot.robot import Command, Robot
 from boebot.running import interrupts
 from boebot.running.interrupts import wishes
@@ -137,15 +138,23 @@ class StepWatch:
     thread; elsewhere it ends when that call does.
     """
 
-    def __init__(self, limit: StepLimit, take_over: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self,
+        limit: StepLimit,
+        take_over: Callable[[], None] | None = None,
+        keep_due: Callable[[], None] | None = None,
+    ) -> None:
         """
         Args:
             limit: may be changed between two steps.
             take_over: does what is left to do in the run, in the watching thread, if a step goes on after Ctrl-C; the
                 process ends then. None: nothing is left to do.
+            keep_due: puts what happened before a step that lasts into the record, in the watching thread, while the
+                step goes on. None: there is no record.
         """
         self.limit = limit
         self._take_over = take_over
+        self._keep_due = keep_due
         self._wishes = 0  # to end, before the step
         self._unheard_s = math.inf  # since when there is one that the main thread has not heard of
         self._thread = 0  # which the steps run in
@@ -223,6 +232,7 @@ class StepWatch:
         while not self._ended.wait(look_s := min(self.limit.seconds / _LOOKS, _LOOK_S)):
             if self._inside and self._wakes and self._goes_on():
                 self._end_process()
+            self._keep()
             if not self._inside or self._count != seen or self._in_debugger():
                 seen, looks = self._count, 0
                 continue
@@ -230,6 +240,12 @@ class StepWatch:
             if looks * look_s >= self.limit.seconds * (1 - 1e-9):
                 looks = 0  # a brain that catches it is asked again
                 self._interrupt()
+
+    def _keep(self) -> None:
+        with self._lock:  # the step cannot end meanwhile
+            if self._inside and self._keep_due is not None:
+                with contextlib.suppress(BoebotError):  # the run's next turn meets it again
+                    self._keep_due()
 
     def _interrupt(self) -> None:
         with self._lock:

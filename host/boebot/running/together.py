@@ -220,7 +220,7 @@ class _Run:
                 put_away(result)
 
         try:
-            with StepWatch(AT_LEISURE, take_over) as watch:
+            with StepWatch(AT_LEISURE, take_over, self._keep_due) as watch:
                 self._loop(watch)
         except (BoebotError, KeyboardInterrupt) as caught:
             error = caught
@@ -257,6 +257,9 @@ class _Run:
         """What is due to be kept; nothing happens meanwhile."""
         if not self._is_recorded and all(robot.driver is not None for robot in self._robots):
             self._begin_record()
+        self._keep_due()
+
+    def _keep_due(self) -> None:
         for robot in self._robots:
             if self._is_recorded and not robot.is_ending and robot.task.record.is_due():
                 assert robot.driver is not None
