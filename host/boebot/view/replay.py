@@ -221,4 +221,6 @@ def _points(points: Floats) -> list[list[float]]:
 
 
 def _array(values: Floats) -> str:
-    return base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")
+    with np.errstate(over="ignore"):  # what a brain shows may be beyond float32: infinite on the page
+        single = values.astype("<f4")
+    return base64.b64encode(single.tobytes()).decode("ascii")
