@@ -1,4 +1,4 @@
-"""Commands on the record of a run: `boebot plot`, `boebot run --again` and `boebot replay`."""
+"""Commands on the record of a run: `boebot report`, `boebot plot`, `boebot run --again` and `boebot replay`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("runs") / "run"
     library.run("wander", seconds=2, out=folder)
     return folder
+
+
+def test_report_prints_figures_though_its_files_cannot_be_written(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, folder: Path
+) -> None:
+    (tmp_path / "record.mcap").write_bytes((folder / "record.mcap").read_bytes())
+    (tmp_path / "summary.json").mkdir()
+    code, out, err = boebot(capsys, "report", str(tmp_path), "--json")
+    assert code == 1 and json.loads(out)["ticks"] == 201 and json.loads(out)["files"] == []
+    assert err == f"boebot: the run's files cannot be written to {tmp_path}: Is a directory\n"
 
 
 def test_columns_are_drawn(

@@ -9,9 +9,11 @@ import typer
 
 from boebot.cli import ending, options, output
 from boebot.cli.run_table import Detail, detail, print_run
+from boebot.errors import BoebotError
 from boebot.record.mending import mend
 from boebot.record.reading import CutError, read_run, robots_of
 from boebot.record.run_folder import RECORD, RunFolder
+from boebot.view import IncompleteError
 
 
 def report(
@@ -33,18 +35,27 @@ def report(
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
     folder = run if run.is_dir() else run.parent
     result = read_run(run)
+    files: list[Path] = []
+    unsaved: BoebotError | None = None
     with RunFolder(folder):
-        files = result.save(folder, csv=csv)
-        if foxglove:
-            from boebot.view import save_for_foxglove
+        try:
+            files += result.save(folder, csv=csv)
+            if foxglove:
+                from boebot.view import save_for_foxglove
 
-            files.append(save_for_foxglove([*robots_of(result).values()], folder))
-        if mended and isinstance(result.error, CutError):
-            files.append(mend(folder / RECORD, result))
+                files.append(save_for_foxglove([*robots_of(result).values()], folder))
+            if mended and isinstance(result.error, CutError):
+                files.append(mend(folder / RECORD, result))
+        except BoebotError as error:  # the figures are printed all the same
+            unsaved = error
+            files += error.files if isinstance(error, IncompleteError) else []
     if isinstance(result.error, CutError):
         output.say(str(result.error))
     if wanted is Detail.JSON:
         output.print_json(result.table() | {"files": [str(path) for path in files]})
     elif wanted is not Detail.NOTHING:
         print_run(result, wanted)
-        output.line(ending.files_in(folder, files))
+        if files:
+            output.line(ending.files_in(folder, files))
+    if unsaved is not None:
+        raise unsaved
