@@ -216,6 +216,21 @@ def test_a_robot_that_extends_another_names_the_right_file_and_line(tmp_path: Pa
         load_robot(tmp_path / "other.toml")
 
 
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[device.pingg]\non = false", r"^mine\.toml:2: device\.pingg: 'shieldbot' has no such device; .*'ping'\?$"),
+        ("remove = ['pingg']", r"^mine\.toml removes device 'pingg', which 'shieldbot' does not have; .*'ping'\?$"),
+        ("[device.it]\ntype = 'pingg'", r"^mine\.toml:3: device\.it: type is 'pingg'; .*; did you mean 'ping'\?$"),
+    ],
+)
+def test_the_device_that_was_meant_is_named(tmp_path: Path, text: str, sentence: str) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(f"extends = 'shieldbot'\n{text}\n")
+    with pytest.raises(RobotError, match=sentence):
+        load_robot(file)
+
+
 def test_reading_a_large_file_is_announced_and_its_errors_have_their_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,7 +22,7 @@ from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_nu
 from boebot.devices.encoder import WheelEncoder
 from boebot.devices.equipment import RENAMED
 from boebot.devices.motor import Motor
-from boebot.errors import RobotError
+from boebot.errors import RobotError, did_you_mean
 from boebot.robot import Robot
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -173,9 +173,19 @@ def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
     if base_path in seen:
         raise RobotError(f"{path.name} extends itself by way of {base_name!r}")
     base = _read(base_path, (*seen, path))
+    devices = base.get("device", {})
     for name in removed:
-        if base.get("device", {}).pop(name, None) is None:
-            raise RobotError(f"{path.name} removes device {name!r}, which {base_name!r} does not have")
+        if name not in devices:
+            hint = did_you_mean(name, devices)
+            raise RobotError(f"{path.name} removes device {name!r}, which {base_name!r} does not have{hint}")
+        del devices[name]
+    for name, value in table.get("device", {}).items():
+        if name not in devices and isinstance(value, dict) and "type" not in value:
+            at = toml_files.where(table, path.name, f"device.{name}")
+            raise RobotError(
+                f"{at}: device.{name}: {base_name!r} has no such device; expected one of {', '.join(devices)}, or a "
+                f"type for a new one{did_you_mean(name, devices)}"
+            )
     return toml_files.overlaid(_overlay(base, table), table, base)
 
 

@@ -215,8 +215,10 @@ def _union_fault(value: Any, choices: tuple[Any, ...], key: str) -> Fault | None
     field = choices[0].__struct_config__.tag_field
     tag = value.get(field)
     if not isinstance(tag, str) or tag not in by_tag:
+        known = sorted(map(str, by_tag))
+        hint = did_you_mean(tag, known) if isinstance(tag, str) else ""
         return Fault(
-            _below(key, field), f"{at}{field} is {reprlib.repr(tag)}; expected one of {', '.join(sorted(by_tag))}"
+            _below(key, field), f"{at}{field} is {reprlib.repr(tag)}; expected one of {', '.join(known)}{hint}"
         )
     return _fault({name: entry for name, entry in value.items() if name != field}, by_tag[tag], key)
 
