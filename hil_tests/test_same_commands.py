@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import boebot
-from boebot.experiments.same_commands import BRAINS, disagreements
+from boebot.experiments.same_commands import BRAINS, along_walls, disagreements, judge_walls
 from boebot.record.compare import command_difference, telemetry_difference
 
 pytestmark = pytest.mark.emulated
@@ -22,3 +22,9 @@ def test_commands_differ_no_sooner_than_telemetry(board_url: str, name: str) -> 
     # from one board to the other a step sees the same tick, or the one before or after
     steps = zip(native.record.steps, here.record.steps, strict=True)
     assert max(abs(a[0] - b[0]) for a, b in steps) <= 1
+
+
+def test_whole_runs_along_walls_are_alike(board_url: str) -> None:
+    """E68's brain that its readings pull back: 60 s on both boards, step by step."""
+    measured = judge_walls([along_walls(on, seed=1) for on in ("native", board_url)])
+    assert [one.name for one in measured if not one.is_met] == []

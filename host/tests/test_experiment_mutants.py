@@ -7,13 +7,14 @@ it raises instead is no success: whoever reads its figures would not learn what 
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Sequence
 
 import pytest
 from mutants import Mutant
 from mutants_of_navigation import NAVIGATION
 
-from boebot.behaviors import ChargeBattery, Phototaxis, RunAndTumble, Wander
+from boebot.behaviors import ChargeBattery, FollowWall, Phototaxis, RunAndTumble, Wander
 from boebot.brain import utility
 from boebot.experiments import all_experiments, chemotaxis, economics, evolution, kinesis, predator, utility_theory
 
@@ -104,6 +105,14 @@ def no_mutation(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(evolution, "MUTATION", 0.0)
 
 
+def chance_of_no_seed(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Wander, "chance", lambda self, probability, per=None: random.random() < 0.05)
+
+
+def wall_unheeded(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(FollowWall, "step", lambda self, robot: robot.drive(self.signal, self.signal))
+
+
 def station_without_current(patch: pytest.MonkeyPatch) -> None:
     described = economics.robot
     patch.setattr(economics, "robot", lambda *, contacts=True: described(contacts=False))
@@ -134,6 +143,8 @@ OLD = [
     Mutant("E62", "the utilities' lag", no_lag),
     Mutant("E65", "selection", fitness_unheeded),
     Mutant("E65", "mutation", no_mutation),
+    Mutant("E68", "that a brain's chance is its seed's", chance_of_no_seed),
+    Mutant("E68", "readings", wall_unheeded),
     Mutant("robot-economics", "what charging is good for", station_without_current),
     Mutant("robot-economics", "the way to the station", station_not_sought),
 ]
