@@ -14,9 +14,11 @@ import pytest
 from mutants import Mutant
 from mutants_of_navigation import NAVIGATION
 
-from boebot.behaviors import ChargeBattery, FollowWall, Phototaxis, RunAndTumble, Wander
-from boebot.brain import utility
+from boebot.behaviors import Avoid, ChargeBattery, FollowWall, Phototaxis, RunAndTumble, Wander
+from boebot.brain import leaky, utility
+from boebot.cognition import PathIntegration
 from boebot.experiments import all_experiments, chemotaxis, economics, evolution, kinesis, predator, utility_theory
+from boebot.robot import Robot
 
 pytestmark = pytest.mark.soak
 
@@ -54,7 +56,28 @@ def light_unheeded(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Phototaxis, "step", lambda self, robot: robot.drive(self.signal, self.signal))
 
 
+def nothing_avoided(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(Avoid, "step", lambda self, robot: robot.drive(0.5, 0.5))
+
+
+def wall_unheeded(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(FollowWall, "step", lambda self, robot: robot.drive(self.signal, self.signal))
+
+
+def way_not_summed_up(patch: pytest.MonkeyPatch) -> None:
+    def step(self: PathIntegration, robot: Robot) -> None:
+        summed_up(self, robot)
+        self.vector = (0.0, 0.0)
+
+    summed_up = PathIntegration.step
+    patch.setattr(PathIntegration, "step", step)
+
+
 # ---- section 4.4.2: E. coli, its predator, wood lice -----------------------------------------------------------------
+
+
+def no_memory(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(leaky.LeakyIntegrator, "advance", lambda self, x, elapsed: self.value)
 
 
 def no_tumbling(patch: pytest.MonkeyPatch) -> None:
@@ -94,6 +117,13 @@ def no_lag(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility.Utilities, "_factors_of", lambda self, elapsed: [(0.0, 0.0)] * len(self.values))
 
 
+def gamma_that_stays(patch: pytest.MonkeyPatch) -> None:
+    factors = utility.Utilities._factors_of
+    patch.setattr(
+        utility.Utilities, "_factors_of", lambda self, elapsed: [(lag, 1.0) for lag, _ in factors(self, elapsed)]
+    )
+
+
 def fitness_unheeded(patch: pytest.MonkeyPatch) -> None:
     offspring = evolution.offspring
     patch.setattr(
@@ -107,10 +137,6 @@ def no_mutation(patch: pytest.MonkeyPatch) -> None:
 
 def chance_of_no_seed(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(Wander, "chance", lambda self, probability, per=None: random.random() < 0.05)
-
-
-def wall_unheeded(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(FollowWall, "step", lambda self, robot: robot.drive(self.signal, self.signal))
 
 
 def station_without_current(patch: pytest.MonkeyPatch) -> None:
@@ -131,16 +157,24 @@ OLD = [
     Mutant("elicitation", "the chances", chances_unheeded),
     Mutant("E20", "turning", no_turning),
     Mutant("E20-shieldbot", "turning", no_turning),
+    Mutant("E21", "avoiding", nothing_avoided),
     Mutant("E27", "the light", light_unheeded),
     Mutant("E27-shieldbot", "the light", light_unheeded),
     Mutant("E28", "that humidity slows it down", humid_or_not_alike),
+    Mutant("E29", "the memory", no_memory),
+    Mutant("E30", "the memory", no_memory),
     Mutant("E31", "tumbling", no_tumbling),
     Mutant("E31", "differences of the attractant", attractant_everywhere),
     Mutant("E31", "that the attractant attracts", attractant_repels),
     Mutant("E32", "tumbling on the spot", runs_after_all_tumbles),
+    Mutant("E33", "the home vector", way_not_summed_up),
+    Mutant("E35", "the wall", wall_unheeded),
     Mutant("predator-prey", "the predator's motion", predator_stands_still),
     Mutant("predator-prey", "the predator's attractant", predator_without_attractant),
+    Mutant("E61", "the utilities' lag", no_lag),
     Mutant("E62", "the utilities' lag", no_lag),
+    Mutant("E63", "the decay of gamma", gamma_that_stays),
+    Mutant("E64", "the utilities' lag", no_lag),
     Mutant("E65", "selection", fitness_unheeded),
     Mutant("E65", "mutation", no_mutation),
     Mutant("E68", "that a brain's chance is its seed's", chance_of_no_seed),

@@ -1,6 +1,6 @@
 """E. coli: running and tumbling by equation (4.1), Figs. 4.1 and 4.2, section 4.4.2 of the notes; E29 to E32.
 
-E31 and E32 are runs of the kit's behavior `RunAndTumble`, one robot for each bacterium.
+All by the kit's behavior `RunAndTumble`: E29 and E30 its utility, E31 and E32 runs, one robot for each bacterium.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 from boebot import run
 from boebot.behaviors import RunAndTumble
 from boebot.brain import Brain
-from boebot.brain.leaky import LeakyIntegrator
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.equipment import Equipment
 from boebot.devices.motor import RegulatedMotor
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.trials import trial_seeds
 from boebot.experiments.variants import varied
+from boebot.link import messages
+from boebot.robot import Observation, Robot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from boebot.description.robots import RobotDescription
-    from boebot.robot import Robot
 
 STEP = 0.01  # s
 SIZE, SPREAD, SPEED = 10.0, 2.5, 1.0  # side of the square (m), width of the attractant (m), speed of a run (m/s)
@@ -38,12 +38,23 @@ Attractant = Callable[[float, float, float], float]
 
 
 def utility_of(stimulus: Floats, a: float, b: float, step: float) -> Floats:
-    """U = X - V, dV/dt + a V = b X  (4.1), with V(0) = (b/a) X(0) and X held over each step."""
-    memory = LeakyIntegrator(a, b, b / a * float(stimulus[0]))
+    """U = X - V, dV/dt + a V = b X  (4.1), with V(0) = (b/a) X(0), as the kit's behavior has it in its steps.
+
+    The behavior looks at nothing but X: a robot of which only the time goes on is enough.
+    """
+    robot, equipment = Robot("none", step), Equipment(load_robot("shieldbot"), step)
+    sample = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
+    smelled = [float(stimulus[0])]
+    behavior = RunAndTumble(stimulus=lambda robot: smelled[0], a=a, b=b)
+    behavior.join(step, robot.stream(behavior.name), lambda kind: behavior, lambda process, gamma: None)
+    robot.observation = Observation(sample, equipment, time=0.0)
+    behavior.enter(robot)
     values = []
-    for x in stimulus:
-        values.append(float(x) - memory.value)
-        memory.advance(float(x), step)
+    for index, x in enumerate(stimulus.tolist()):
+        robot.observation = Observation(sample, equipment, time=index * step)
+        smelled[0] = x
+        behavior.step(robot)
+        values.append(behavior.value)
     return np.array(values)
 
 

@@ -22,8 +22,7 @@ from boebot.devices.light import Phototransistor
 from boebot.experiments.experiment import Measured, Outcome, Progress, about, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.trials import Trial, trial_seeds, try_once
-from boebot.experiments.variants import arena_file, at_angle, varied
-from boebot.experiments.wall import RADIUS, small_arsim
+from boebot.experiments.variants import SMALL_RADIUS, arena_file, at_angle, small_arsim, varied
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,7 +51,7 @@ class Setting:
 def _small_arsim() -> RobotDescription:
     """The notes' robot in the size of a Boe-Bot with two phototransistors on its rim, turned 0.5 rad outwards as the
     shieldbot's are."""
-    left, right = (Phototransistor(**at_angle(RADIUS, angle)) for angle in (0.5, -0.5))
+    left, right = (Phototransistor(**at_angle(SMALL_RADIUS, angle)) for angle in (0.5, -0.5))
     return small_arsim(0.3, light_left=left, light_right=right)
 
 

@@ -10,6 +10,7 @@ import math
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,10 @@ import msgspec
 
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import Device
+from boebot.devices.infrared import InfraredProximity
+from boebot.devices.motor import RegulatedMotor
 
+SMALL_RADIUS, SMALL_SPEED = 0.07, 0.17  # m, of a Boe-Bot; m/s at motor signal 1, of its servos
 NARROW_RAD = 0.3324  # directions of IR sensors that also see what lies ahead; arsim's own ±0.7854 rad leave it out
 
 
@@ -53,6 +57,38 @@ def narrow_arsim() -> RobotDescription:
     radius = load_robot("arsim").body.radius_m
     left, right = at_angle(radius, NARROW_RAD), at_angle(radius, -NARROW_RAD)
     return varied("arsim", "arsim-narrow", infrared_left=left, infrared_right=right)
+
+
+def small_arsim(full_speed: float = SMALL_SPEED, **devices: Device) -> RobotDescription:
+    """arsim in the size of a Boe-Bot (docs/reference/notes.md), one IR sensor ahead and one at -60 degrees.
+
+    Args:
+        full_speed: m/s at motor signal 1.
+        devices: more of them.
+    """
+    sensor = partial(InfraredProximity, range_m=0.8, c1_m2=0.012, c2=0.02, sigma=0.03)
+    motor = RegulatedMotor(gain_n_s=1.2, torque_maximum_n_m=0.268)
+    body = {
+        "mass_kg": 0.6,
+        "inertia_kg_m2": 1.2e-3,
+        "radius_m": SMALL_RADIUS,
+        "track_width_m": 0.105,
+        "wheel_radius_m": 0.0333,
+        "wheel_mass_kg": 0.03,
+        "wheel_inertia_kg_m2": 1.7e-5,
+        "angular_damping_n_m_s": 0.004,
+        "wheel_speed_maximum_m_s": full_speed,
+    }
+    return varied(
+        "arsim",
+        "arsim-small",
+        body,
+        motor_left=motor,
+        motor_right=motor,
+        infrared_left=sensor(**at_angle(SMALL_RADIUS, 0.0)),
+        infrared_right=sensor(**at_angle(SMALL_RADIUS, -1.0472)),
+        **devices,
+    )
 
 
 @contextmanager

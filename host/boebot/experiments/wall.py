@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +10,9 @@ from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
-from boebot.devices.device import Device
-from boebot.devices.infrared import InfraredProximity
-from boebot.devices.motor import RegulatedMotor
 from boebot.experiments.experiment import Measured, Outcome, Progress, experiment
 from boebot.experiments.paths import floor
-from boebot.experiments.variants import arena_file, at_angle, varied
+from boebot.experiments.variants import SMALL_SPEED, arena_file, small_arsim, varied
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,46 +25,12 @@ ROOM = f"""
 corners_m = [[0, 0], [{LENGTH}, 0], [{LENGTH}, {WIDTH}], [0, {WIDTH}]]
 """
 SECONDS = 80.0
-RADIUS = 0.07  # m
 SPEED = 0.12  # v_0 (m/s)
-FULL_SPEED = 0.17  # m/s at motor signal 1, of both robots
 
 
 def follower() -> Brain:
     """v_0 = 0.12 m/s, k = 0.5 m/s, S_ref = 0.25, as motor signals."""
-    return Brain([FollowWall(signal=SPEED / FULL_SPEED, gain=0.5 / FULL_SPEED, reference=0.25)])
-
-
-def small_arsim(full_speed: float = FULL_SPEED, **devices: Device) -> RobotDescription:
-    """arsim in the size of a Boe-Bot (docs/reference/notes.md), one IR sensor ahead and one at -60 degrees.
-
-    Args:
-        full_speed: m/s at motor signal 1.
-        devices: more of them.
-    """
-    sensor = partial(InfraredProximity, range_m=0.8, c1_m2=0.012, c2=0.02, sigma=0.03)
-    motor = RegulatedMotor(gain_n_s=1.2, torque_maximum_n_m=0.268)
-    body = {
-        "mass_kg": 0.6,
-        "inertia_kg_m2": 1.2e-3,
-        "radius_m": RADIUS,
-        "track_width_m": 0.105,
-        "wheel_radius_m": 0.0333,
-        "wheel_mass_kg": 0.03,
-        "wheel_inertia_kg_m2": 1.7e-5,
-        "angular_damping_n_m_s": 0.004,
-        "wheel_speed_maximum_m_s": full_speed,
-    }
-    return varied(
-        "arsim",
-        "arsim-small",
-        body,
-        motor_left=motor,
-        motor_right=motor,
-        infrared_left=sensor(**at_angle(RADIUS, 0.0)),
-        infrared_right=sensor(**at_angle(RADIUS, -1.0472)),
-        **devices,
-    )
+    return Brain([FollowWall(signal=SPEED / SMALL_SPEED, gain=0.5 / SMALL_SPEED, reference=0.25)])
 
 
 def lap(robot: RobotDescription, on: str | None, seed: int, start: float, progress: Progress) -> RunResult:
