@@ -444,7 +444,7 @@ def clearance(plan: LineMap, path: Sequence[Point]) -> float:
 @experiment(
     "E46",
     title="A grid made from a map, and a path tightened in it",
-    source="section 6.2.1, Fig. 6.6",
+    source="section 6.2, Fig. 6.6",
     caption="Left: forbidden parts (black), where a robot of 0.07 m with a margin of 0.05 m cannot be, and the "
     "cells into which the rest is merged. Right: a path from cell to cell of a lattice (grey), and tightened (blue).",
     criterion="On a lattice of 8 neighbours a way is longer than the straight one by |cos| + (√2 - 1) |sin| of its "

@@ -1,4 +1,4 @@
-"""Navigation by potential fields: section 6.2.2 of the notes, Figs. 6.11 to 6.13, (6.1) to (6.7); E47 to E51.
+"""Navigation by potential fields: section 6.2 of the notes, Figs. 6.11 to 6.13, (6.1) to (6.7); E47 to E51.
 
 The robot is the notes' own size, round and with odometry that does not drift; on a Boe-Bot all lengths are half as
 long, and its encoders count.
@@ -53,7 +53,7 @@ def difference(field: PotentialField, points: Floats, step: float) -> float:
 @experiment(
     "E47",
     title="The gradient of a potential field",
-    source="section 6.2.2, Fig. 6.11, equations (6.1) to (6.3)",
+    source="section 6.2, Fig. 6.11, equations (6.1) to (6.3)",
     caption="Left: the field of one obstacle and a goal. Right: greatest difference of the gradient of nine random "
     "potentials from central differences, over the differences' step; dashed: in proportion to its square.",
     criterion="Nine potentials of any place, height, widths and direction, 1000 points. Central differences over ± 1 "
@@ -286,7 +286,7 @@ CLEARANCE = (
 @experiment(
     "E48",
     title="Down a potential field past four pillars",
-    source="section 6.2.2, Fig. 6.12",
+    source="section 6.2, Fig. 6.12",
     caption=f"{NINE}the robot's paths from four starts to the goal (yellow).",
     robot="roller, its odometer without noise",
     criterion=CLEARANCE,
@@ -308,7 +308,7 @@ DRIFT = (
 @experiment(
     "E48-avr",
     title="Down a potential field past four pillars, with the firmware's AVR image",
-    source="section 6.2.2, Fig. 6.12",
+    source="section 6.2, Fig. 6.12",
     caption=f"{NINE}a Boe-Bot's paths from four starts to the goal (yellow).",
     robot=BOE_BOT,
     criterion=f"{HALF}{DRIFT} Its middle stays farther than its radius and 0.05 m from all lines.",
@@ -329,7 +329,7 @@ AHEAD: list[Pose] = [(-1.0, 0.0, 0.0), (-1.0, 0.05, 0.0)]
 @experiment(
     "E49",
     title="Locked in a wedge",
-    source="section 6.2.2, Fig. 6.13",
+    source="section 6.2, Fig. 6.13",
     caption="Left: contours of the field of a goal at (2, 0) and of the three hills of a wedge, and paths from two "
     "starts. Right: distance from the goal, also without the wedge, and with one of its hills only.",
     robot="roller, its odometer without noise",
@@ -452,7 +452,7 @@ WITHIN = (
 @experiment(
     "E50",
     title="Waypoints lead around a wedge",
-    source="section 6.2.2",
+    source="section 6.2",
     caption=PAST,
     robot="roller, its odometer without noise",
     criterion=WITHIN,
@@ -464,7 +464,7 @@ def around(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E50-avr",
     title="Waypoints lead around a wedge, with the firmware's AVR image",
-    source="section 6.2.2",
+    source="section 6.2",
     caption=PAST,
     robot=BOE_BOT,
     criterion=f"{WITHIN}{HALF}{DRIFT}",
@@ -585,7 +585,7 @@ RULE = "It turns on the spot where the error is beyond π/3, by the shorter way,
 @experiment(
     "E51",
     title="Facing away from the goal it turns on the spot first",
-    source="section 6.2.2, equations (6.5) to (6.7)",
+    source="section 6.2, equations (6.5) to (6.7)",
     caption=FACING,
     robot="roller, its odometer without noise",
     criterion=f"{RULE}It turns by 0.042 rad in a step of 0.05 s: it goes on at π/12 less that, 0.22 rad, or more.",
@@ -597,7 +597,7 @@ def rotation(seed: int, progress: Progress) -> Outcome:
 @experiment(
     "E51-avr",
     title="Facing away from the goal it turns on the spot first, with the firmware's AVR image",
-    source="section 6.2.2, equations (6.5) to (6.7)",
+    source="section 6.2, equations (6.5) to (6.7)",
     caption=FACING,
     robot=BOE_BOT,
     criterion=f"{RULE}The heading is known to 0.016 rad, as edges are 1.6 mm apart. By the servos' curve 0.06 m/s are "

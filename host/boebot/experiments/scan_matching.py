@@ -150,7 +150,7 @@ NEARLY = 0.01  # m, m, rad: of the lower row of the figure
 @experiment(
     "E53",
     title="A scan fits the map badly where the pose is wrong",
-    source="section 6.3, Fig. 6.16",
+    source="section 6.3, Figs. 6.16 and 6.17",
     caption="Left: a scan, drawn at the true pose (blue). Middle: what the map lets expect at the pose of the odometry "
     "(red). Right: where the rays of both end, as the robot compares them. Above: odometry is 0.1 m, 0.1 m and 0.1 "
     "rad off; below: a tenth of that.",

@@ -1,5 +1,5 @@
 """Free cells of a lattice merged into rectangles: convex, so that any straight way inside one is free, and few (section
-6.2.1 of the notes).
+6.2 of the notes).
 
 The greatest rectangle of free cells is taken first, then the greatest of what is left, and so on. A node is the middle
 of an edge that two rectangles share.

@@ -1,4 +1,4 @@
-"""A regular grid of free and forbidden cells over a map: where a robot's centre may be (section 6.2.1 of the notes).
+"""A regular grid of free and forbidden cells over a map: where a robot's centre may be (section 6.2 of the notes).
 
 A cell is forbidden if its centre is nearer to a line than the robot's radius and a margin, or inside something solid,
 or if no way leads there from the start.
