@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -66,11 +66,11 @@ class ExplorationGraph:
         self.legs: set[frozenset[int]] = set()  # along which nodes were placed
         self._bad: set[frozenset[int]] = set()
 
-    def place(self, place: Point) -> Node | None:
+    def place(self, place: Point, share: float = 1.0) -> Node | None:
         """R5, R6: a new pending node there (m); None: it would be too near to another. To one that is unreachable it
-        may be nearer: it may be reached from another side."""
+        may be nearer: it may be reached from another side. `share`: of d_min that is enough."""
         for node in self.nodes:
-            least = self._least / 3 if node.status == "unreachable" else self._least
+            least = share * (self._least / 3 if node.status == "unreachable" else self._least)
             if math.dist(node.place, place) < least:
                 return None
         node = Node(len(self.nodes), place, "pending", [self.active, len(self.nodes)])
@@ -133,6 +133,16 @@ class ExplorationGraph:
             self.legs.add(frozenset((last, node.number)))
         return bool(way)
 
+    def set_out(self, node: Node) -> bool:
+        """R14e: back to a completed node; whether a way leads there."""
+        node.path = search(self, self.active, node.number, "dijkstra").path
+        return bool(node.path)
+
+    def nearest_completed(self, node: Node) -> list[Node]:
+        """The completed nodes, the nearest to that one first."""
+        completed = [one for one in self.nodes if one.status == "completed"]
+        return sorted(completed, key=lambda one: self.distance(one.number, node.number))
+
     def _find_path(self, node: Node) -> None:
         node.status = "completed"  # so that its last leg counts as well
         node.path = search(self, self.active, node.number, "dijkstra").path
@@ -140,9 +150,11 @@ class ExplorationGraph:
 
     def _activate(self, number: int) -> None:
         """R10: all paths begin at that node from now on."""
+        if number == self.active:
+            return
         way = self.nodes[number].path or [self.active, number]
         for node in self.nodes:
-            if node.status == "pending" and node.number != number:
+            if node.path and node.number != number:
                 node.path = joined(way, node.path)
         self.nodes[number].path = []
         self.active = number
@@ -175,6 +187,10 @@ class Placement:
         """For rooms that are not large, by the robot's radius (m)."""
         distance = max(0.4, 4 * radius)
         return cls(distance, radius + 0.05, cls.least_angle, 0.7 * distance)
+
+    def closer(self, share: float) -> Placement:
+        """The same with nodes at that share of the distances."""
+        return replace(self, distance=share * self.distance, least_distance=share * self.least_distance)
 
     def bearings(self, scan: Scan, half_width: float = 0.0) -> list[float]:
         """R2 to R4: directions of new nodes, from the robot's heading (rad): in each interval of free directions, one

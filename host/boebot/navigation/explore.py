@@ -31,8 +31,11 @@ QUARTER = math.pi / 2
 CLEARANCE = 0.05  # m that its body keeps to either side
 FACING = 0.03  # rad off, and it faces a point
 BACKWARD = 0.1  # m from what blocks the way, before it turns
+BACKWARD_S = 4.0  # at most
+PROGRESS, PROGRESS_S = 0.02, 3.0  # less (m) within this time (s) is none
 ATTEMPTS = 5  # of coming back to its nodes
 RETRIED_FROM = 4  # completed nodes from which an unreachable one is tried again
+CLOSER = 0.5  # of the distances, where all else has failed
 
 
 class State(enum.Enum):
@@ -110,7 +113,7 @@ class Explore(SteeredBehavior):
         return self.other(Odometry).pose if self.localization is None else self.localization.pose
 
     def enter(self, robot: Robot) -> None:
-        self._stood_s = robot.time
+        self._stood_s = self._seen_s = robot.time
 
     def step(self, robot: Robot) -> None:
         """Goes from state to state until one takes time; stands where it is lost."""
@@ -121,7 +124,7 @@ class Explore(SteeredBehavior):
             before, self.state = self.state, self._states[self.state](self, robot)
             if self.state is before:
                 break
-            self._stood_s = robot.time
+            self._stood_s = self._seen_s = robot.time
 
     # ---- nodes -------------------------------------------------------------------------------------------------------
 
@@ -131,8 +134,12 @@ class Explore(SteeredBehavior):
         self.graph = ExplorationGraph((x, y), self._placement.least_distance, 1.1 * self._placement.distance)
         self._tried: set[tuple[int, int]] = set()  # R14d: unreachable node, completed node
         self._retried = -1
+        self._looked_closely: set[int] = set()  # R14e: completed nodes
+        self._close: set[int] = set()  # nodes that were placed then; one try is enough for them
+        self._share = 1.0  # of the distances at which nodes are placed
         self._not_direct: set[tuple[int, int]] = set()  # active node, target
         self._blocked_at: Point | None = None
+        self._seen_at, self._seen_s = (x, y), robot.time  # where it was last when it made progress
         self._look_around()
         return State.SCAN
 
@@ -154,12 +161,18 @@ class Explore(SteeredBehavior):
     def _place(self, robot: Robot) -> State:
         assert self._sweep is not None
         x, y, heading = self.pose
-        way = self._placement.distance
-        for bearing in self._placement.bearings(self._sweep, half_width(robot)):
+        placement = self._placement.closer(self._share)
+        way = placement.distance
+        for bearing in placement.bearings(self._sweep, half_width(robot)):
             angle = heading + bearing
-            self._graph.place((x + way * math.cos(angle), y + way * math.sin(angle)))
+            node = self._graph.place((x + way * math.cos(angle), y + way * math.sin(angle)), self._share)
+            if node is not None and self._share < 1.0:
+                self._close.add(node.number)
         self._draw(robot)
-        return State.TURN_SCAN if self._headings else State.SELECT
+        if self._headings:
+            return State.TURN_SCAN
+        self._share = 1.0
+        return State.SELECT
 
     def _turn_scan(self, robot: Robot) -> State:
         if not self._turn(robot, self._headings[0]):
@@ -183,19 +196,24 @@ class Explore(SteeredBehavior):
         return State.NEXT_LEG
 
     def _retry_select(self, robot: Robot) -> State:
-        """R14d: once from each of the completed nodes nearest to one that was unreachable."""
+        """R14d, R14e: what could not be reached is tried from other nodes, then looked for in smaller steps."""
         graph = self._graph
-        for node in graph.nodes:
-            if node.status == "unreachable":
-                completed = [one for one in graph.nodes if one.status == "completed"]
-                completed.sort(key=lambda one: graph.distance(one.number, node.number))
-                for last in completed[:RETRIED_FROM]:
-                    pair = node.number, last.number
-                    if pair not in self._tried:
-                        self._tried.add(pair)
-                        if graph.retry(node, last.number):
-                            self._retried = node.number
-                            return State.SELECT
+        unreachable = [n for n in graph.nodes if n.status == "unreachable" and n.number not in self._close]
+        for node in unreachable:
+            for last in graph.nearest_completed(node)[:RETRIED_FROM]:
+                pair = node.number, last.number
+                if pair not in self._tried:
+                    self._tried.add(pair)
+                    if graph.retry(node, last.number):
+                        self._retried = node.number
+                        return State.SELECT
+        for node in unreachable:
+            nearest = graph.nearest_completed(node)[0]
+            if nearest.number not in self._looked_closely:
+                self._looked_closely.add(nearest.number)
+                if graph.set_out(nearest):
+                    self._target, self._share, self._attempts = nearest, CLOSER, 0
+                    return State.NEXT_LEG
         return State.DONE
 
     # ---- ways --------------------------------------------------------------------------------------------------------
@@ -213,12 +231,16 @@ class Explore(SteeredBehavior):
         return State.DRIVE_DIRECT if is_clear(sweep, bearing, length, half_width(robot)) else State.NEXT_LEG
 
     def _drive_direct(self, robot: Robot) -> State:
-        if self._blocked(robot):
-            self._blocked_at = self.pose[:2]
-            return State.BACKTRACK
-        return State.ARRIVED if self._drive(robot, self._target.place) else State.DRIVE_DIRECT
+        if self._drive(robot, self._target.place):
+            return State.ARRIVED
+        if not self._blocked(robot):
+            return State.DRIVE_DIRECT
+        self._base = self._graph.active
+        return State.BACKTRACK
 
     def _next_leg(self, robot: Robot) -> State:
+        if len(self._target.path) < 2:
+            return State.ARRIVED
         self._next = self._graph.nodes[self._target.path[1]]
         return State.ROTATE
 
@@ -226,10 +248,8 @@ class Explore(SteeredBehavior):
         return State.DRIVE_LEG if self._face(robot, self._next.place) else State.ROTATE
 
     def _drive_leg(self, robot: Robot) -> State:
-        if self._blocked(robot):
-            return State.BLOCKED
         if not self._drive(robot, self._next.place):
-            return State.DRIVE_LEG
+            return State.BLOCKED if self._blocked(robot) else State.DRIVE_LEG
         if self._next is self._target:
             return State.ARRIVED
         self._graph.reached(self._next.number)  # it becomes active; the target's path begins there now
@@ -240,16 +260,16 @@ class Explore(SteeredBehavior):
         return State.UPDATE_PATHS
 
     def _update_paths(self, robot: Robot) -> State:
-        """R9; R14d: where it could not come before, it looks in all directions."""
-        if self._target.number == self._retried:
+        """R9; R14d, R14e: where it could not come before, it looks in all directions."""
+        if self._target.number == self._retried or self._share < 1.0:
             self._look_around()
         self._draw(robot)
         return State.SCAN
 
     def _block(self, robot: Robot) -> State:
         """R11 for a target; R14c for a node on the way there."""
-        self._blocked_at = self.pose[:2]
-        if self._next is self._target:
+        self._base = self._graph.active
+        if self._next is self._target and self._target.status == "pending":
             self._graph.blocked(self._target.number)
         elif self.second_pass:
             self._graph.bad_leg(self._graph.active, self._next.number)
@@ -257,20 +277,19 @@ class Explore(SteeredBehavior):
         return State.BACKTRACK
 
     def _backtrack(self, robot: Robot) -> State:
-        """Backward, until it can turn; then to the active node, unless that is the one that it cannot reach."""
+        """Backward, until it can turn; then to the node where it was last."""
         if self._blocked_at is not None:
             robot.drive_speed(-self.turn_speed, -self.turn_speed)
-            if math.dist(self.pose[:2], self._blocked_at) >= BACKWARD:
-                self._blocked_at = None
+            if math.dist(self.pose[:2], self._blocked_at) >= BACKWARD or robot.time - self._stood_s > BACKWARD_S:
+                self._blocked_at, self._seen_s = None, robot.time
             return State.BACKTRACK
-        active = self._graph.nodes[self._graph.active]
-        if active.status != "completed":
+        if self._drive(robot, self._graph.nodes[self._base].place):
+            self._graph.reached(self._base)
             return State.SELECT
         if self._blocked(robot):
-            self._blocked_at = self.pose[:2]
+            self._stood_s = robot.time
             self._attempts += 1
-            return State.BACKTRACK if self._attempts < ATTEMPTS else State.FAILED
-        return State.SELECT if self._drive(robot, active.place) else State.BACKTRACK
+        return State.BACKTRACK if self._attempts < ATTEMPTS else State.FAILED
 
     def _end(self, robot: Robot) -> State:
         stand(robot, self._stood_s)
@@ -307,8 +326,16 @@ class Explore(SteeredBehavior):
         return abs(wrapped(math.atan2(place[1] - y, place[0] - x) - heading)) < self.turn_below
 
     def _blocked(self, robot: Robot) -> bool:
-        """Something is right before it, by its sonars or whiskers."""
-        return not self.turning and is_blocked(robot, self.near, self.sonars)
+        """Something is right before it, by its sonars or whiskers, or it comes no further."""
+        x, y = self.pose[:2]
+        if self.turning or math.dist((x, y), self._seen_at) > PROGRESS:
+            self._seen_at, self._seen_s = (x, y), robot.time
+        is_blocked_now = robot.time - self._seen_s > PROGRESS_S or (
+            not self.turning and is_blocked(robot, self.near, self.sonars)
+        )
+        if is_blocked_now:
+            self._blocked_at = x, y
+        return is_blocked_now
 
     @property
     def _graph(self) -> ExplorationGraph:
