@@ -41,6 +41,10 @@ def utility_straight(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility_theory, "money_utility", lambda amount, kappa: amount / utility_theory.MOST)
 
 
+def price_of_the_payoff(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(utility_theory, "expected_gain", lambda wealth, price: sum(1.0 for _ in range(30)) - price)
+
+
 def answers_by_payoff(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility_theory, "answer", lambda better, worse: (better + worse) / 2)
 
@@ -117,6 +121,10 @@ def no_lag(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(utility.Utilities, "_factors_of", lambda self, elapsed: [(0.0, 0.0)] * len(self.values))
 
 
+def constant_tendencies(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(utility.Utilities, "advance", lambda self, z, elapsed: None)
+
+
 def gamma_that_stays(patch: pytest.MonkeyPatch) -> None:
     factors = utility.Utilities._factors_of
     patch.setattr(
@@ -149,6 +157,7 @@ def station_not_sought(patch: pytest.MonkeyPatch) -> None:
 
 
 OLD = [
+    Mutant("E56", "the logarithm", price_of_the_payoff),
     Mutant("E57", "which chance belongs to which outcome", chances_swapped),
     Mutant("E57", "the chances", chances_unheeded),
     Mutant("E58", "the aversion to risks", utility_straight),
@@ -171,6 +180,8 @@ OLD = [
     Mutant("E35", "the wall", wall_unheeded),
     Mutant("predator-prey", "the predator's motion", predator_stands_still),
     Mutant("predator-prey", "the predator's attractant", predator_without_attractant),
+    Mutant("E59", "the memory", no_memory),
+    Mutant("isocline", "that tendencies follow deficits", constant_tendencies),
     Mutant("E61", "the utilities' lag", no_lag),
     Mutant("E62", "the utilities' lag", no_lag),
     Mutant("E63", "the decay of gamma", gamma_that_stays),

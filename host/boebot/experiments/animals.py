@@ -5,7 +5,8 @@ beyond the lethal boundary it dies. The rule, after McFarland:
 
     deficit_i = 1 - level_i,   tendency_i = deficit_i × cue_i,   and it does what the larger tendency asks for,
 
-where cue_i says how much of it is to be had here. The motivational isocline is where both tendencies are equal, a
+where cue_i says how much of it is to be had here: utility functions of the kit, tanh(cue_i - cue_i level_i), almost
+without lag. The motivational isocline is where both tendencies are equal, a
 straight line through (1, 1):   (1 - nutrients) / (1 - water) = cue_water / cue_nutrients. The cost of a state is
 Σ deficit_i², and the boundary the quarter of a circle at which this cost is 1 or a level is 0.
 """
@@ -19,6 +20,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.brain import Utility
+from boebot.brain.utility import Utilities
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
@@ -28,7 +31,9 @@ if TYPE_CHECKING:
 USE = 0.02  # 1/s, of each
 INTAKE = 0.10  # 1/s at cue 1, of what it takes in, times its cue
 STEP = 0.05  # s
+LAG = 1e-3  # s, of its utilities
 LETHAL = 1.0  # cost
+TIE = 1e-9  # tendencies that differ by less are equal
 
 
 @dataclass(frozen=True)
@@ -64,10 +69,15 @@ def live(
         rule: "larger" tendency, or "water": only ever drinks.
     """
     levels, times, drinks = [np.array(start)], [0.0], []
+    names = ("water", "nutrients")
+    functions = [Utility(b=cue, w={name: -cue}, tau=LAG) for name, cue in zip(names, cues, strict=True)]
+    if rule == "water":
+        functions[0] = Utility(b=9.0)
+    tendencies = Utilities(functions, names)
+    tendencies.start(start)
     for index in range(round(seconds / STEP)):
-        deficit = 1 - levels[-1]
-        tendency = deficit * cues
-        drinks.append(rule == "water" or bool(tendency[0] >= tendency[1]))
+        tendencies.advance(levels[-1].tolist(), STEP)
+        drinks.append(tendencies.values[0] >= tendencies.values[1])
         gain = np.array([INTAKE * cues[0], 0.0] if drinks[-1] else [0.0, INTAKE * cues[1]])
         levels.append(np.clip(levels[-1] + STEP * (gain - USE), 0.0, 1.0))
         times.append((index + 1) * STEP)
@@ -107,9 +117,10 @@ def isocline(seed: int, progress: Progress) -> Outcome:
     for one, start in zip(lives, STARTS, strict=True):
         tendency = (1 - one.levels) * cues
         difference = tendency[:, 0] - tendency[:, 1]
-        wrong += int((one.drinks[:-1] != (difference[:-1] >= 0)).sum())
+        larger = np.where(np.abs(difference) < TIE, 0.0, np.sign(difference))[:-1]
+        wrong += int((np.where(one.drinks[:-1], 1, -1) == -larger).sum())
         flips = np.flatnonzero(np.diff(one.drinks[:-1].astype(int)))
-        flips_off += int((np.sign(difference[flips]) == np.sign(difference[flips + 1])).sum())
+        flips_off += int((larger[flips] * larger[flips + 1] > 0).sum())
         arrived = one.steadied(CUES)
         arrivals.append(arrived)
         expected.append(time_to_isocline(start, CUES))

@@ -4,12 +4,14 @@
     i_sel = argmax U_i                                         (7.13)
     dX/dt + k_1 X = X_1 while it feeds,  dX/dt + k_2 X = X_2 otherwise      (7.14), (7.15)
 
-The notes do not give the parameters; these reproduce Fig. 7.4. Two ways through the equations stand here: Euler's
-method, by which the expected times were found, and the exact one, from switch to switch.
+The notes do not give the parameters; these reproduce Fig. 7.4. Three ways through the equations stand here: Euler's
+method, by which the expected times were found, the exact one, from switch to switch, and that of the kit's behavior
+`Escalate`, whose chain of leaky integrators holds X over each step.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
@@ -17,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.behaviors.escalate import LeakyChain
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 
 if TYPE_CHECKING:
@@ -68,6 +71,20 @@ def by_euler(dose: float = X_1, seconds: float = SECONDS, step: float = STEP) ->
         x += step * (dose - K_1 * x if active == 0 else X_2 - K_2 * x)
         u = u + step * (GAINS * x - DECAYS * u)
     return Response(times, stimulus, utilities, starts)
+
+
+def by_chain(seconds: float = SECONDS, step: float = STEP) -> list[tuple[int, float]]:
+    """Starts as the kit's chain has them (1..5, s); X is advanced before it, by (7.14) or (7.15) solved."""
+    chain = LeakyChain(list(zip(DECAYS.tolist(), GAINS.tolist(), strict=True)), FEED)
+    x, starts = 0.0, [(1, 0.0)]
+    for index in range(round(seconds / step)):
+        active = chain.chosen
+        if starts[-1][0] != active + 1:
+            starts.append((active + 1, index * step))
+        k, end = (K_1, X_1 / K_1) if active == 0 else (K_2, X_2 / K_2)
+        x = end + (x - end) * math.exp(-k * step)
+        chain.advance(x, step)
+    return starts
 
 
 def held(active: int, dose: float, x: float, u: Floats, since: Floats) -> tuple[Floats, Floats]:
@@ -158,10 +175,10 @@ def _data(found: Response) -> dict[str, Any]:
     criterion="The order of Fig. 7.4, with times found by Euler's method with steps of 1 ms, X first: so is it done "
     "here. Later starts follow from short returns to feeding and feel the step; the last two "
     "of the exact solution, which come 0.06 s later, stand beside them with the times that an independent "
-    "integrator gives.",
+    "integrator gives. The kit's chain, by steps of 1 ms too, is compared with the exact solution.",
 )
 def sequence(seed: int, progress: Progress) -> Outcome:
-    found, limit = by_euler(), exact()
+    found, limit, chain = by_euler(), exact(), by_chain()
     expected = [(1, 0.0), (2, 0.24), (3, 0.61), (4, 1.15), (5, 2.07), (1, 2.82), (5, 2.85), (1, 3.62), (5, 3.64)]
     starts = list(zip_longest(found.starts, expected, fillvalue=(0, np.nan)))
     measured = [
@@ -174,8 +191,16 @@ def sequence(seed: int, progress: Progress) -> Outcome:
         exactly("exact: order is the same (1: yes)", limit.order == "123451515", 1),
         about("exact: last start of B1", limit.starts[7][1] if len(limit.starts) > 7 else np.nan, 3.6794, 1e-4, "s"),
         about("exact: last start of B5", limit.starts[-1][1], 3.6976, 1e-4, "s"),
+        exactly(
+            "the kit's chain: order is the same (1: yes)", [b for b, _ in chain] == [b for b, _ in limit.starts], 1
+        ),
+        Measured("its starts off the exact ones by", _farthest(chain, limit.starts), "s", 0.0, 0.05),
     ]
     return Outcome(measured, _data(found), lambda figure: _draw(figure, found))
+
+
+def _farthest(starts: list[tuple[int, float]], others: list[tuple[int, float]]) -> float:
+    return max(abs(one - other) for (_, one), (_, other) in zip(starts, others, strict=False))
 
 
 @experiment(
