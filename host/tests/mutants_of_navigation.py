@@ -12,9 +12,20 @@ import numpy as np
 import pytest
 from mutants import Mutant
 
-from boebot.experiments import grid_search, potential_fields, scan_matching
+from boebot.experiments import exploring, grid_search, potential_fields, scan_matching
 from boebot.experiments.grid_search import Nodes
-from boebot.navigation import Cells, Lattice, LineMap, LockDetector, PotentialField, Scan, exploration_graph
+from boebot.navigation import (
+    Cells,
+    Estimate,
+    Explore,
+    Lattice,
+    LineMap,
+    LockDetector,
+    PotentialField,
+    RandomSearch,
+    Scan,
+    exploration_graph,
+)
 from boebot.navigation.exploration_graph import ExplorationGraph, Placement
 from boebot.navigation.steering import SteeredBehavior
 
@@ -123,6 +134,17 @@ def unheeded(_: Any) -> Any:
 
 NOTHING: list[Any] = []
 
+
+def looking_ahead(self: Explore) -> None:
+    """In one direction only."""
+    self._headings, self._has_looked = [], True
+
+
+def correcting_nothing(self: RandomSearch, scan: Scan) -> Estimate:
+    """Whatever a scan says, the pose stays."""
+    return Estimate(self.pose, self.uncertainty, 0.0, True)
+
+
 NAVIGATION = [
     Mutant(
         "E36",
@@ -198,4 +220,12 @@ NAVIGATION = [
     Mutant("E54", "the box goes with what is better", put(scan_matching, "search_pose", box_stays)),
     Mutant("E54", "the box is small", put(scan_matching, "search_pose", search_with(box=(0.5, 0.5, 0.5)))),
     Mutant("E54", "the scan", put(Scan, "errors", unheeded)),
+    Mutant("E38", "that something blocks the way", put(Explore, "_blocked", lambda _: lambda self, robot: False)),
+    Mutant("E39", "R15: it looks in four directions", put(Explore, "_look_around", lambda _: looking_ahead)),
+    Mutant(
+        "E40",
+        "R14: what to do in a deadlock",
+        put(exploring, "explorer", lambda old: lambda **_: old(second_pass=False)),
+    ),
+    Mutant("E55", "the scan's correction", put(RandomSearch, "correct", lambda _: correcting_nothing)),
 ]

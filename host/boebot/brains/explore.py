@@ -1,6 +1,6 @@
 """Explore the office: drive until every place has been seen (chapter 6 of the notes).
 
-    boebot run explore --robot roller --arena office --seconds 500
+    boebot run explore --robot roller --arena office --seconds 600
     boebot run explore --robot shieldbot-turret --arena office --seconds 1800
 
 What it finds grows as a tree of nodes. It does not use the office's map to find its way, but to correct where it is:
@@ -14,8 +14,8 @@ from boebot.navigation import Explore, LineMap, Localization
 START = (-2.5, 0.0, 0.0)  # m, m, rad: where the arena says that robots begin
 
 localization = Localization(
-    plan=LineMap.of("office"), start=START, every=15.0, utility=Utility(b=-1.0, w={"due": 3.0}, tau=0.05)
+    plan=LineMap.of("office"), start=START, every=10.0, utility=Utility(b=-1.0, w={"due": 3.0}, tau=0.05)
 )
-explore = Explore(localization=localization, utility=Utility(b=0.5))
+explore = Explore(localization=localization, speed=0.25, turn_speed=0.1, utility=Utility(b=0.5))
 
 brain = Brain([Odometry(), localization, explore], [localization.due_variable])

@@ -57,7 +57,7 @@ localization = Localization(
     name="localize",
     plan=LineMap.of("office"),
     start=START,
-    every=15.0,
+    every=10.0,
     utility=Utility(b=-1.0, w={"due": 3.0}, tau=0.05),
 )
 
@@ -66,8 +66,13 @@ brain = Brain(
         Odometry(),
         battery,
         localization,
-        Visit(localization=localization, utility=Utility(b=0.5)),
-        Recharge(localization=localization, utility=Utility(b=-1.7, w={"low": 3.2, "charging": 1.9})),
+        Visit(localization=localization, speed=0.25, turn_speed=0.1, utility=Utility(b=0.5)),
+        Recharge(
+            localization=localization,
+            speed=0.25,
+            turn_speed=0.1,
+            utility=Utility(b=-1.7, w={"low": 3.2, "charging": 1.9}),
+        ),
     ],
     variables=[battery.variable(), battery.charging_variable(), localization.due_variable],
 )

@@ -19,7 +19,7 @@ from boebot.navigation.corridor import is_clear
 from boebot.navigation.exploration_graph import STATUSES, ExplorationGraph, Placement
 from boebot.navigation.obstacle import SONARS, is_blocked
 from boebot.navigation.scan_error import Scan
-from boebot.navigation.steering import SteeredBehavior, stand
+from boebot.navigation.steering import SHARE_TO_TURN, SteeredBehavior, stand
 from boebot.navigation.sweep import Sweep
 
 if TYPE_CHECKING:
@@ -283,7 +283,8 @@ class Explore(SteeredBehavior):
             if math.dist(self.pose[:2], self._blocked_at) >= BACKWARD or robot.time - self._stood_s > BACKWARD_S:
                 self._blocked_at, self._seen_s = None, robot.time
             return State.BACKTRACK
-        if self._drive(robot, self._graph.nodes[self._base].place):
+        place = self._graph.nodes[self._base].place
+        if math.dist(self.pose[:2], place) <= 2 * BACKWARD or self._drive(robot, place):
             self._graph.reached(self._base)
             return State.SELECT
         if self._blocked(robot):
@@ -303,7 +304,9 @@ class Explore(SteeredBehavior):
         if abs(error) < FACING:
             robot.drive_speed(0.0, 0.0)
             return True
-        turn = math.copysign(min(self.turn_speed, 0.01 + 0.2 * abs(error)), error)
+        turn = math.copysign(
+            min(self.turn_speed, SHARE_TO_TURN * robot.dimensions.speed, 0.01 + 0.2 * abs(error)), error
+        )
         robot.drive_speed(-turn, turn)
         return False
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 BRAKING_S = 0.3
+SHARE_TO_DRIVE, SHARE_TO_TURN = 0.75, 0.4  # of the speed at full motor signal, at most: the rest is for steering
 
 
 def stand(robot: Robot, since_s: float) -> None:
@@ -74,9 +75,9 @@ class SteeredBehavior(MotorBehavior):
         error = wrapped(error)
         self.turning = abs(error) > (self.turn_below if self.turning else self.turn_above)
         if self.turning:
-            turn = math.copysign(min(self.turn_speed, robot.speed_limit), error)
+            turn = math.copysign(min(self.turn_speed, SHARE_TO_TURN * robot.dimensions.speed), error)
             robot.drive_speed(-turn, turn)
             return
-        speed = min(self.speed, robot.speed_limit / 2) * share
+        speed = min(self.speed, SHARE_TO_DRIVE * robot.dimensions.speed) * share
         difference = max(-2.0 * speed, min(2.0 * speed, self.gain * speed * error))  # no wheel turns backward
         robot.drive_speed(speed - difference / 2, speed + difference / 2)
