@@ -1,6 +1,6 @@
 """Explore the office: drive until every place has been seen (chapter 6 of the notes).
 
-    boebot run explore --robot roller --arena office --seconds 600
+    boebot run explore --robot roller --arena office --seconds 900
     boebot run explore --robot shieldbot-turret --arena office --seconds 1800
 
 What it finds grows as a tree of nodes. It does not use the office's map to find its way, but to correct where it is:
