@@ -292,4 +292,5 @@ def _draw_shares(axes: Axes, runs: list[Exploration], colour: str, label: str) -
         [run.trial.way for run in runs], [100 * run.share for run in runs], "o", color=colour, alpha=0.7, label=label
     )
     axes.axhline(100 * LEAST, color="0.6", lw=0.8, ls="--")
-    axes.set(xlabel="way (m)", ylabel="coverage (%)")
+    least = 100 * min(run.share for run in runs)
+    axes.set(xlabel="way (m)", ylabel="coverage (%)", ylim=(min(least - 5, 95, axes.get_ylim()[0]), 101))
