@@ -227,5 +227,7 @@ NAVIGATION = [
         "R14: what to do in a deadlock",
         put(exploring, "explorer", lambda old: lambda **_: old(second_pass=False)),
     ),
+    Mutant("E52-avr", "that a beam is wide", put(scan_matching, "TurretScan", lambda old: lambda: old(beam=0.0))),
+    Mutant("E55-avr", "the scan's correction", put(RandomSearch, "correct", lambda _: correcting_nothing)),
     Mutant("E55", "the scan's correction", put(RandomSearch, "correct", lambda _: correcting_nothing)),
 ]

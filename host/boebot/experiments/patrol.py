@@ -150,8 +150,8 @@ AVR_SECONDS, AVR_SEEDS = 240.0, 5
     caption="Left: path of the first run. Right: how far from the truth it believes to be, by its encoders alone and "
     "with a sweep of the turret every fifteen seconds; five runs, the first one dark.",
     robot="shieldbot-turret (avr)",
-    criterion="As the notes' figure shows it: the greatest error of a run with localization is less than half of that by "
-    "odometry alone; medians.",
+    criterion="As the notes' figure shows it: the greatest error of a run with localization is less than half of that "
+    "by odometry alone; medians.",
     slow=True,
 )
 def patrol_avr(seed: int, progress: Progress) -> Outcome:
