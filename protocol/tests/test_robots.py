@@ -153,9 +153,8 @@ def test_device_may_be_switched_off(tmp_path: Path) -> None:
 
 
 def test_unknown_robot_names_the_known_ones() -> None:
-    with pytest.raises(
-        RobotError, match=r"there is no robot 'dalek'; expected one of arsim, arsim-1\.2, boebot, roller, shieldbot, "
-    ):
+    known = r"arsim, arsim-1\.2, boebot, roller, roller-charging, shieldbot, "
+    with pytest.raises(RobotError, match=rf"there is no robot 'dalek'; expected one of {known}"):
         load_robot("dalek")
 
 

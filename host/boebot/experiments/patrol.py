@@ -148,7 +148,7 @@ AVR_SECONDS, AVR_SEEDS = 240.0, 5
     title="A patrol of a Shield-Bot with a turret",
     source="section 6.3, Figs. 6.14 and 6.15",
     caption="Left: path of the first run. Right: how far from the truth it believes to be, by its encoders alone and "
-    "with a sweep of the turret every fifteen seconds; five runs, the first one dark.",
+    "with a sweep of the turret every ten seconds; five runs, the first one dark.",
     robot="shieldbot-turret (avr)",
     criterion="As the notes' figure shows it: the greatest error of a run with localization is less than half of that "
     "by odometry alone; medians.",
@@ -156,7 +156,7 @@ AVR_SECONDS, AVR_SEEDS = 240.0, 5
 )
 def patrol_avr(seed: int, progress: Progress) -> Outcome:
     seeds = with_progress(trial_seeds(seed, AVR_SEEDS), progress)
-    runs = [patrolled(number, "shieldbot-turret", AVR_SECONDS, 15.0, (0.15, 0.15, 0.3), "avr") for number in seeds]
+    runs = [patrolled(number, "shieldbot-turret", AVR_SECONDS, 10.0, (0.15, 0.15, 0.3), "avr") for number in seeds]
     alone = [float(run.odometry.max()) for run in runs]
     corrected = [float(run.localization.max()) for run in runs]
     measured = [
