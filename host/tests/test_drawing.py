@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from functools import cache
 from pathlib import Path
@@ -16,12 +17,14 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 
 import boebot
 from boebot.arenas.description import Charger, Light
 from boebot.arenas.floor_plan import FloorPlan, Moving, Patch, Solid
 from boebot.description.outlines import way_out
 from boebot.description.robots import RobotDescription, load_robot
+from boebot.record import overview
 from boebot.record.result import RunResult
 from boebot.running import runner
 from boebot.view import picture, scene, style
@@ -289,6 +292,79 @@ def test_the_way_out_is_the_nearest_edge_ahead(star: list[tuple[float, float]]) 
         return
     ring = shapely.LinearRing(corners).intersection(shapely.LineString([(0, 0), (2, 0)]))
     assert way_out(corners) == pytest.approx(ring.distance(shapely.Point(0, 0)), abs=1e-9)
+
+
+LASERS = """
+extends = 'roller'
+name = 'lasers'
+[device.laser]
+rays = 682
+step_rad = 0.006135923
+sigma = 0.0
+position_m = [0.05, -0.02]
+[device.rear]
+type = "laser_range_finder"
+rays = 7
+step_rad = 0.2
+sigma = 0.0
+range_m = 0.5
+position_m = [-0.1, 0.03]
+heading_rad = 3.0
+"""
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
+    """A turning robot with two lasers without noise: one that is read every 0.1 s, one every 0.01 s."""
+    robot = tmp_path_factory.mktemp("robot") / "lasers.toml"
+    robot.write_text(LASERS)
+    return boebot.run(lambda it: it.drive(0.2, 0.6), robot=robot, arena="room", seconds=3)
+
+
+def misses(scanned: RunResult, swept: scene.Swept, index: int) -> np.ndarray:
+    """How far the ends of a sweep's rays are from the nearest edge in their way, or from the reach (m), by shapely."""
+    edges = shapely.union_all([shapely.LinearRing(solid.points) for solid in scanned.plan.solids])
+    sensor, *ends = swept.area(index)
+    found = []
+    for end in ends:
+        far = math.dist(sensor, end)
+        ray = shapely.LineString([sensor, sensor + 10 * (end - sensor) / far])
+        nearest = shapely.Point(sensor).distance(ray.intersection(edges))
+        found.append(far - min(nearest, swept.sweeps.reach))
+    return np.abs(found)
+
+
+def test_a_sweep_ends_at_the_walls_seen_from_where_it_was_taken(scanned: RunResult) -> None:
+    ahead, rear = scene.view(scanned).swept
+    assert np.allclose(np.diff(ahead.time), 0.1) and np.allclose(np.diff(rear.time), 0.01)
+    for swept, rays in ((ahead, 682), (rear, 7)):
+        for index in (0, len(swept.time) // 2, -1):
+            assert len(swept.area(index)) == 1 + rays
+            assert misses(scanned, swept, index).max() < 1e-3
+    lengths = [math.dist(rear.area(0)[0], end) for end in rear.area(0)[1:]]
+    assert max(lengths) == pytest.approx(0.5), "nothing within reach"
+
+
+def test_sweeps_older_than_the_tick_that_has_them_are_where_they_were_taken(
+    scanned: RunResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a long run few ticks are shown, at which a laser's last sweep is up to its period old."""
+    monkeypatch.setattr(overview, "POINTS", 43)
+    few = copy.copy(scanned)
+    few.__dict__.pop("overview", None)
+    ahead, _ = scene.view(few).swept
+    assert few.overview.series.time[1] == pytest.approx(0.07)
+    index = int(np.argmax(few.overview.series.time[ahead.ticks] - ahead.time))
+    assert few.overview.series.time[ahead.ticks[index]] - ahead.time[index] > 0.05
+    assert np.median(misses(few, ahead, index)) < 2e-3
+
+
+def test_picture_has_the_sweeps_of_start_and_end(scanned: RunResult) -> None:
+    drawn = [patch.get_xy()[:-1] for patch in picture.draw(scanned).axes.patches if isinstance(patch, Polygon)]
+    for swept in scene.view(scanned).swept:
+        for index in (0, -1):
+            area = swept.area(index)
+            assert sum(np.array_equal(points, area) for points in drawn) == 2, "filled, and its outline"
 
 
 # ---- the result in a few words ---------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ import pytest
 import boebot
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
 from boebot.record.result import RunResult
-from boebot.view import replay, style
+from boebot.view import replay, scene, style
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 pytestmark = pytest.mark.skipif(NODE is None, reason="runs the page's script with node, which is not installed")
@@ -210,3 +210,69 @@ def test_page_stays_small(composed_run: RunResult, tmp_path: Path) -> None:
         composed_run.overview.brain = record
     assert record is not None
     assert with_brain - without < 120 * 13 * 4 / 3 + 200 * len(record.switches) + 500
+
+
+# ---- sweeps of lasers ---------------------------------------------------------------------------------------------
+
+REAR = """
+extends = 'roller'
+name = 'two lasers'
+[device.laser]
+rays = 682
+step_rad = 0.006135923
+[device.rear]
+type = "laser_range_finder"
+rays = 7
+step_rad = 0.2
+range_m = 0.5
+position_m = [-0.1, 0.03]
+heading_rad = 3.0
+"""
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
+    robot = tmp_path_factory.mktemp("robot") / "rear.toml"
+    robot.write_text(REAR)
+    return boebot.run(lambda it: it.drive(0.2, 0.6), robot=robot, arena="room", seconds=3)
+
+
+def swept(moment: dict[str, Any]) -> list[np.ndarray]:
+    """The areas on the page, back in metres."""
+    scale, shift_x, shift_y = moment["scale"]
+    found = [row["path"] for row in moment["drawn"] if row.get("fill") == style.colour(1) and row["alpha"] == 0.1]
+    return [(np.array(path) - (shift_x, shift_y)) / (scale, -scale) for path in found]
+
+
+def test_page_draws_the_newest_sweep_of_each_laser(scanned: RunResult, tmp_path: Path) -> None:
+    """Between two of them the last one stands, where it was taken; of 682 rays 128 are kept, the outermost too."""
+    ahead, rear = scene.view(scanned).swept
+    for time, moment in zip((0.0, 1.07, 2.93), moments(scanned, tmp_path, 0.0, 1.07, 2.93), strict=True):
+        shown_ahead, shown_rear = swept(moment)
+        area = ahead.area(int(np.flatnonzero(ahead.time <= time + 1e-9)[-1]))
+        assert len(shown_ahead) == 1 + 128
+        assert np.allclose(shown_ahead[[0, 1, -1]], area[[0, 1, -1]], atol=2e-4)
+        assert np.abs(shown_ahead[:, None] - area).max(axis=2).min(axis=1).max() < 2e-4, "its own corners"
+        area = rear.area(int(np.flatnonzero(rear.time <= time + 1e-9)[-1]))
+        assert np.allclose(shown_rear, area, atol=1e-4)
+
+
+def test_sweeps_take_bounded_room_in_the_page(
+    scanned: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two bytes a number, in four characters for three bytes; what is shown is no older than the sweeps left out."""
+    sizes = []
+    for most in (replay.SWEPT_AT_MOST, 2_000):
+        monkeypatch.setattr(replay, "SWEPT_AT_MOST", most)
+        sizes.append(replay.write([scanned], tmp_path / "page.html").stat().st_size)
+        (content,) = json.loads((tmp_path / "page.html").read_text().partition("const page = ")[2].partition(";\n")[0])[
+            "runs"
+        ]
+        room = sum(len(value) for one in content["swept"] for value in (one["time"], one["distances"], *one["pose"]))
+        assert room <= most * 2 * 4 / 3 + 100
+    assert sizes[1] < sizes[0] - 5_000
+    ahead = scene.view(scanned).swept[0]
+    (moment,) = moments(scanned, tmp_path, 2.93)
+    shown = swept(moment)[0]
+    taken = [index for index in range(len(ahead.time)) if np.allclose(ahead.area(index)[0], shown[0], atol=1e-5)]
+    assert taken and 2.93 - ahead.time[taken[-1]] < 0.1 * 6, "30 sweeps, of which 6 have room: every fifth"

@@ -24,7 +24,7 @@ from boebot.devices.wiring import BREADBOARD, Wire
 from boebot.link.messages import DevicesTelemetry
 
 if TYPE_CHECKING:
-    from boebot.devices.drawing import Shape
+    from boebot.devices.drawing import Shape, Sweeps
 
 LARGEST = 1e12  # of any number of a robot without a board: products of some of them stay finite
 Positive = Annotated[float, msgspec.Meta(gt=0, le=LARGEST)]
@@ -215,6 +215,10 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     def drawing(self) -> list[Shape]:
         """What it looks like from above, in the robot's frame."""
         return []
+
+    def sweeps(self, place: Place, run: Run) -> Sweeps | None:
+        """The area that it measured, at each tick; None: it measures none."""
+        return None
 
 
 class SlowDevice(Device, frozen=True, kw_only=True):

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 Point = tuple[float, float]
 
 
@@ -62,3 +65,20 @@ class Axis(NamedTuple):
 
 
 Shape = Cone | Ray | Spot | Stroke | Axis
+
+
+class Sweeps(NamedTuple):
+    """What a sensor with a fan of rays measured over time: each sweep covers the area from it through their ends."""
+
+    position: Point
+    """m"""
+    heading: float
+    """rad"""
+    angles: NDArray[np.float64]
+    """rad from the heading, counter-clockwise, in rising order"""
+    distances: NDArray[np.float64]
+    """m, shape (ticks, rays); below 0: nothing within reach"""
+    reach: float
+    """m"""
+    ages: NDArray[np.float64]
+    """s, of each tick's distances"""

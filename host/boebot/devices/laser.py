@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from boebot.devices.device import Angle, Column, NotNegative, Place, Point, Positive, Reader, Readout, Run, Sensor
-from boebot.devices.drawing import Cone, Shape
+from boebot.devices.drawing import Cone, Shape, Sweeps
 from boebot.devices.readings import Readings
 
 _SHADE = 0.06
@@ -59,8 +59,7 @@ class Laser(Sensor, tag="laser_range_finder", frozen=True, kw_only=True):
     def reader(self, place: Place) -> Reader:
         """See `Device`."""
         where, first = place.where, place.where.start
-        begin = -self.step_rad * (self.rays - 1) / 2
-        angles = tuple(begin + self.step_rad * ray for ray in range(self.rays))
+        angles = self._angles()
         return lambda sample, _: _scan(sample, where, first, angles)
 
     def columns(self, place: Place, run: Run) -> list[Column]:
@@ -77,6 +76,16 @@ class Laser(Sensor, tag="laser_range_finder", frozen=True, kw_only=True):
     def drawing(self) -> list[Shape]:
         """The fan of its rays."""
         return [Cone(self.position_m, self.heading_rad, self.step_rad * (self.rays - 1), self.range_m, _SHADE)]
+
+    def sweeps(self, place: Place, run: Run) -> Sweeps:
+        """Each of its scans."""
+        values, ages = run.values(place.name), run.ages(place.name)
+        return Sweeps(self.position_m, self.heading_rad, np.array(self._angles()), values, self.range_m, ages)
+
+    def _angles(self) -> tuple[float, ...]:
+        """Of its rays, from right to left (rad)."""
+        begin = -self.step_rad * (self.rays - 1) / 2
+        return tuple(begin + self.step_rad * ray for ray in range(self.rays))
 
 
 def _scan(sample: Readings, where: slice, first: int, angles: tuple[float, ...]) -> Scan:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.devices.device import Column, Place, Readout, Run
+from boebot.devices.drawing import Sweeps
 from boebot.devices.equipment import places
 from boebot.link.messages import Status
 
@@ -143,6 +144,11 @@ class Series(Run, ABC):
             for device, place in self._places.items()
         ]
         return [readout for readout in found if readout is not None]
+
+    def sweeps(self) -> list[Sweeps]:
+        """The areas that devices measured, which pictures and pages show."""
+        found = [self._robot.device[device].sweeps(place, self) for device, place in self._places.items()]
+        return [sweeps for sweeps in found if sweeps is not None]
 
     @cached_property
     def commands(self) -> list[tuple[str, float, float]]:

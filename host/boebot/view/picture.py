@@ -15,7 +15,7 @@ from matplotlib.transforms import Affine2D
 from boebot.record.figures import counted
 from boebot.view import scene, style, utility_panel
 from boebot.view.arena_drawing import draw_arena, legend_entries
-from boebot.view.robot_drawing import body_patch, draw_robot
+from boebot.view.robot_drawing import body_patch, draw_robot, draw_swept
 from boebot.view.sheet import Sheet
 from boebot.view.sketch_drawing import draw_layers, layer_entries
 
@@ -63,6 +63,7 @@ def draw(result: RunResult) -> Sheet:
     draw_marks(axes, view)
     for index, colour in ((0, style.START), (-1, style.END)):
         turret = float(view.turret[index])
+        draw_swept(axes, view.swept, index, colour)
         draw_robot(axes, result.robot, view.pose(index), colour, plan=view.plan, turret=turret)
     return sheet
 

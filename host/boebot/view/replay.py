@@ -7,6 +7,9 @@ runs     one per robot: title, table, paths, flags, readings, what the robot loo
          processes did, or null: processes, utilities, the active motor behavior, the last switch to it
 
          `shown` and `layers`: what the brain showed and sketched
+         `swept`: of each sensor with a fan of rays, its `angles` (rad), and of each sweep its time, the sensor's
+         pose and the rays' distances, sweep after sweep (uint16: 65535 is `reach`, in m). To keep the page small, at
+         most `RAYS_AT_MOST` rays of a sweep, and every n-th sweep, so that all have at most `SWEPT_AT_MOST` numbers
 
 Arrays are little-endian float32 (`flags` and `motor`: uint8), one entry per frame; those of `mind` one per step of the
 brain, fewer where there are very many.
@@ -37,8 +40,12 @@ if TYPE_CHECKING:
     from boebot.record.series import Floats, Pose
     from boebot.record.shown import Layer, Shown
 
-FORMAT = 7
+FORMAT = 8
 STEPS_AT_MOST = 6_000  # of a brain of processes
+RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
+SWEPT_AT_MOST = 1_000_000  # numbers of two bytes, of all sweeps of all robots: 2.7 MB of the page
+WHOLE = 65535  # such a number for the whole reach
+POSE_NUMBERS = 8  # as many of these as time and place of a sweep take
 _PAGE = Path(__file__).with_name("replay_page.html")
 _PLACEHOLDER = "/*PAGE*/null"
 
@@ -50,12 +57,14 @@ def write(results: Sequence[RunResult], path: Path) -> Path:
     """Writes the page of the robots of one run."""
     views = [scene.view(result) for result in results]
     low, high = scene.bounds(*views)
+    room = SWEPT_AT_MOST // max(1, sum(len(view.swept) for view in views))
     content = {
         "format": FORMAT,
         "plan": plan_data(views[0].plan),
         "bounds": [*low.tolist(), *high.tolist()],
         "runs": [
-            run_data(result, view) | {"colour": style.colour(number)}
+            run_data(result, view)
+            | {"colour": style.colour(number), "swept": [_swept(one, room) for one in view.swept]}
             for number, (result, view) in enumerate(zip(results, views, strict=True), 1)
         ],
     }
@@ -158,6 +167,22 @@ def _layer(layer: Layer, view: scene.View, index: int) -> dict[str, Any]:
         whole = msgspec.to_builtins(sketch)
         sketches.append({key: whole[key] for key in ("lines", "points", "grid")} | {"origin": origin})
     return {"name": layer.name, "colour": style.layer(index), "time": _array(layer.time), "sketches": sketches}
+
+
+def _swept(swept: scene.Swept, room: int) -> dict[str, Any]:
+    """The sweeps of one sensor, in so many numbers of two bytes at most."""
+    count, reach = len(swept.sweeps.angles), swept.sweeps.reach
+    rays = np.linspace(0, count - 1, min(count, RAYS_AT_MOST)).round().astype(np.intp)
+    sweeps_at_most = max(1, room // (len(rays) + POSE_NUMBERS))
+    which = np.arange(0, len(swept.time), max(1, math.ceil(len(swept.time) / sweeps_at_most)))
+    shares = np.minimum(swept.distances(which, rays) / reach, 1.0)
+    return {
+        "reach": reach,
+        "time": _array(swept.time[which]),
+        "pose": _pose(swept.pose.part(which)),
+        "angles": _array(swept.sweeps.angles[rays]),
+        "distances": base64.b64encode((shares * WHOLE).round().astype("<u2").tobytes()).decode("ascii"),
+    }
 
 
 def _mind(record: BrainRecord) -> dict[str, Any] | None:

@@ -22,9 +22,11 @@ if TYPE_CHECKING:
 
     from boebot.arenas.floor_plan import FloorPlan
     from boebot.description.robots import RobotDescription
+    from boebot.view.scene import Swept
 
 REACH_SHOWN_M = 0.35  # the Ping reaches 3 m; a cone is drawn this far at most
 SPOT_SHOWN_M = 0.04
+SWEPT_SHADE, SWEPT_EDGE = 0.10, 0.45  # opacity of the area of a sweep, and of its outline
 RIM_M = 0.012  # width of a wheel
 
 
@@ -59,6 +61,15 @@ def draw_robot(
     axes.add_patch(body_patch(robot.body.radius_m, robot.body.outline_m, transform=on_axes, **look))
     nose = np.array([(0.9, 0.0), (0.35, 0.32), (0.35, -0.32)]) * robot.body.front_m
     axes.add_patch(Polygon(nose, closed=True, facecolor=colour, edgecolor="none", transform=on_axes, zorder=12))
+
+
+def draw_swept(axes: Axes, swept: Sequence[Swept], index: int, colour: str) -> None:
+    """The area that the sweep of that index covers, of each such sensor of a robot."""
+    for one in swept:
+        if len(one.time):
+            area = one.area(index)
+            axes.add_patch(Polygon(area, facecolor=colour, edgecolor="none", alpha=SWEPT_SHADE, zorder=1.4))
+            axes.add_patch(Polygon(area, facecolor="none", edgecolor=colour, alpha=SWEPT_EDGE, lw=0.7, zorder=1.6))
 
 
 def body_patch(radius: float, outline: Sequence[Sequence[float]], **look: Any) -> Patch:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.record.series import Pose
@@ -14,9 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from boebot.description.robots import RobotDescription
-    from boebot.devices.drawing import Shape
+    from boebot.devices.drawing import Shape, Sweeps
     from boebot.record.result import RunResult
-    from boebot.record.series import Floats
+    from boebot.record.series import Floats, Series
     from boebot.record.shown import Layer
     from boebot.showing import Sketch
 
@@ -24,7 +25,33 @@ MARGIN = 0.03  # of the greater side
 OPEN_M = 0.3  # to see around a path in an open field, at least
 OPEN_ARENA_M = 1.0  # around the robots in an open field
 OPEN_SHARE = 0.15  # of the path's extent, to see around it
+SAME_S = 1e-6  # sweeps nearer in time than this are one
 SLIMMEST = 0.4  # shorter side by longer side of what is shown of an open field
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What one sensor with a fan of rays measured, where and when it did: an entry per sweep."""
+
+    time: Floats
+    """s, the run's"""
+    pose: Pose
+    """Of the sensor."""
+    sweeps: Sweeps
+    ticks: NDArray[np.intp]
+    """At which of those of the run it was read."""
+
+    def distances(self, which: NDArray[np.intp], rays: NDArray[np.intp]) -> Floats:
+        """Of these rays (m): the reach where nothing is within it."""
+        read = self.sweeps.distances[np.ix_(self.ticks[which], rays)]
+        return np.where(read < 0, self.sweeps.reach, read)
+
+    def area(self, index: int) -> Floats:
+        """Corners of what that sweep covers (m), shape (1 + rays, 2): from the sensor through the ends of its rays."""
+        x, y, heading = self.pose.at(index)
+        angles = heading + self.sweeps.angles
+        (far,) = self.distances(np.array([index]), np.arange(len(angles)))
+        return np.vstack(((x, y), np.column_stack((x + far * np.cos(angles), y + far * np.sin(angles)))))
 
 
 @dataclass(frozen=True)
@@ -47,6 +74,8 @@ class View:
     """Somebody knows where the robot went: the simulator, or its odometry."""
     layers: list[Layer]
     """What the brain sketched."""
+    swept: list[Swept]
+    """What sensors with fans of rays measured."""
 
     def origin(self, sketch: Sketch) -> tuple[float, float, float]:
         """Of the frame of a sketch, as it lies in the picture at the run's end: m, m, rad."""
@@ -74,7 +103,22 @@ def view(result: RunResult) -> View:
         turret=np.nan_to_num(series.number("turret", "angle"), nan=0.0),
         path_is_seen=seen is not None,
         layers=few.layers,
+        swept=[] if seen is None else swept(series, seen),
     )
+
+
+def swept(series: Series, path: Pose) -> list[Swept]:
+    """The sweeps of each such sensor of a robot on that path, which has a pose for each tick."""
+    found = []
+    for sweeps in series.sweeps():
+        sampled = series.time - sweeps.ages
+        ticks = np.flatnonzero(np.diff(sampled, prepend=-np.inf) > SAME_S)
+        time = sampled[ticks]
+        x, y, heading = (np.interp(time, series.time, row) for row in (path.x, path.y, np.unwrap(path.heading)))
+        (forward, left), (cosine, sine) = sweeps.position, (np.cos(heading), np.sin(heading))
+        pose = Pose(x + cosine * forward - sine * left, y + sine * forward + cosine * left, heading + sweeps.heading)
+        found.append(Swept(time, pose, sweeps, ticks))
+    return found
 
 
 def shapes(robot: RobotDescription) -> list[tuple[str, Shape]]:

@@ -10,7 +10,7 @@ from boebot.record.figures import counted
 from boebot.view import scene, style
 from boebot.view.arena_drawing import draw_arena, legend_entries
 from boebot.view.picture import draw_marks
-from boebot.view.robot_drawing import draw_robot
+from boebot.view.robot_drawing import draw_robot, draw_swept
 from boebot.view.sheet import Sheet
 from boebot.view.sketch_drawing import draw_layers
 
@@ -43,6 +43,7 @@ def draw(result: TogetherResult) -> Sheet:
         axes.plot(view.path.x[0], view.path.y[0], "o", mfc=style.PAPER, mec=colour, mew=1.8, ms=6, zorder=8)
         draw_layers(axes, view, colour)
         draw_marks(axes, view)
+        draw_swept(axes, view.swept, -1, colour)
         draw_robot(axes, robot.robot, view.pose(-1), colour, plan=plan, turret=float(view.turret[-1]))
         axes.annotate(
             str(number), view.pose(-1)[:2], color=style.INK, fontsize=8, weight="bold", ha="center", va="center",
