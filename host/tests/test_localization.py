@@ -113,6 +113,20 @@ def test_estimator_follows_and_says_when_it_is_lost(
     assert lost >= 8
 
 
+def test_random_search_does_not_believe_a_fit_far_away(office: LineMap, places: list[Pose]) -> None:
+    """It may walk from 0.4 m away to the true pose; but so it may walk to any place that looks much like it."""
+    walked = 0
+    for number, pose in enumerate(places[:20]):
+        for estimator, limit in ((RandomSearch(), 0.3), (RandomSearch(farthest=(1.0, 1.0)), 1.0)):
+            estimator.begin(office, (pose[0] + 0.4, pose[1], pose[2]), random.Random(number))
+            before = estimator.pose
+            estimate = estimator.correct(scan_at(office, pose, seed=number))
+            moved = math.dist(estimate.pose[:2], before[:2])
+            assert moved <= limit and estimate.found == (moved > 0)
+            walked += moved > 0.35
+    assert walked
+
+
 def test_particle_filter_finds_itself_again(office: LineMap, places: list[Pose]) -> None:
     again = 0
     for number in range(10):

@@ -75,6 +75,9 @@ class RandomSearch:
     """T: twice the ε of a range finder with 1 % noise; below it the odometry is left as it is"""
     growth: float = 0.05
     """of the uncertainty, for each m of way and rad of turning"""
+    farthest: tuple[float, float] = (0.3, 0.5)
+    """from where odometry has it (m, rad): a scan that fits beyond is not believed, as the search would walk on to any
+    place that looks much like the true one"""
     found_within: Pose = (0.02, 0.02, 0.01)
     """uncertainty after a scan that fits (m, m, rad)"""
 
@@ -96,11 +99,15 @@ class RandomSearch:
         narrow = self._failures == 0
         box, tries = (self.box, self.tries) if narrow else (self.wide_box, self.wide_tries)
         match = search_pose(scan, self._plan, self.pose, self._source, box=box, tries=tries, enough=self.enough)
-        found = match.error < 3 * self.enough
+        found = match.error < 3 * self.enough and self._is_near(match.pose)
         self._failures = 0 if found else self._failures + 1
         if found:
             self.pose, self.uncertainty = match.pose, self.found_within
         return Estimate(self.pose, self.uncertainty, match.error, found)
+
+    def _is_near(self, pose: Pose) -> bool:
+        turn = math.remainder(pose[2] - self.pose[2], 2 * math.pi)
+        return math.dist(pose[:2], self.pose[:2]) <= self.farthest[0] and abs(turn) <= self.farthest[1]
 
 
 def mean_of(poses: np.ndarray, weights: np.ndarray) -> tuple[Pose, Pose]:
