@@ -31,6 +31,7 @@ MODULES = (
     "record",
     "demo_brain",
     "world",
+    "navigation",
     "precision",
     "calibration",
     "timing",
