@@ -213,8 +213,8 @@ def data_of(runs: list[Exploration]) -> dict[str, list[float]]:
     caption="Exploration of three rooms. Left: the first start, nodes, legs along which they were placed, path. Right: "
     "coverage and way of each of twelve starts.",
     robot="roller, with odometry that does not drift",
-    criterion="Fig. 6.4 says better than 99.5 %; the way is at most 45 m in the median. Where something blocks the way to "
-    "a node the robot tries again from other sides, which takes longer.",
+    criterion="Fig. 6.4 says better than 99.5 %; the way is at most 45 m in the median. Where something blocks the way "
+    "to a node the robot tries again from other sides, which takes longer.",
     slow=True,
 )
 def coverage(seed: int, progress: Progress) -> Outcome:
