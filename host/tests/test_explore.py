@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot.brain import Brain, CognitiveProcess, Utility
+from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
 from boebot.experiments.exploring import explored, explorer, starts
-from boebot.navigation import Coverage, Explore, GoTo, LineMap, Localization, Scan, TurretScan
+from boebot.navigation import Coverage, Explore, LineMap, Scan, TurretScan
 from boebot.navigation.corridor import is_clear
 from boebot.navigation.scan_error import heard
+from tools.navigation_figures.tasks import errand
 
 HALF_TURN = (-math.pi / 2, math.pi / 2)
 
@@ -119,25 +120,6 @@ def test_rooms_are_explored(arena: str) -> None:
 
 
 # ---- driving to places -----------------------------------------------------------------------------------------------
-
-
-class Errand(CognitiveProcess):
-    """Says once where to go."""
-
-    goal = (0.0, 0.0)
-
-    def step(self, robot: boebot.Robot) -> None:
-        if self.other(GoTo).goal is None:
-            self.other(GoTo).go(self.goal)
-
-
-def errand(plan: LineMap, start: tuple[float, float, float], goal: tuple[float, float]) -> tuple[Brain, GoTo]:
-    """A brain that goes to a place, and what drives there."""
-    due = Utility(b=-1.0, w={"due": 3.0}, tau=0.05)
-    localization = Localization(plan=plan, start=start, every=8.0, utility=due)
-    go, order = GoTo(localization=localization, speed=0.25, turn_speed=0.1, utility=Utility(b=0.5)), Errand()
-    order.goal = goal
-    return Brain([Odometry(), localization, order, go], [localization.due_variable]), go
 
 
 def test_way_leads_there_and_a_scan_says_so(office: LineMap) -> None:

@@ -1,0 +1,1 @@
+"""Figures of navigation: see __main__.py."""
