@@ -146,7 +146,7 @@ def low_obstacle(seed: int, progress: Progress) -> Outcome:
     watch = Watch(explore=explore)
     with arena_file("low", LOW) as arena:
         brain = Brain([Odometry(), watch, explore])
-        trial = try_once(brain, roller(), arena, 150.0, pose=LOW_START, seed=seed)
+        trial = try_once(brain, roller(), arena, 250.0, pose=LOW_START, seed=seed)
     progress(1.0)
     assert explore.graph is not None
     nodes = explore.graph.nodes
@@ -213,8 +213,7 @@ def data_of(runs: list[Exploration]) -> dict[str, list[float]]:
     caption="Exploration of three rooms. Left: the first start, nodes, legs along which they were placed, path. Right: "
     "coverage and way of each of twelve starts.",
     robot="roller, with odometry that does not drift",
-    criterion="Fig. 6.4 says better than 99.5 %; the way is at most 45 m in the median. Where something blocks the way "
-    "to a node the robot tries again from other sides, which takes longer.",
+    criterion="Fig. 6.4 says better than 99.5 %; the way is at most 45 m.",
     slow=True,
 )
 def coverage(seed: int, progress: Progress) -> Outcome:
@@ -222,8 +221,7 @@ def coverage(seed: int, progress: Progress) -> Outcome:
     measured = [
         exactly("starts with a coverage of 99.5 %", sum(run.share >= LEAST for run in runs), STARTS),
         exactly("explorations that are complete", sum(run.is_complete for run in runs), STARTS),
-        Measured("way, median", float(np.median([run.trial.way for run in runs])), "m", most=45.0),
-        Measured("longest way", max(run.trial.way for run in runs), "m"),
+        Measured("longest way", max(run.trial.way for run in runs), "m", most=45.0),
         Measured("true contacts", sum(run.trial.result.true_contacts or 0 for run in runs)),
     ]
 

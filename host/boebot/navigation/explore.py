@@ -263,6 +263,8 @@ class Explore(SteeredBehavior):
         """R9; R14d, R14e: where it could not come before, it looks in all directions."""
         if self._target.number == self._retried or self._share < 1.0:
             self._look_around()
+        else:
+            self._headings = [self.pose[2] + math.pi]  # R15: a range finder of half a turn also looks back
         self._draw(robot)
         return State.SCAN
 

@@ -34,6 +34,7 @@ from boebot.running.interrupts import wishes
 STEP_LIMIT_S = 10.0  # for a step, by the wall clock, where nothing waits for it
 _LOOKS = 10  # of the watching thread while a step may last
 _LOOK_S = 0.1  # from one look to the next at most
+_LASTS_S = 0.5  # while a step lasts longer, what happened before it is put into the record
 _GRACE_S = 0.5  # that a step has to end after Ctrl-C
 _FOREVER_S = 1e6
 _WAKE: Any = getattr(signal, "SIGURG", None)  # what nobody minds; it ends a wait of the main thread
@@ -232,11 +233,12 @@ class StepWatch:
         while not self._ended.wait(look_s := min(self.limit.seconds / _LOOKS, _LOOK_S)):
             if self._inside and self._wakes and self._goes_on():
                 self._end_process()
-            self._keep()
             if not self._inside or self._count != seen or self._in_debugger():
                 seen, looks = self._count, 0
                 continue
             looks += 1
+            if looks * look_s >= _LASTS_S:
+                self._keep()
             if looks * look_s >= self.limit.seconds * (1 - 1e-9):
                 looks = 0  # a brain that catches it is asked again
                 self._interrupt()
