@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from boebot.devices.readings import Readings
 from boebot.link.events import BoardEvent
-from boebot.record.blocks import Block, Group, Row, Rows, chain, group_of
+from boebot.record.blocks import Block, Group, Row, Rows, chain, group_of, joined
 from boebot.record.keepers import InMemory, Keeper
 
 Append = Callable[[str, float, bytes], None]
@@ -58,6 +58,8 @@ class Record:
         """Kept there; None: in memory. `is_new`: nothing is kept there yet."""
         self._keeper: Keeper = InMemory() if keeper is None else keeper
         self._rows: defaultdict[str, list[Row]] = defaultdict(list)
+        self._blocks: dict[str, Block] = {}  # of other streams, that wait with those rows
+        self._told: Counter[str] = Counter()  # how many of those that wait `news` has given
         self._counts: Counter[str] | None = Counter() if is_new else None  # of the rows that are kept; None: not known
         self._due_s = wall.perf_counter() + EACH_S
         self._decoded: dict[str, tuple[int, Any]] = {}
@@ -86,18 +88,30 @@ class Record:
         """A second of the wall clock has passed since rows were last handed over to be kept, or there are many."""
         return wall.perf_counter() >= self._due_s or len(self._rows["command"]) >= STEPS_AT_MOST
 
-    def keep(self, time_s: float, more: Group | None = None) -> None:
-        """Hands over the rows so far to be kept, as a group; `time_s`: of the run; `more`: of other streams.
+    def keep(self, time_s: float) -> None:
+        """Hands over the rows so far to be kept, as a group; `time_s`: of the run.
 
         Raises:
             RecordError: they cannot be kept.
         """
         self._due_s = wall.perf_counter() + EACH_S
-        rows: Rows = {**self._rows, **(more or {})}
-        self._rows = defaultdict(list)
+        rows: Rows = {**self._rows, **self._blocks}
+        self._rows, self._blocks, self._told = defaultdict(list), {}, Counter()
         if any(rows.values()):
             self._counted(rows)
             self._keeper.write(rows, time_s)
+
+    def put(self, group: Group) -> None:
+        """Rows of streams that come in blocks: they wait to be kept with the others."""
+        for stream, block in group.items():
+            self._blocks[stream] = joined(self._blocks.get(stream), block)
+
+    def news(self) -> Group:
+        """The rows that wait to be kept, and that this has not given yet."""
+        new = group_of({stream: rows[self._told[stream] :] for stream, rows in self._rows.items()})
+        blocks = {stream: block.part(self._told[stream], len(block)) for stream, block in self._blocks.items()}
+        self._told.update({stream: len(block) for stream, block in (new | blocks).items()})
+        return new | {stream: block for stream, block in blocks.items() if len(block)}
 
     def recount(self) -> None:
         """Some of the rows that were handed over could not be kept; they do not count."""
@@ -133,7 +147,7 @@ class Record:
     def groups(self) -> Iterator[Group]:
         """What is kept, and what waits to be, oldest first; each group by itself is small."""
         yield from self._keeper.groups()
-        waiting = group_of(self._rows)
+        waiting = {**group_of(self._rows), **self._blocks}
         if waiting:
             yield waiting
 
@@ -143,7 +157,7 @@ class Record:
             self._counts = Counter()
             for group in self._keeper.groups():
                 self._counted(group)
-        return self._counts[stream] + len(self._rows.get(stream, ()))
+        return self._counts[stream] + len(self._rows.get(stream, ())) + len(self._blocks.get(stream, ()))
 
     def rows(self, stream: str) -> list[Row]:
         """The rows of a stream, oldest first."""
@@ -253,7 +267,10 @@ class Unrecorded(Record):
     def append(self, stream: str, time_s: float, data: bytes) -> None:
         """Nothing is kept."""
 
-    def keep(self, time_s: float, more: Group | None = None) -> None:
+    def put(self, group: Group) -> None:
+        """Nothing is kept."""
+
+    def keep(self, time_s: float) -> None:
         """Nothing is kept."""
         self._due_s = wall.perf_counter() + EACH_S
 

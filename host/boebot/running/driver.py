@@ -94,12 +94,18 @@ def keep_rows(driver: Driver, task: Task, time_s: float, *, ended: bool = False)
     Raises:
         BoebotError: it cannot be kept.
     """
+    gather_rows(driver, task, ended=ended)
+    task.record.keep(time_s)
+
+
+def gather_rows(driver: Driver, task: Task, *, ended: bool = False) -> None:
+    """Brings what has happened into the record, where it waits to be kept."""
     append_brain(task.record, task.brain.brain, driver.robot)
     if ended:
         driver.robot.showing.end()
     for row in driver.robot.showing.take():
         task.record.append(*row)
-    task.record.keep(time_s, driver.session.drain(ended=ended))
+    task.record.put(driver.session.drain(ended=ended))
 
 
 def end_rows(driver: Driver, task: Task) -> BoebotError | None:

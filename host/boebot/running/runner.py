@@ -26,6 +26,7 @@ from boebot.running import hangs, interrupts
 from boebot.running.board_driver import BoardDriver
 from boebot.running.direct_driver import DirectDriver
 from boebot.running.driver import Driver, Progress, Task, end_rows, keep_rows
+from boebot.running.interventions import Hands, Onlooker
 from boebot.running.sources import sources
 from boebot.running.stepping import StepTimes, StepWatch, step_once
 from boebot.running.tasks import Request, check_progress, expect
@@ -106,10 +107,11 @@ def execute(
     progress: Progress | None = None,
     folder: RunFolder | None = None,
     put_away: Callable[[RunResult], None] | None = None,
+    onlooker: Onlooker | None = None,
 ) -> RunResult:
     """Runs the one robot of a request; its record goes to the folder as it comes. Once the run has begun every end of
     it, even by an error, is a result: see `RunResult.error`. If the brain goes on after Ctrl-C, `put_away` gets the
-    result, in another thread, and then the process ends.
+    result, in another thread, and then the process ends. An `onlooker` watches it, and may interfere.
 
     Raises:
         BoebotError: the run could not begin.
@@ -133,7 +135,10 @@ def execute(
             waits = session.arena is not None and not request.realtime
             begun = [driver.result(None, 0.0)]
             recording.begin(folder, begun, sources(request, [task]), request.said([task]), waits=waits)
-            result = _drive(driver, task, unended)
+            hands = None if onlooker is None else Hands(driver, task, 0, onlooker)
+            if onlooker is not None and hands is not None:
+                onlooker.begin([hands], begun)
+            result = _drive(driver, task, unended, hands)
             result.error = recording.end([result]) or result.error
             return result
         finally:
@@ -198,8 +203,9 @@ def _board_driver(session: BoardSession, task: Task) -> Driver:
         raise
 
 
-def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> RunResult:
-    """The whole run, from the robot made ready to its result; `unended` gets one that cannot be returned."""
+def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None], hands: Hands | None) -> RunResult:
+    """The whole run, from the robot made ready to its result; `unended` gets one that cannot be returned; `hands`: who
+    interferes with it."""
     error: BaseException | None = None
     times = StepTimes()
     time_s = 0.0
@@ -222,7 +228,12 @@ def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None]) -> 
                 keep_due()
                 if task.brain.is_over:
                     break
+                if hands is not None:
+                    hands.before_step(time_s)
                 step_once(driver.robot, task.brain, watch, times)
+                if hands is not None:
+                    hands.after_step()
+                    hands.onlooker.look(time_s)
     except (BoebotError, KeyboardInterrupt) as caught:
         error = caught
     finally:

@@ -24,6 +24,7 @@ from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
+from boebot.running.interventions import Hands, Onlooker
 from boebot.running.runner import UNENDED, driver_of, keep, result_of
 from boebot.running.sources import sources
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
@@ -88,10 +89,12 @@ def execute_together(
     progress: Progress | None = None,
     folder: RunFolder | None = None,
     put_away: Callable[[TogetherResult], None] | None = None,
+    onlooker: Onlooker | None = None,
 ) -> TogetherResult:
     """Runs all robots of a request in one world; their record goes to the folder as it comes. Once the run has begun
     every end of it, even by an error, is a result: see `TogetherResult.error`. If a brain goes on after Ctrl-C,
-    `put_away` gets the result, in another thread, and then the process ends.
+    `put_away` gets the result, in another thread, and then the process ends. An `onlooker` watches it, and may
+    interfere.
 
     Raises:
         BoebotError: the run could not begin.
@@ -105,7 +108,7 @@ def execute_together(
         kind = next((task.on for task in tasks if task.request.robot.has_board), request.on or DIRECT)
         world = open_together(kind, [task.request for task in tasks])
         try:
-            return _Run(world, request, tasks, progress, recording, folder).run(put_away)
+            return _Run(world, request, tasks, progress, recording, folder, onlooker).run(put_away)
         finally:
             world.close()
 
@@ -138,6 +141,7 @@ class _Robot:
         self.result: RunResult | None = None
         self.is_ending = False  # its motors are being stopped
         self.time_s = 0.0
+        self.hands: Hands | None = None  # who interferes with it
         self._times = StepTimes()
         self._session = session
         self.thread = PausableThread(self._work, f"robot {number}")
@@ -172,7 +176,11 @@ class _Robot:
             assert self.driver is not None
             try:
                 watch.limit = self.driver.step_limit
+                if self.hands is not None:
+                    self.hands.before_step(self.time_s)
                 step_once(self.driver.robot, self.task.brain, watch, self._times)
+                if self.hands is not None:
+                    self.hands.after_step()
             except BaseException as caught:
                 self.error = caught
                 raise
@@ -195,7 +203,9 @@ class _Run:
         progress: Progress | None,
         recording: Recording,
         folder: RunFolder | None,
+        onlooker: Onlooker | None,
     ) -> None:
+        self._onlooker = onlooker
         self._world, self._request = world, request
         self._recording, self._folder, self._is_recorded = recording, folder, False
         self._robots = [
@@ -244,6 +254,8 @@ class _Run:
             awake = [self._robots[index] for index in self._world.advance()]
             self._record()
             self._report()
+            if self._onlooker is not None and self._is_recorded:
+                self._onlooker.look(min(robot.time_s for robot in self._robots))
 
     def _turn(self, robot: _Robot, watch: StepWatch) -> None:
         try:
@@ -273,6 +285,11 @@ class _Run:
         self._recording.begin(
             self._folder, results, sources(self._request, tasks), self._request.said(tasks), waits=waits
         )
+        if self._onlooker is not None:
+            for robot in self._robots:
+                if robot.driver is not None:
+                    robot.hands = Hands(robot.driver, robot.task, robot.number - 1, self._onlooker)
+            self._onlooker.begin([robot.hands for robot in self._robots if robot.hands is not None], results)
 
     def _report(self) -> None:
         if self._progress is not None and wall.perf_counter() >= self._next_progress:

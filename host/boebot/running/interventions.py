@@ -1,0 +1,268 @@
+"""What a person does to a run between two steps of its brain: drives by hand, lifts the robot, changes a parameter.
+
+Whoever watches a run (boebot.live) hands interventions over; they are carried out here, before a step of the brain, and
+each goes into the record with its time. A simulated run with the same interventions at the same steps is the same run
+bit for bit: `boebot run --again` takes them from the record.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, ClassVar, Protocol
+
+import msgspec
+
+from boebot.boards import Changeable
+from boebot.errors import BoebotError, BrainError
+
+if TYPE_CHECKING:
+    from boebot.brain import Process
+    from boebot.brains import LoadedBrain
+    from boebot.record.record import Record
+    from boebot.record.result import RunResult
+    from boebot.running.driver import Driver, Task
+
+STREAM = "intervention"  # of the record
+
+
+class Intervention(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower):
+    """One of those below, of one robot."""
+
+    COUNTS: ClassVar[bool] = True
+    """It is a deed of its own: a run's result counts it."""
+
+
+class Hand(Intervention, frozen=True):
+    """The robot is driven by these motor signals (-1 to 1), whatever its brain says, until `Release`."""
+
+    COUNTS = False  # each time by itself; that the robot is taken over is counted once
+    left: float
+    right: float
+
+
+class Release(Intervention, frozen=True):
+    """Its brain drives it again."""
+
+    COUNTS = False
+
+
+class Stop(Intervention, frozen=True):
+    """Its motors are latched off."""
+
+
+class Arm(Intervention, frozen=True):
+    """They are no longer."""
+
+
+class Place(Intervention, frozen=True):
+    """A simulated robot is lifted and put elsewhere: x (m), y (m), heading (rad)."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class Shape(Intervention, frozen=True):
+    """So is a moving shape of the arena, the `index`-th from 0."""
+
+    index: int
+    x: float
+    y: float
+    heading: float
+
+
+class Parameter(Intervention, frozen=True):
+    """A parameter of a process of its brain gets another value; `name`: as "avoid.turn"."""
+
+    name: str
+    value: float
+
+
+Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter
+_DECODER: msgspec.json.Decoder[Deed] = msgspec.json.Decoder(Deed)
+
+
+class Onlooker(Protocol):
+    """Who watches a run, and may interfere with it."""
+
+    def begin(self, robots: Sequence[Hands], results: Sequence[RunResult]) -> None:
+        """The run begins. `results`: what is known of each robot."""
+
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+        """The brain of a robot (from 0) is about to step: what is done to the robot first. It may wait.
+
+        Raises:
+            BoebotError: the run is to end.
+        """
+
+    def refuse(self, number: int, error: BoebotError) -> None:
+        """What was to be done cannot be done.
+
+        Raises:
+            BoebotError: the run is to end.
+        """
+
+    def look(self, time_s: float) -> None:
+        """Steps are done; nothing happens meanwhile."""
+
+
+class Hands:
+    """What is done to one robot of a run.
+
+    Attributes:
+        driver, task: of the robot.
+        onlooker: who does it.
+        held: the motor signals that it is driven by; None: its brain drives it.
+        count: of interventions so far, as a result counts them.
+    """
+
+    def __init__(self, driver: Driver, task: Task, number: int, onlooker: Onlooker) -> None:
+        """`number`: of the robot, from 0."""
+        self.driver, self.task = driver, task
+        self.held: Hand | None = None
+        self.count = 0
+        self.onlooker, self._number = onlooker, number
+
+    def before_step(self, time_s: float) -> None:
+        """What is due."""
+        for one in self.onlooker.before_step(self._number, time_s):
+            try:
+                self._carry_out(one)
+            except BoebotError as error:
+                self.onlooker.refuse(self._number, error)
+            else:
+                self.task.record.append(STREAM, time_s, msgspec.json.encode(one))
+
+    def after_step(self) -> None:
+        """Who drives by hand has the last word."""
+        if self.held is not None:
+            self.driver.robot.drive(self.held.left, self.held.right)
+
+    def _carry_out(self, one: Deed) -> None:
+        robot = self.driver.robot
+        taken_over = self.held is None and isinstance(one, Hand)
+        match one:
+            case Hand():
+                self.held = one
+            case Release():
+                self.held = None
+            case Stop():
+                robot.emergency_stop()
+            case Arm():
+                robot.arm()
+            case Place(x, y, heading):
+                _changeable(self.driver).place(x, y, heading)
+            case Shape(index, x, y, heading):
+                _changeable(self.driver).place_shape(index, x, y, heading)
+            case Parameter(name, value):
+                set_parameter(self.task.brain, name, value)
+        self.count += one.COUNTS or taken_over
+
+
+def _changeable(driver: Driver) -> Changeable:
+    """The robot's world. Raises BoebotError where it is no simulated one."""
+    if not isinstance(driver.session, Changeable):
+        raise BoebotError("a real robot is put elsewhere by hand; expected a simulated one")
+    return driver.session
+
+
+class Repeated:
+    """Does again what a record says that was done (an `Onlooker`)."""
+
+    def __init__(self, records: Sequence[Record]) -> None:
+        """`records`: one for each robot."""
+        self._due = [interventions(record) for record in records]
+
+    def begin(self, robots: Sequence[Hands], results: Sequence[RunResult]) -> None:
+        """See `Onlooker`."""
+
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+        """See `Onlooker`."""
+        due = self._due[number]
+        while due and due[0][0] <= time_s:
+            yield due.pop(0)[1]
+
+    def refuse(self, number: int, error: BoebotError) -> None:
+        """What could be done once can be done again, or the runs differ: they are compared."""
+
+    def look(self, time_s: float) -> None:
+        """Nobody looks."""
+
+
+def interventions(record: Record) -> list[tuple[float, Deed]]:
+    """Those of a robot's run, with their times (s)."""
+    return [(time_s, _DECODER.decode(data)) for time_s, data in record.rows(STREAM)]
+
+
+def touched(record: Record) -> int:
+    """How often a person has interfered with a robot's run: driving by hand counts once, until its brain drives it
+    again."""
+    count, by_hand = 0, False
+    for _, one in interventions(record):
+        count += one.COUNTS or (isinstance(one, Hand) and not by_hand)
+        by_hand = isinstance(one, Hand) or (by_hand and not isinstance(one, Release))
+    return count
+
+
+# ---- parameters of a brain ---------------------------------------------------------------------------------------------
+
+
+def parameters(brain: LoadedBrain) -> dict[str, float]:
+    """The numbers that its processes declare, by name, as "avoid.turn"."""
+    return {f"{process.name}.{name}": getattr(process, name) for process, name in _declared(brain)}
+
+
+def _declared(brain: LoadedBrain) -> list[tuple[Process, str]]:
+    if brain.brain is None:
+        return []
+    found = []
+    for process in brain.brain.processes:
+        for one in dataclasses.fields(process):
+            value = getattr(process, one.name)
+            if one.name != "period" and one.init and isinstance(value, float | int) and not isinstance(value, bool):
+                found.append((process, one.name))
+    return found
+
+
+def set_parameter(brain: LoadedBrain, name: str, value: float) -> None:
+    """Gives a parameter another value, if its process takes it.
+
+    Raises:
+        BrainError: there is no such parameter, or the process refuses the value.
+    """
+    process, field = _find(brain, name)
+    kind = type(getattr(process, field))
+    check_parameter(process, field, kind(value))
+    setattr(process, field, kind(value))
+
+
+def _find(brain: LoadedBrain, name: str) -> tuple[Process, str]:
+    for process, field in _declared(brain):
+        if f"{process.name}.{field}" == name:
+            return process, field
+    raise BrainError(f"the brain has no parameter {name!r}; expected one of {', '.join(parameters(brain)) or 'none'}")
+
+
+def check_parameter(process: Process, field: str, value: float) -> None:
+    """Raises BrainError where the process would refuse that value when it is made."""
+    dataclasses.replace(process, **{field: value})
+
+
+def bounds(brain: LoadedBrain, name: str) -> tuple[float, float]:
+    """Between which values a slider for a parameter lies: about three times its present value, and within what its
+    process takes."""
+    process, field = _find(brain, name)
+    value = getattr(process, field)
+    far = 3.0 * abs(value) or 1.0
+    most = next(one for one in (far, 2 / 3 * far, 1.0, value) if one >= value and _takes(process, field, one))
+    least = next(one for one in (-far if value < 0 else 0.0, -1.0, value) if one <= value and _takes(process, field, one))
+    return float(least), float(most)
+
+
+def _takes(process: Process, field: str, value: float) -> bool:
+    try:
+        check_parameter(process, field, type(getattr(process, field))(value))
+    except BrainError:
+        return False
+    return True
