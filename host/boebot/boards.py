@@ -159,17 +159,6 @@ class VehicleSession(Protocol):
         """Frees the world."""
 
 
-@runtime_checkable
-class Changeable(Protocol):
-    """A session of a simulated robot: a person may put things elsewhere, as by hand."""
-
-    def place(self, x: float, y: float, heading: float) -> None:
-        """Puts the robot there (m, m, rad), at rest. Raises BoebotError where it cannot stand."""
-
-    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
-        """Puts a moving shape of the arena there. Raises BoebotError where it cannot be."""
-
-
 BoardFactory = Callable[[BoardRequest], BoardSession]
 """What an entry point of the group `boebot.boards` loads to: opens a board; raises a BoebotError with one sentence if
 it cannot."""

@@ -84,8 +84,13 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
         ("time", f"{result.run_time:g} s{faster}"),
         ("way", ", ".join(way)),
         ("brain", _brain(result, table)),
-        ("ended", table["ended"]),
+        ("ended", table["ended"] + _touched(result)),
     ]
+
+
+def _touched(result: RunResult) -> str:
+    """That somebody interfered with the run, in words."""
+    return f", touched {figures.counted(result.touched, 'time', 'times')} by hand" if result.touched else ""
 
 
 def not_zero(result: RunResult) -> list[str]:

@@ -26,7 +26,7 @@ from __future__ import annotations
 import bisect
 import time as wall
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from struct import Struct
 from typing import Any, TypeVar
 
@@ -59,7 +59,8 @@ class Record:
         self._keeper: Keeper = InMemory() if keeper is None else keeper
         self._rows: defaultdict[str, list[Row]] = defaultdict(list)
         self._blocks: dict[str, Block] = {}  # of other streams, that wait with those rows
-        self._told: Counter[str] = Counter()  # how many of those that wait `news` has given
+        self._told: Counter[str] | None = None  # how many of those that wait `news` has given; None: nobody asks
+        self._untold: dict[str, Block] = {}  # that were kept before somebody asked again
         self._counts: Counter[str] | None = Counter() if is_new else None  # of the rows that are kept; None: not known
         self._due_s = wall.perf_counter() + EACH_S
         self._decoded: dict[str, tuple[int, Any]] = {}
@@ -95,8 +96,10 @@ class Record:
             RecordError: they cannot be kept.
         """
         self._due_s = wall.perf_counter() + EACH_S
+        if self._told is not None:
+            self._untold, self._told = dict(self.news()), Counter()
         rows: Rows = {**self._rows, **self._blocks}
-        self._rows, self._blocks, self._told = defaultdict(list), {}, Counter()
+        self._rows, self._blocks = defaultdict(list), {}
         if any(rows.values()):
             self._counted(rows)
             self._keeper.write(rows, time_s)
@@ -107,11 +110,15 @@ class Record:
             self._blocks[stream] = joined(self._blocks.get(stream), block)
 
     def news(self) -> Group:
-        """The rows that wait to be kept, and that this has not given yet."""
-        new = group_of({stream: rows[self._told[stream] :] for stream, rows in self._rows.items()})
-        blocks = {stream: block.part(self._told[stream], len(block)) for stream, block in self._blocks.items()}
-        self._told.update({stream: len(block) for stream, block in (new | blocks).items()})
-        return new | {stream: block for stream, block in blocks.items() if len(block)}
+        """The rows that came since this was last asked; of the first time only those that are not kept yet."""
+        told = self._told = self._told or Counter()
+        new: dict[str, Sequence[Row] | Block] = {stream: rows[told[stream] :] for stream, rows in self._rows.items()}
+        new |= {stream: block.part(told[stream], len(block)) for stream, block in self._blocks.items()}
+        told.update({stream: len(rows) for stream, rows in new.items()})
+        found, self._untold = self._untold, {}
+        for stream, block in group_of({stream: rows for stream, rows in new.items() if len(rows)}).items():
+            found[stream] = joined(found.get(stream), block)
+        return found
 
     def recount(self) -> None:
         """Some of the rows that were handed over could not be kept; they do not count."""

@@ -31,6 +31,7 @@ from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions, TelemetrySeries
 from boebot.record.truth import plan_of, truth_of
 from boebot.running import hangs
+from boebot.running.interventions import touched
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -347,6 +348,7 @@ class RunResult(FormerNames):
                 "fallback_takeovers": self.fallback_takeovers if on_board else None,
                 "resets": self.resets if on_board else None,
                 "sessions_lost": self.sessions_lost if on_board else None,
+                "touched": self.touched,
                 "hung_at": hangs.places(self.watchdog_resets),
                 "real_time_factor": round(self.real_time_factor, 2),
                 "firmware": None if identity is None else text(identity.firmware_version),
@@ -355,6 +357,12 @@ class RunResult(FormerNames):
                 "ended": "complete" if self.error is None else why(self.error),
             }
         )
+
+    @property
+    def touched(self) -> int:
+        """How often a person interfered with the run through a live view: drove by hand, lifted the robot, changed a
+        parameter."""
+        return touched(self.record)
 
     # ---- to look at ----------------------------------------------------------------------------------------
 

@@ -49,14 +49,14 @@ def windows(record: Record, clock_offset_s: float) -> Iterator[Window]:
         while stream in waiting and len(waiting[stream]) - first > TICKS + LATE_TICKS:
             last = first + TICKS - 1
             end_s, late_s = waiting[stream].times[[last, last + LATE_TICKS]].tolist()
-            window, waiting = _cut(waiting, end_s, late_s, clock_offset_s)
+            window, waiting = cut(waiting, end_s, late_s, clock_offset_s)
             yield Window(record_of(window), first)
             first = 1
     if stream in waiting and len(waiting[stream]) > first:
         yield Window(record_of(waiting), first)
 
 
-def _cut(waiting: Group, end_s: float, late_s: float, clock_offset_s: float) -> tuple[Group, dict[str, Block]]:
+def cut(waiting: Group, end_s: float, late_s: float, clock_offset_s: float) -> tuple[Group, dict[str, Block]]:
     """What belongs to a window that ends with the tick of that time, and what to the next one."""
     window, rest = {}, {}
     for name, block in waiting.items():

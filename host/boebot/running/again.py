@@ -17,6 +17,7 @@ from boebot.record.reading import CutError, attachments_of, read_run
 from boebot.record.recording import BEGIN
 from boebot.record.result import RunResult, TogetherResult, why
 from boebot.running.driver import Progress
+from boebot.running.interventions import Repeated
 from boebot.running.runner import execute
 from boebot.running.sources import arena_file, brain_file
 from boebot.running.tasks import Member, Request
@@ -115,7 +116,9 @@ def again(run: Recorded, progress: Progress | None = None) -> Repetition:
             for number, said in enumerate(run.asked["members"], 1)
         }
         request = _request(run, files, Path(folder))
-        new = _robots((execute if len(run.results) == 1 else execute_together)(request, progress))
+        repeated = Repeated([result.record for result in run.results])
+        run_all = execute if len(run.results) == 1 else execute_together
+        new = _robots(run_all(request, progress, onlooker=repeated))
     for result in new:
         if isinstance(result.error, KeyboardInterrupt):
             raise result.error

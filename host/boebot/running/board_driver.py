@@ -33,7 +33,7 @@ from boebot.record.brain_record import BrainNames
 from boebot.record.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import hangs
-from boebot.running.driver import PROGRESS_S, Task, check_period, step_limit, whole_ticks
+from boebot.running.driver import PROGRESS_S, LinkQuality, Task, check_period, step_limit, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepLimit
 
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
@@ -260,6 +260,12 @@ class BoardDriver:
             )
         if telemetry.latch == messages.Latch.STOP_COMMAND and not self._halted:
             raise BoardError(f"the board at {where} has stopped its motors: a stop command came from elsewhere")
+
+    def link_quality(self) -> LinkQuality:
+        """See `boebot.running.driver.Driver`."""
+        link = self.link
+        decoder, trip_s = link.line.decoder, link.clock.round_trips.quantile(0.5)
+        return LinkQuality(decoder.lost, decoder.bad, link.counts.sessions_lost, self.resets, trip_s)
 
     # ---- the run -----------------------------------------------------------------------------------------------------
 

@@ -35,6 +35,9 @@ class DirectDriver:
         self.late_steps = 0
         self._last_s = 0.0
 
+    def link_quality(self) -> None:
+        """See `boebot.running.driver.Driver`: there is no link."""
+
     def begin(self) -> None:
         """Nothing is to be made ready."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from boebot.arguments import duration
 from boebot.boards import BoardRequest, BoardSession, VehicleSession
@@ -51,6 +51,20 @@ class Task:
     """why sensors, period and line do not go together in time, where the run was forced all the same"""
 
 
+class LinkQuality(NamedTuple):
+    """Of the link to a board, since the run began."""
+
+    lost: int
+    """telemetry frames that never came"""
+    bad: int
+    """frames that came damaged"""
+    sessions_lost: int
+    resets: int
+    """of the board"""
+    round_trip_s: float | None
+    """median from question to answer; None: not known"""
+
+
 class Driver(Protocol):
     """Drives one robot through one run."""
 
@@ -65,6 +79,9 @@ class Driver(Protocol):
     @property
     def step_limit(self) -> StepLimit:
         """How long a step of the brain may take."""
+
+    def link_quality(self) -> LinkQuality | None:
+        """How the link has done so far; None: there is none."""
 
     def begin(self) -> None:
         """Makes the robot ready to move.

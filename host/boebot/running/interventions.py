@@ -8,12 +8,12 @@ bit for bit: `boebot run --again` takes them from the record.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import msgspec
 
-from boebot.boards import Changeable
 from boebot.errors import BoebotError, BrainError
 
 if TYPE_CHECKING:
@@ -152,19 +152,12 @@ class Hands:
             case Arm():
                 robot.arm()
             case Place(x, y, heading):
-                _changeable(self.driver).place(x, y, heading)
+                self.driver.session.place(x, y, heading)
             case Shape(index, x, y, heading):
-                _changeable(self.driver).place_shape(index, x, y, heading)
+                self.driver.session.place_shape(index, x, y, heading)
             case Parameter(name, value):
                 set_parameter(self.task.brain, name, value)
         self.count += one.COUNTS or taken_over
-
-
-def _changeable(driver: Driver) -> Changeable:
-    """The robot's world. Raises BoebotError where it is no simulated one."""
-    if not isinstance(driver.session, Changeable):
-        raise BoebotError("a real robot is put elsewhere by hand; expected a simulated one")
-    return driver.session
 
 
 class Repeated:
@@ -193,6 +186,25 @@ class Repeated:
 def interventions(record: Record) -> list[tuple[float, Deed]]:
     """Those of a robot's run, with their times (s)."""
     return [(time_s, _DECODER.decode(data)) for time_s, data in record.rows(STREAM)]
+
+
+def in_words(data: bytes) -> str:
+    """An intervention as it stands in a record."""
+    match _DECODER.decode(data):
+        case Hand(left, right):
+            return f"driven by hand: {left:+.2f}, {right:+.2f}"
+        case Release():
+            return "the brain drives again"
+        case Stop():
+            return "motors latched off by hand"
+        case Arm():
+            return "motors armed by hand"
+        case Place(x, y, heading):
+            return f"put at {x:.2f}, {y:.2f} m, {math.degrees(heading):.0f}°"
+        case Shape(index, x, y):
+            return f"moving shape {index + 1} put at {x:.2f}, {y:.2f} m"
+        case Parameter(name, value):
+            return f"{name} = {value:g}"
 
 
 def touched(record: Record) -> int:

@@ -52,6 +52,7 @@ def run(
     force_timing: bool = False,
     record: bool = True,
     pins: bool = False,
+    view: bool = False,
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
@@ -76,6 +77,8 @@ def run(
         pins: the output edges of emulated boards are recorded, too.
         out: folder for the record, and the files that are made from it (boebot.view).
         record: False: nothing is recorded; a result then has few figures, and `out` is refused.
+        view: shows the run in the browser while it goes on, at real time at first; a person may interfere there, or
+            begin it afresh: the result is that of the last run (docs/how-to/watch-a-run.md).
         progress: called with the run's time so far (s), about ten times a second.
 
     Raises:
@@ -99,7 +102,28 @@ def run(
         record=record,
         pins=pins,
     )
-    return keep(lambda folder, put_away: execute(request, progress, folder, put_away), out)
+    return keep(viewed(request, progress, execute, view=view), out)
+
+
+def viewed(
+    request: Request, progress: Progress | None, run_all: Callable[..., Result], *, view: bool
+) -> Callable[[RunFolder | None, Callable[[Result], None]], Result]:
+    """What `keep` does: the whole of a run, with a live view or without."""
+    if not isinstance(view, bool):
+        raise BoebotError(f"view is {view!r}; expected True or False")
+    if not view:
+        return lambda folder, put_away: run_all(request, progress, folder, put_away)
+    if not request.record:
+        raise BoebotError("a run that is not recorded cannot be viewed; expected record=True with view=True")
+
+    def work(folder: RunFolder | None, put_away: Callable[[Result], None]) -> Result:
+        from boebot.live.session import opened, run_viewed
+
+        with opened(lambda url: print(f"watch it: {url}", file=sys.stderr, flush=True)) as page:
+            again = lambda wanted: run_all(wanted, progress, folder, put_away, page)  # noqa: E731
+            return run_viewed(page, request, again, waits=False)
+
+    return work
 
 
 def execute(

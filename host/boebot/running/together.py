@@ -25,7 +25,7 @@ from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
 from boebot.running.interventions import Hands, Onlooker
-from boebot.running.runner import UNENDED, driver_of, keep, result_of
+from boebot.running.runner import UNENDED, driver_of, keep, result_of, viewed
 from boebot.running.sources import sources
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import Member, Request, check_progress, of_robot
@@ -51,6 +51,7 @@ def run_together(
     step_timeout: float | None = None,
     force_timing: bool = False,
     pins: bool = False,
+    view: bool = False,
 ) -> TogetherResult:
     """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
 
@@ -58,7 +59,7 @@ def run_together(
 
     Args:
         members: the robots.
-        arena, seconds, on, seed, realtime, step_timeout, force_timing, pins: as of `boebot.run`.
+        arena, seconds, on, seed, realtime, step_timeout, force_timing, pins, view: as of `boebot.run`.
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
         progress: called with the run's time so far (s), about ten times a second.
 
@@ -81,7 +82,7 @@ def run_together(
         force_timing=force_timing,
         pins=pins,
     )
-    return keep(lambda folder, put_away: execute_together(request, progress, folder, put_away), out)
+    return keep(viewed(request, progress, execute_together, view=view), out)
 
 
 def execute_together(

@@ -1,0 +1,192 @@
+"""What happened to a robot since the last chunk, in the form in which the page draws it: a replay in small pieces.
+
+A chunk is made from the rows that the record has got meanwhile, by the code that makes replays: so both show the same.
+It holds few ticks: the page is for the eye, the record has all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from boebot.arenas.floor_plan import FloorPlan, Moving
+from boebot.devices.whisker import Whisker
+from boebot.link.messages import DevicesTelemetry
+from boebot.record.blocks import Block, joined
+from boebot.record.brain_record import STEPS, SWITCHES, read_brain
+from boebot.record.record import Record
+from boebot.record.result import RunResult
+from boebot.record.series import Floats, Pose, Series
+from boebot.record.shown import read_layers, read_shown
+from boebot.record.telemetry_series import Directions
+from boebot.record.truth import track_of
+from boebot.record.windows import OF_TICKS, cut, record_of
+from boebot.running.driver import gather_rows
+from boebot.running.interventions import STREAM, Hands, in_words
+from boebot.showing import SKETCH
+from boebot.view import page_data, scene
+
+TICKS_AT_MOST = 12  # in a chunk
+COGNITIVE_AT_MOST = 4
+
+
+class Chunks:
+    """Of one robot of a run.
+
+    Attributes:
+        content: what the page knows of the robot from the start; None before the first chunk.
+    """
+
+    def __init__(self, hands: Hands, result: RunResult, number: int) -> None:
+        """`result`: what is known as the run begins. `number`: of the robot, from 1."""
+        self.content: dict[str, Any] | None = None
+        self._hands, self._result, self._number = hands, result, number
+        self._waiting: dict[str, Block] = {}  # of ticks and the truth, from the last chunk's last tick on
+        self._first = 0  # index of the first new tick in them
+        self._directions = Directions()
+        self._place: tuple[float, float, float] | None = None  # by odometry, at that last tick
+        self._start: tuple[float, float, float] | None = None  # where the run began
+        self._offset_s = 0.0  # the transport's clock at the run's time 0
+        self._cycles: tuple[float, float] = 0.0, 0.0  # executed, and all
+
+    def make(self) -> dict[str, Any] | None:
+        """The rows of a chunk; None: nothing has happened."""
+        task = self._hands.task
+        gather_rows(self._hands.driver, task)
+        news = task.record.news()
+        for name in (*OF_TICKS, "truth"):
+            if name in news:
+                self._waiting[name] = joined(self._waiting.get(name), news[name])
+        record = record_of(self._waiting)
+        if record.ticks <= self._first:
+            return None
+        if self.content is None:
+            self._offset_s = self._hands.driver.result(None, 0.0).clock_offset
+        stretch, series = self._stretch(record, news)
+        if self.content is None:
+            self.content = self._content(series, stretch)
+        rows = page_data.rows_data(stretch, cognitive=self._cognitive())
+        end_s = float(series.time[-1])
+        _, self._waiting = cut(self._waiting, end_s, end_s, self._offset_s)
+        self._first = 1
+        return rows
+
+    def _stretch(self, record: Record, news: dict[str, Block]) -> tuple[page_data.Stretch, Series]:
+        result = self._result
+        series = result.series_of(record, self._directions)
+        new = np.arange(self._first, len(series))
+        kept = new[:: -(-len(new) // TICKS_AT_MOST)] if len(new) > TICKS_AT_MOST else new
+        kept = np.unique(np.append(kept, len(series) - 1))
+        few = result.series_of(_part(record, series, kept))
+        track = track_of(record)
+        true = track.at(series.time + self._offset_s) if len(track.time) else None
+        contact = track.contact_at(series.time + self._offset_s) if len(track.time) else np.zeros(len(series), np.bool_)
+        odometry = self._odometry(series)
+        seen = true or odometry or Pose(*np.zeros((3, len(series))))
+        if self._start is None:
+            self._start = seen.at(0)
+        path = seen.part(kept)
+        whiskers = [name for name, device in result.robot.device.items() if device.on and isinstance(device, Whisker)]
+        events = page_data.events(series, contact, whiskers, first=self._first)
+        events += [(time_s, "intervention", in_words(data)) for time_s, data in _rows(news, STREAM)]
+        names = result.brain_names
+        stretch = page_data.Stretch(
+            series=few,
+            path=path,
+            estimate=None if true is None or odometry is None else odometry.placed(*self._start).part(kept),
+            contact=contact[kept],
+            start=self._start if true is not None else (0.0, 0.0, 0.0),
+            shown=read_shown(record),
+            layers=read_layers(record_of({SKETCH: news[SKETCH]})) if SKETCH in news else (),
+            brain=None if names is None or STEPS not in news else read_brain(_brain_of(news), names),
+            swept=scene.swept(few, path),
+            true_contacts=_where(true, events, "contact", series),
+            touches=_where(seen, events, "touch", series),
+            events=sorted(events),
+            load=self._load(len(kept)),
+            pins=page_data.pins(record_of({"pins": news["pins"]}), result.robot, self._offset_s) if "pins" in news else {},
+        )
+        return stretch, series
+
+    def _odometry(self, series: Series) -> Pose | None:
+        """As seen from the run's start."""
+        if not self._result.has_odometry:
+            return None
+        pose = series.odometry()
+        if self._place is not None:
+            pose = pose.placed(*self._place)
+        self._place = pose.at(-1)
+        return pose
+
+    def _load(self, ticks: int) -> Floats | None:
+        """The share of its cycles that an emulated board worked since the last chunk."""
+        counters = self._hands.driver.session.counters()
+        if "executed_cycles" not in counters or "load" not in counters or not counters["load"]:
+            return None
+        executed, before = counters["executed_cycles"], self._cycles
+        all_of_them = executed / counters["load"]
+        self._cycles = executed, all_of_them
+        passed = all_of_them - before[1]
+        return np.full(ticks, (executed - before[0]) / passed if passed > 0 else counters["load"])
+
+    def moving(self, plan: FloorPlan) -> list[Moving]:
+        """The moving shapes of that plan where they are now."""
+        now = self._hands.driver.session.truth_now()
+        if now is None or "truth" not in self._waiting:
+            return []
+        time = self._waiting["truth"].times[-1:]
+        return [
+            replace(moving, time=time, x=np.array([x]), y=np.array([y]), heading=np.array([heading]))
+            for moving, (x, y, heading) in zip(plan.moving, now.shapes, strict=True)
+        ]
+
+    def _cognitive(self) -> list[str]:
+        names = self._result.brain_names
+        return [] if names is None else list(names.cognitive[:COGNITIVE_AT_MOST])
+
+    def _content(self, series: Series, stretch: page_data.Stretch) -> dict[str, Any]:
+        result = self._result
+        return page_data.robot_data(
+            result.robot,
+            series,
+            number=self._number,
+            title=f"{result.brain} on {result.robot.name} ({result.board})",
+            brain=result.brain,
+            begin=self._offset_s,
+            known="truth" in self._waiting,
+            has_estimate=stretch.estimate is not None,
+            table={"robot": result.robot.name, "arena": result.world.name if result.world else None, "seed": result.seed},
+            names=result.brain_names,
+            cognitive=self._cognitive(),
+        )
+
+
+def _part(record: Record, series: Series, kept: Any) -> Record:
+    """The record of a few of its ticks, with what was in force and newest at each."""
+    part = Record()
+    stream = record.tick_stream
+    rows, commands = record.rows(stream), series.commands
+    held = series.held(DevicesTelemetry) if record.count(DevicesTelemetry.NAME) else None
+    for index in kept.tolist():
+        time_s, data = rows[index]
+        part.append(stream, time_s, data)
+        part.append_command(time_s, *commands[index])
+        if held is not None and held.newest[index] >= 0:
+            part.append(DevicesTelemetry.NAME, time_s, held.messages[held.newest[index]].pack())
+    return part
+
+
+def _brain_of(news: dict[str, Block]) -> Record:
+    return record_of({name: news[name] for name in (STEPS, SWITCHES) if name in news})
+
+
+def _rows(news: dict[str, Block], stream: str) -> list[tuple[float, bytes]]:
+    return news[stream].rows() if stream in news else []
+
+
+def _where(pose: Pose | None, events: list[page_data.Event], kind: str, series: Series) -> Floats:
+    """Where the robot was at the events of a kind, shape (n, 2)."""
+    at = [int(np.searchsorted(series.time, time_s)) for time_s, what, _ in events if what == kind]
+    return np.empty((0, 2)) if pose is None or not at else np.column_stack((pose.x[at], pose.y[at]))

@@ -1,0 +1,76 @@
+"""What waits to be sent to one page. A page that is slow gets fewer and newer chunks: of those that it has missed only
+what must not be lost is kept, such as events, and that is bounded."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from typing import Any
+
+import msgspec
+
+Message = dict[str, Any]
+EVENTS = 500  # of a kind, that wait at most
+LETTERS = 20_000  # printed, that wait at most
+_ADDED = ("events", "true_contacts", "touches")  # lists of rows that are not lost with their chunk
+
+
+class Outbox:
+    """Filled by the thread of the run, emptied by that of the server.
+
+    Attributes:
+        ready: there is something; of the server's loop.
+    """
+
+    def __init__(self) -> None:
+        self.ready = asyncio.Event()
+        self._lock = threading.Lock()
+        self._first: list[Message] = []  # must be sent, and before the rest
+        self._chunk: Message | None = None
+        self._state: Message | None = None
+
+    def begin(self, run: Message, past: list[Message]) -> None:
+        """A run begins, or the page comes in the middle of it: what it needs first. Nothing else counts any more."""
+        with self._lock:
+            self._first, self._chunk, self._state = [run, *past], None, None
+
+    def put(self, message: Message) -> None:
+        """Something for the page."""
+        with self._lock:
+            kind = message["type"]
+            if kind == "chunk":
+                self._chunk = message if self._chunk is None else merged(self._chunk, message)
+            elif kind == "state":
+                self._state = message
+            elif len(self._first) < EVENTS:
+                self._first.append(message)
+
+    @property
+    def is_waiting(self) -> bool:
+        """There is something in it."""
+        with self._lock:
+            return bool(self._first or self._chunk or self._state)
+
+    def take(self) -> list[str]:
+        """All of it, to be sent in this order."""
+        with self._lock:
+            waiting = [*self._first, *filter(None, (self._chunk, self._state))]
+            self._first, self._chunk, self._state = [], None, None
+        return [msgspec.json.encode(message).decode() for message in waiting]
+
+
+def merged(old: Message, new: Message) -> Message:
+    """The newer of two chunks, with what must not be lost of the older one."""
+    return new | {
+        "runs": [_merged_rows(one, other) for one, other in zip(old["runs"], new["runs"], strict=True)],
+        "printed": (old["printed"] + new["printed"])[-LETTERS:],
+    }
+
+
+def _merged_rows(old: Message, new: Message) -> Message:
+    layers = {layer["name"]: layer for layer in (*old["layers"], *new["layers"])}
+    rows = new | {name: (old[name] + new[name])[-EVENTS:] for name in _ADDED} | {"layers": list(layers.values())}
+    if old["mind"] is not None and new["mind"] is not None:
+        switches = (old["mind"]["switches"] + new["mind"]["switches"])[-EVENTS:]
+        rows["mind"] = new["mind"] | {"switches": switches}
+    return rows
