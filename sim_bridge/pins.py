@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.arguments import number, shown
-from boebot.errors import ArenaError, BoardError
+from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
-from sim_bridge.sim import SimRobot, checked_pose
+from sim_bridge.sim import SimRobot
 
 ECHO_MAXIMUM_US = 1e6
 SUPPLY_MAXIMUM_V = 30.0
@@ -131,14 +131,8 @@ class BoardPins(BoardMemory):
         return int(lib.sim_brown_outs(self._handle, self._number, upsets)), int(upsets[0])
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Puts the robot elsewhere, at rest (m, m, rad).
-
-        Raises:
-            ArenaError: that place is not free.
-        """
-        x, y, heading = checked_pose("place: the pose", (x, y, heading))
-        if lib.sim_place(self._handle, self._number, x, y, heading) != lib.SIM_OK:
-            raise ArenaError(f"the robot cannot be put at x = {x:g} m, y = {y:g} m: no free space")
+        """See `SimRobot.place`."""
+        self._robot.place(x, y, heading)
 
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import sys
 import time
@@ -15,12 +16,13 @@ from numpy.typing import NDArray
 
 from boebot import arguments
 from boebot.arenas import Arena
-from boebot.arenas.floor_plan import Lateness
+from boebot.arenas.floor_plan import Lateness, Shift
 from boebot.arguments import point, shown, whole
+from boebot.boards import TruthNow
 from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.former_names import FormerNames
-from boebot.record.blocks import Block, Group
+from boebot.record.blocks import Block, Group, group_of
 from sim_bridge import saved
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
@@ -45,6 +47,7 @@ NEVER = 2**64 - 1
 TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
 TONE = ("time", "duration", "frequency")
 _WAIT = struct.Struct("<dd")
+_SHIFT = struct.Struct("<dddd")
 LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
 BAUD_MAXIMUM = 4_000_000
@@ -129,6 +132,7 @@ class Sim:
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
+        self._count, self._time = ffi.new("size_t *"), ffi.new("double *")
         self.drained_s: dict[int, float] = {}  # of each robot: up to when its truth was drained
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
@@ -303,16 +307,43 @@ class Sim:
         """The truth is kept."""
         return self._record
 
-    def drain_waits(self) -> Group:
-        """The stream "waits" of a record since it was last drained: rows (shape, how long it has waited in all, s), the
-        last one of each shape of now. Empty without recording, and without moving shapes."""
-        rows = [
+    def place_shape(self, index: int, pose: Pose) -> None:
+        """Puts a moving shape of the arena (0: the first one) at `pose` (m, m, rad), as it is now. It goes on along its
+        way shifted by as much, and turned in itself; the direction of the way stays.
+
+        Raises:
+            ArenaError: there is no such shape, or a robot stands there.
+        """
+        shapes = len(self.arena.description.moving)
+        if not shapes:
+            raise ArenaError(f"arena {self.arena.name} has no moving shape to put elsewhere")
+        index = whole("place_shape: the moving shape", index, ArenaError, least=0, most=shapes - 1)
+        x, y, heading = checked_pose("place_shape: the pose", pose)
+        if lib.sim_place_shape(self.handle, index, x, y, heading) != lib.SIM_OK:
+            raise ArenaError(f"moving shape {index + 1} cannot stand at {x:.2f} m, {y:.2f} m: a robot is there")
+
+    def shapes(self) -> tuple[Pose, ...]:
+        """Truth: where the arena's moving shapes stand now (m, m, rad)."""
+        movers = lib.sim_movers(self.handle, self._count, self._time)
+        return tuple((m.x, m.y, math.atan2(m.sine, m.cosine)) for m in (movers[k] for k in range(self._count[0])))
+
+    def drain(self) -> Group:
+        """The streams of a record that tell of the arena's moving shapes since it was last drained. "waits": rows
+        (shape, how long it has waited in all, s), the last one of each shape of now; "shifts": rows (shape, by how much
+        it is off its way from then on: m, m, rad). Empty without recording, and without moving shapes."""
+        waits = [
             (time, _WAIT.pack(shape, waited))
             for shape, late in enumerate(self.lateness())
             for time, waited in zip(late.time.tolist(), late.waited.tolist(), strict=True)
         ]
-        lib.sim_forget_waits(self.handle)
-        return {"waits": Block.of(sorted(rows))} if rows else {}
+        shifts = [(shift.time, _SHIFT.pack(shift.shape, shift.x, shift.y, shift.heading)) for shift in self.shifts()]
+        lib.sim_forget_world(self.handle)
+        return group_of({"waits": sorted(waits), "shifts": shifts})
+
+    def shifts(self) -> list[Shift]:
+        """Truth: when moving shapes were put elsewhere, oldest first; empty without recording."""
+        rows = lib.sim_shifts(self.handle, self._count)
+        return [Shift(row.time, int(row.shape), row.x, row.y, row.heading) for row in rows[0 : self._count[0]]]
 
     def lateness(self) -> list[Lateness]:
         """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had
@@ -623,6 +654,24 @@ class SimRobot(FormerNames):
         body = ffi.new("body_state *")
         lib.sim_body(self._handle, self.number, body)
         return body
+
+    def truth_now(self) -> TruthNow:
+        """What only a simulator knows, as it stands now."""
+        body = self.body()
+        shapes = self.sim.shapes()
+        return TruthNow((body.x, body.y, body.heading), self.true_contacts, shapes)
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Lifts the robot and puts it elsewhere, at rest (m, m, rad): see `sim_place` of loop/loop.h.
+
+        Raises:
+            ArenaError: that place is not free.
+        """
+        x, y, heading = checked_pose("place: the pose", (x, y, heading))
+        if lib.sim_place(self._handle, self.number, x, y, heading) != lib.SIM_OK:
+            raise ArenaError(
+                f"a robot cannot stand at {x:.2f} m, {y:.2f} m: a wall, a moving shape or another robot is in the way"
+            )
 
     def _need_board(self, what: str) -> None:
         if not self.description.has_board:

@@ -73,6 +73,19 @@ class Truth:
     plan: FloorPlan = field(default_factory=FloorPlan)  # what stands and moves where it happened
 
 
+Pose = tuple[float, float, float]  # x (m), y (m), heading (rad)
+
+
+class TruthNow(NamedTuple):
+    """What really is, now; no brain ever sees it. Up to a step of the world ahead of the transport's clock."""
+
+    pose: Pose
+    contacts: int
+    """touches begun so far"""
+    shapes: Sequence[Pose]
+    """of the arena's moving shapes"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class WatchdogReset:
     """Where a board's watchdog found the program that it reset."""
@@ -106,6 +119,27 @@ class BoardSession(Protocol):
     def drain(self, *, ended: bool = False) -> Group:
         """The streams of a record that only a simulator knows, from where it was last drained (`Truth`); empty where
         nobody knows. `ended`: the run has ended now."""
+
+    def truth_now(self) -> TruthNow | None:
+        """What only a simulator knows, as it stands now; None where nobody knows. As all of a session, not
+        while time passes."""
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Lifts a simulated robot and puts it there (m, m, rad), at rest; its motors go on as they are told.
+
+        Neither the board nor its odometry knows of it. Its sensors look from there from the next step of the world on.
+
+        Raises:
+            BoebotError: that place is not free, or the robot is real.
+        """
+
+    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
+        """Puts a moving shape of the arena there, the first one if `index` is 0; it goes on along its way shifted by as
+        much, and turned in itself.
+
+        Raises:
+            BoebotError: a robot stands there, or there is no such shape, or the robot is real.
+        """
 
     def counters(self) -> Mapping[str, float]:
         """What the board counted, by name; may be empty."""
@@ -150,6 +184,15 @@ class VehicleSession(Protocol):
         """Where the robot is."""
 
     def drain(self, *, ended: bool = False) -> Group:
+        """See `BoardSession`."""
+
+    def truth_now(self) -> TruthNow:
+        """See `BoardSession`."""
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """See `BoardSession`."""
+
+    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
         """See `BoardSession`."""
 
     def counters(self) -> Mapping[str, float]:
@@ -242,6 +285,18 @@ class LiveSession:
     def drain(self, *, ended: bool = False) -> Group:
         """Nobody knows where a real robot is."""
         return {}
+
+    def truth_now(self) -> TruthNow | None:
+        """Nor now."""
+        return None
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """By hand only."""
+        raise BoardError(f"the {self.description} is put elsewhere by hand: only a simulated robot can be put there")
+
+    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
+        """By hand only."""
+        raise BoardError(f"what stands around the {self.description} is moved by hand: only a simulator can do it")
 
     def counters(self) -> Mapping[str, float]:
         """A port counts nothing."""

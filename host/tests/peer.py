@@ -27,7 +27,7 @@ from channel import Channel
 
 from boebot.arenas.arena import Arena
 from boebot.arenas.description import ArenaDescription, Polygon, Start
-from boebot.boards import WatchdogReset
+from boebot.boards import TruthNow, WatchdogReset
 from boebot.description.board_parameters import parameters_of
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
@@ -692,6 +692,15 @@ class InProcess:
 
     def drain(self, *, ended: bool = False) -> Group:
         return self.peer.drain()
+
+    def truth_now(self) -> TruthNow | None:
+        return None
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        raise BoardError("it stands where it is")
+
+    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
+        raise BoardError("it stands where it is")
 
     def counters(self) -> Mapping[str, float]:
         return {}

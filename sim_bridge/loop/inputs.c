@@ -107,6 +107,8 @@ static int apply(sim *self, const input *in) {
       return sim_line_rate(self, n, (uint32_t)w[0]);
     case INPUT_PLACE:
       return sim_place(self, n, double_of_input(w[0]), double_of_input(w[1]), double_of_input(w[2]));
+    case INPUT_SHAPE:
+      return sim_place_shape(self, n, double_of_input(w[0]), double_of_input(w[1]), double_of_input(w[2]));
     case INPUT_DRIVE:
       return sim_drive(self, n, w[0], (uint8_t)w[1], (uint8_t)w[2]);
     case INPUT_WAVE:
@@ -209,6 +211,10 @@ uint64_t sim_state_hash(const sim *self) {
     sum = hash_mix(sum ^ r->contacts);
     sum = r->vehicle != NULL ? hash_mix(sum ^ vehicles_hash(r->vehicle, 0)) : mixed_board(sum, r);
   }
-  for (size_t k = 0; k < self->world.obstacles; k++) sum = hash_mix(sum ^ input_of_double(self->movers[k].waited));
+  for (size_t k = 0; k < self->world.obstacles; k++) {
+    const mover *m = &self->movers[k];
+    const double off[] = {m->waited, m->shift_x, m->shift_y, m->shift_heading};
+    for (int n = 0; n < 4; n++) sum = hash_mix(sum ^ input_of_double(off[n]));
+  }
   return sum;
 }

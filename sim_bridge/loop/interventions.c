@@ -8,17 +8,42 @@
 
 static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
 
+static int bad_pose(double x, double y, double heading) {
+  return !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y);
+}
+
+/* The truth has where it was, and a cycle later where it is. */
+static void lift(robot *r, double x, double y, double heading) {
+  const uint64_t at = r->sim->world_at;
+  const int is_recorded = r->sim->record_cycles > 0;
+  if (is_recorded && at > 0) robot_record(r, at - 1u);
+  body_place(r->body, x, y, heading);
+  r->touched = 0;
+  if (is_recorded) robot_record(r, at > r->next_row ? at : r->next_row);
+}
+
 int sim_place(sim *self, int number, double x, double y, double heading) {
   robot *r = sim_robot(self, number);
-  if (r == NULL || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
+  if (r == NULL || bad_pose(x, y, heading)) return SIM_BAD_ARGUMENT;
   if (!world_is_free(&self->world, x, y, r->body->body_reach, r->chassis.self_id)) return SIM_NOT_FREE;
   const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
   sim_note(self, number, INPUT_PLACE, words, 3, NULL, 0);
-  body_place(r->body, x, y, heading);
+  lift(r, x, y, heading);
   r->chassis.x = x;
   r->chassis.y = y;
   r->chassis.heading = heading;
   world_update(&self->world);
+  return SIM_OK;
+}
+
+int sim_place_shape(sim *self, int shape, double x, double y, double heading) {
+  if (shape < 0 || (size_t)shape >= self->world.obstacles || bad_pose(x, y, heading)) return SIM_BAD_ARGUMENT;
+  if (!world_place_obstacle(&self->world, (size_t)shape, x, y, heading)) return SIM_NOT_FREE;
+  const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
+  sim_note(self, shape, INPUT_SHAPE, words, 3, NULL, 0);
+  const mover *m = &self->movers[shape];
+  const sim_shift row = {(double)self->world_at / BOARD_CLOCK_HZ, shape, m->shift_x, m->shift_y, m->shift_heading};
+  if (self->record_cycles > 0) buffer_append(&self->shifts, &row, sizeof row);
   return SIM_OK;
 }
 

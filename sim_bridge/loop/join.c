@@ -48,6 +48,7 @@ void sim_destroy(sim *self) {
   free(self->robots);
   buffer_free(&self->inputs);
   buffer_free(&self->waits);
+  buffer_free(&self->shifts);
   free(self);
 }
 

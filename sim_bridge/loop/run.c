@@ -24,23 +24,6 @@ double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
 
 /* ---- the world's step ---------------------------------------------------------------------------------------------- */
 
-static void record(robot *r, uint64_t cycle) {
-  const body_state *s = &r->body->state;
-  const sim_truth row = {
-      .time = (double)cycle / BOARD_CLOCK_HZ,
-      .x = s->x,
-      .y = s->y,
-      .heading = s->heading,
-      .speed = s->speed,
-      .turn_rate = s->turn_rate,
-      .left = body_left_speed(r->body),
-      .right = body_right_speed(r->body),
-      .contact = r->touched,
-  };
-  r->touched = s->touching;
-  buffer_append(&r->truth, &row, sizeof row);
-}
-
 void robot_update_supply(robot *self) {
   chassis *c = &self->chassis;
   const int held = self->held_supply > 0.0;
@@ -121,7 +104,7 @@ const world_robot_operations ROBOT_OPERATIONS = {.torques = begin_step, .moved =
 
 static void step_world(sim *self) {
   if (self->record_cycles > 0 && self->world_at >= self->next_record) {
-    for (int i = 0; i < self->robot_count; i++) record(self->robots[i], self->world_at);
+    for (int i = 0; i < self->robot_count; i++) robot_record(self->robots[i], self->world_at);
     self->next_record += self->record_cycles;
   }
   if (self->robot_count > 1) exchange_light(self);

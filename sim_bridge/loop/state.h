@@ -54,7 +54,8 @@ typedef struct {
   buffer looks;
   buffer tones;
   edge_log edges;
-  int touched; /* since the last row of the truth */
+  uint64_t next_row; /* least cycle of the truth's next row */
+  int touched;       /* since its last row */
   uint64_t last_touch;
   uint64_t contacts;
 } robot;
@@ -74,6 +75,7 @@ struct sim {
   int robot_count;
   mover_clock clocks[SIM_OBSTACLES_MAXIMUM];
   buffer waits;  /* rows of sim_wait */
+  buffer shifts; /* rows of sim_shift */
   buffer inputs; /* from outside, as inputs.c notes them */
   int crashed;   /* 1: a board has */
 };
@@ -95,6 +97,7 @@ typedef enum {
   INPUT_MEMORY = 13,   /* address; bytes */
   INPUT_SIGNALS = 14,  /* left, right */
   INPUT_UNPLUG = 15,   /* pin, unplugged */
+  INPUT_SHAPE = 16,    /* x, y, heading; its number is that of a moving shape */
 } input_kind;
 
 #define INPUT_WORDS 4 /* at most */
@@ -140,6 +143,9 @@ uint64_t line_idle_cycles(uint32_t baud);
 
 /* The voltage of the rail as it is now goes to all that runs on it. */
 void robot_update_supply(robot *self);
+
+/* truth.c: a row of the truth, unless there is one of that cycle or a later one. */
+void robot_record(robot *r, uint64_t cycle);
 
 /* truth.c: how long movers waited in the world's step that began at `begin`. */
 void sim_record_waits(sim *self, uint64_t begin);

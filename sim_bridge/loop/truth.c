@@ -26,6 +26,25 @@ const sim_tone *sim_tones(const sim *self, int number, size_t *count) {
   return r == NULL ? NULL : (const sim_tone *)(const void *)r->tones.data;
 }
 
+void robot_record(robot *r, uint64_t cycle) {
+  if (cycle < r->next_row) return;
+  r->next_row = cycle + 1u;
+  const body_state *s = &r->body->state;
+  const sim_truth row = {
+      .time = (double)cycle / BOARD_CLOCK_HZ,
+      .x = s->x,
+      .y = s->y,
+      .heading = s->heading,
+      .speed = s->speed,
+      .turn_rate = s->turn_rate,
+      .left = body_left_speed(r->body),
+      .right = body_right_speed(r->body),
+      .contact = r->touched,
+  };
+  r->touched = s->touching;
+  buffer_append(&r->truth, &row, sizeof row);
+}
+
 void sim_record_waits(sim *self, uint64_t begin) {
   for (size_t k = 0; k < self->world.obstacles; k++) {
     const mover *m = &self->movers[k];
@@ -42,12 +61,17 @@ const sim_wait *sim_waits(const sim *self, size_t *count) {
   return (const sim_wait *)(const void *)self->waits.data;
 }
 
+const sim_shift *sim_shifts(const sim *self, size_t *count) {
+  *count = self->shifts.count / sizeof(sim_shift);
+  return (const sim_shift *)(const void *)self->shifts.data;
+}
+
 void sim_forget(sim *self, int number) {
   robot *r = sim_robot(self, number);
   if (r != NULL) r->truth.count = r->looks.count = r->tones.count = 0;
 }
 
-void sim_forget_waits(sim *self) { self->waits.count = 0; }
+void sim_forget_world(sim *self) { self->waits.count = self->shifts.count = 0; }
 
 const mover *sim_movers(const sim *self, size_t *count, double *time) {
   *count = self->world.obstacles;

@@ -40,6 +40,13 @@ typedef struct {
   double shape;  /* its number among the arena's moving shapes */
   double waited; /* s by which it is behind then */
 } sim_wait;
+
+/* A moving shape was put elsewhere: from `time` on it goes along its way shifted by so much. */
+typedef struct {
+  double time;          /* s */
+  double shape;         /* its number among the arena's moving shapes */
+  double x, y, heading; /* m, m, rad */
+} sim_shift;
 /* python: end */
 
 #define SIM_EDGES_KEPT (1u << 20)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from boebot.arenas import load_arena
 from boebot.arenas.floor_plan import floor_plan
-from boebot.boards import BoardRequest, Truth
+from boebot.boards import BoardRequest, Truth, TruthNow
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sim import Sim, SimRobot
@@ -70,10 +70,36 @@ def alone(sim: Sim, *, paced: bool = False) -> Wait:
     return wait
 
 
+class InWorld:
+    """What every simulated robot's session offers: the truth, and hands that lift things. Of `BoardSession` and
+    `VehicleSession` of boebot.boards."""
+
+    def __init__(self, robot: SimRobot) -> None:
+        self.robot = robot
+        self.sim = robot.sim
+        self.arena = robot.sim.arena
+
+    def truth_now(self) -> TruthNow:
+        """Where the robot and the arena's moving shapes are."""
+        return self.robot.truth_now()
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Lifts the robot and puts it there, at rest."""
+        self.robot.place(x, y, heading)
+
+    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
+        """Puts a moving shape there; it goes on along its way shifted by as much."""
+        self.sim.place_shape(index, (x, y, heading))
+
+    def truth(self) -> Truth | None:
+        """What happened so far; None without recording."""
+        return truth_of(self.robot)
+
+
 def drain(robot: SimRobot, *, ended: bool) -> Group:
     """See `boebot.boards.BoardSession`. What belongs to the world goes with its first robot."""
-    waits = robot.sim.drain_waits() if robot.number == min(robot.sim.members) else {}
-    return {**robot.drain(to_now=ended and not robot.description.has_board), **waits}
+    world = robot.sim.drain() if robot.number == min(robot.sim.members) else {}
+    return {**robot.drain(to_now=ended and not robot.description.has_board), **world}
 
 
 def truth_of(robot: SimRobot) -> Truth | None:
@@ -89,5 +115,11 @@ def truth_of(robot: SimRobot) -> Truth | None:
         contact=columns["contact"] > 0,
         left_speed=columns["left"],
         right_speed=columns["right"],
-        plan=floor_plan(robot.sim.arena, float(columns["time"][0]), float(columns["time"][-1]), robot.sim.lateness()),
+        plan=floor_plan(
+            robot.sim.arena,
+            float(columns["time"][0]),
+            float(columns["time"][-1]),
+            robot.sim.lateness(),
+            robot.sim.shifts(),
+        ),
     )

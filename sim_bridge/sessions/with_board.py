@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from boebot.boards import BoardRequest, BoardSession, SharedWorld, Truth, VehicleSession, WatchdogReset
+from boebot.boards import BoardRequest, BoardSession, SharedWorld, VehicleSession, WatchdogReset
 from boebot.description import robots
 from boebot.devices.uart import Uart
 from boebot.errors import BoardError
@@ -21,7 +21,7 @@ from sim_bridge.boards.code_places import watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins, PinRecorder
 from sim_bridge.robots.switches import switches
-from sim_bridge.sessions.opening import Wait, alone, drain, new_sim, truth_of
+from sim_bridge.sessions.opening import InWorld, Wait, alone, drain, new_sim
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sessions.without_board import DirectSession, add_vehicle
 from sim_bridge.sim import Floats, Sim, SimRobot
@@ -88,15 +88,13 @@ class SimTransport:
         self._closed = True
 
 
-class SimSession:
+class SimSession(InWorld):
     """An opened simulated robot (BoardSession of boebot.boards)."""
 
     def __init__(self, robot: SimRobot, kind: str, wait: Wait, *, pins: bool = False, shared: bool = False) -> None:
         """`pins`: the board's edges are recorded. `shared`: the world is not this robot's alone, and is closed by
         somebody else."""
-        self.robot = robot
-        self.sim = robot.sim
-        self.arena = robot.sim.arena
+        super().__init__(robot)
         self.description = f"{robot.board.description} in arena {self.arena.name}"
         self.board = BoardPins(robot)
         self._pins = PinRecorder(self.board) if pins else None
@@ -109,10 +107,6 @@ class SimSession:
         """See `boebot.boards.BoardSession`."""
         edges = {} if self._pins is None else self._pins.drain()
         return {**drain(self.robot, ended=ended), **edges}
-
-    def truth(self) -> Truth | None:
-        """What happened so far; None without recording."""
-        return truth_of(self.robot)
 
     def looks(self) -> dict[str, Floats]:
         """Where the range sensors looked from and what they saw: columns `LOOK`."""

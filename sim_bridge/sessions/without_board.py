@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from boebot.boards import BoardRequest, SharedWorld, Truth
+from boebot.boards import BoardRequest, SharedWorld
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.sessions.opening import Wait, alone, drain, new_sim, truth_of
+from sim_bridge.sessions.opening import InWorld, Wait, alone, drain, new_sim
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.vehicles.model_file import STEP_S
@@ -21,18 +21,16 @@ from sim_bridge.vehicles.model_file import STEP_S
 DEFAULT_ARENA = "arsim"
 
 
-class DirectSession:
+class DirectSession(InWorld):
     """An opened vehicle (VehicleSession of boebot.boards)."""
 
     tick_s = STEP_S
 
     def __init__(self, robot: SimRobot, wait: Wait, *, shared: bool = False) -> None:
         """`shared`: the world is not this robot's alone, and is closed by somebody else."""
-        self.robot = robot
-        self.sim = robot.sim
+        super().__init__(robot)
         self.layout: Mapping[str, slice] = robot.layout
         self.description = f"robot without a board in arena {robot.sim.arena.name}"
-        self.arena = robot.sim.arena
         self._wait = wait
         self._cycles = round(STEP_S * CLOCK_HZ)
         self._shared = shared
@@ -58,10 +56,6 @@ class DirectSession:
     def drain(self, *, ended: bool = False) -> Group:
         """See `boebot.boards.BoardSession`."""
         return drain(self.robot, ended=ended)
-
-    def truth(self) -> Truth | None:
-        """What happened so far; None without recording."""
-        return truth_of(self.robot)
 
     def counters(self) -> Mapping[str, float]:
         """`true_contacts`, `true_distance_m` and `time_s`."""

@@ -2,6 +2,7 @@
 #include "world.h"
 
 #include "body_step.h"
+#include "geometry/numbers.h"
 
 void world_init(world *self, const arena *where, double dt, mover *movers) {
   *self = (world){.arena = where, .dt = dt, .obstacles = arena_moving_count(where), .movers = movers};
@@ -53,4 +54,28 @@ int world_is_free(const world *self, double x, double y, double radius, uint32_t
   body_as_mover(self->robots[0].body, &alone);
   const scene robot = {.arena = self->arena, .movers = &alone, .movers_count = 1};
   return scene_is_free(&robot, x, y, radius, self_id);
+}
+
+static int meets_a_robot(const world *self, const mover *m) {
+  for (size_t i = 0; i < self->count; i++) {
+    const body *b = self->robots[i].body;
+    const double apart = mover_distance(m, b->state.x, b->state.y);
+    if (!(apart > 0.0 && apart >= b->body_reach)) return 1;
+  }
+  return 0;
+}
+
+int world_place_obstacle(world *self, size_t obstacle, double x, double y, double heading) {
+  mover *m = &self->movers[obstacle];
+  const mover before = *m;
+  path_state way;
+  path_at(&arena_movings(self->arena)[obstacle].path, (double)self->steps * self->dt - m->waited, &way);
+  m->shift_x = x - way.x;
+  m->shift_y = y - way.y;
+  m->shift_heading = number_wrap(heading - way.heading);
+  m->waits = 0;
+  world_update(self);
+  if (!meets_a_robot(self, m)) return 1;
+  *m = before;
+  return 0;
 }

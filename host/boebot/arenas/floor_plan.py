@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from boebot.arenas import description
 from boebot.arenas.arena import Arena, Floats
 
+JUMP_S = 1e-6  # before a moving shape is put elsewhere it is drawn where it was
 SAMPLE_S = 0.05  # from one pose of a moving shape to the next
 SAMPLES_MAXIMUM = 20_000  # of one moving shape; longer times have them farther apart
 LOOKED_OVER_M = 0.10  # the highest sensor, a laser, sits here: lower things are not seen by all sensors
@@ -147,10 +148,30 @@ class Lateness:
     waited: Floats  # s
 
 
-def floor_plan(arena: Arena, begin: float, end: float, late: Sequence[Lateness] = ()) -> FloorPlan:
-    """The arena with its moving shapes from `begin` to `end` (s); `late`: of each of them, unless none ever waited."""
-    time = _times(arena, begin, end, late)
-    return plan_of_poses(arena, time, _poses(arena, time, late))
+class Shift(NamedTuple):
+    """A moving shape was put elsewhere: from `time` (s) on it goes along its way this much off it (m, m, rad)."""
+
+    time: float
+    shape: int
+    x: float
+    y: float
+    heading: float
+
+
+def floor_plan(
+    arena: Arena, begin: float, end: float, late: Sequence[Lateness] = (), shifts: Sequence[Shift] = ()
+) -> FloorPlan:
+    """The arena with its moving shapes from `begin` to `end` (s).
+
+    Args:
+        late: of each of them, unless none ever waited.
+        shifts: all of them, by time.
+    """
+    time = _times(arena, begin, end, late, shifts)
+    poses = _poses(arena, time, late)
+    for shape, pose in enumerate(poses):
+        _shift(pose, time, [shift for shift in shifts if shift.shape == shape])
+    return plan_of_poses(arena, time, poses)
 
 
 def plan_of_poses(arena: Arena, time: Floats, poses: Floats) -> FloorPlan:
@@ -227,10 +248,11 @@ def moving_solids(arena: Arena) -> list[Solid]:
     ]
 
 
-def _times(arena: Arena, begin: float, end: float, late: Sequence[Lateness]) -> Floats:
-    """Times of the poses: evenly, and wherever a shape begins or ends to wait or passes a waypoint, between which it
-    goes straight (paths.h)."""
+def _times(arena: Arena, begin: float, end: float, late: Sequence[Lateness], shifts: Sequence[Shift]) -> Floats:
+    """Times of the poses: evenly, and wherever a shape begins or ends to wait, is put elsewhere or passes a waypoint,
+    between which it goes straight (paths.h)."""
     bends = [row.time for row in late]
+    bends += [np.array((shift.time - JUMP_S, shift.time)) for shift in shifts]
     for k, moving in enumerate(arena.description.moving):
         clock = late[k] if late else Lateness(time=np.array([begin, end]), waited=np.zeros(2))
         bends.append(_waypoint_times(moving, begin, end, clock))
@@ -267,3 +289,16 @@ def _poses(arena: Arena, time: Floats, late: Sequence[Lateness]) -> Floats:
     waited = np.array([np.interp(time, row.time, row.waited) for row in late]).reshape(len(late), len(time)).T
     rows = zip(time.tolist(), waited.tolist(), strict=True)
     return np.array([poses_of(arena.movers(moment, clocks)) for moment, clocks in rows]).transpose(1, 2, 0)
+
+
+def _shift(pose: Floats, time: Floats, shifts: Sequence[Shift]) -> None:
+    """Puts one shape as far off its way as it was at each time: x, y, cosine and sine of its heading change."""
+    if not shifts:
+        return
+    newest = np.searchsorted([shift.time for shift in shifts], time, side="right")
+    x, y, turn = np.array([(0.0, 0.0, 0.0), *((shift.x, shift.y, shift.heading) for shift in shifts)])[newest].T
+    cosine, sine = pose[2].copy(), pose[3].copy()
+    pose[0] += x
+    pose[1] += y
+    pose[2] = cosine * np.cos(turn) - sine * np.sin(turn)
+    pose[3] = sine * np.cos(turn) + cosine * np.sin(turn)

@@ -26,7 +26,7 @@ from boebot.robot import Command, Equipment, Observation, Robot
 NOT_SEEN = frozenset(("setpoint_sequence",))
 """Fields of telemetry that say what the host itself sent, and that no device shows to a brain."""
 
-_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "waits")
+_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "waits", "shifts")
 """Streams whose times are of the transport's clock, or near it."""
 
 

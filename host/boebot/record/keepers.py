@@ -148,4 +148,4 @@ class Shared:
         return stream if stream in WORLD else self._prefix + stream
 
 
-WORLD = ("waits",)  # streams of a world, not of one of its robots
+WORLD = ("waits", "shifts")  # streams of a world, not of one of its robots

@@ -101,10 +101,10 @@ class _Walk:
         self._apart_s = apart_s
         self._begun_s: float | None = None
         self._places = 0  # so far
-        self._x, self._y = np.empty(0), np.empty(0)  # the last one
+        self._time, self._x, self._y = np.empty(0), np.empty(0), np.empty(0)  # the last one
 
-    def add(self, time: Floats, pose: Pose, *, is_last: bool) -> None:
-        """Some more ticks. `is_last`: there are no more."""
+    def add(self, time: Floats, pose: Pose, *, is_last: bool, lifts: Floats | None = None) -> None:
+        """Some more ticks. `is_last`: there are no more. `lifts`: when the robot was put elsewhere, which is no way."""
         at = np.arange(len(time))
         if self._apart_s:
             self._begun_s = float(time[0]) if self._begun_s is None else self._begun_s
@@ -114,9 +114,13 @@ class _Walk:
             self._places += len(wanted)
             at = np.searchsorted(time, wanted)
             at = np.append(at, len(time) - 1) if is_last else at
+        when = np.append(self._time, time[at])
         x, y = np.append(self._x, pose.x[at]), np.append(self._y, pose.y[at])
-        self.length += float(np.hypot(np.diff(x), np.diff(y)).sum())
-        self._x, self._y = x[-1:], y[-1:]
+        way = np.hypot(np.diff(x), np.diff(y))
+        if lifts is not None and len(lifts):
+            way = way[np.diff(np.searchsorted(lifts, when, side="right")) == 0]
+        self.length += float(way.sum())
+        self._time, self._x, self._y = when[-1:], x[-1:], y[-1:]
 
 
 class _Contacts:
@@ -248,7 +252,8 @@ def overview(
         if has_truth:
             track = track_of(window.record)
             pose = track.at(time_s)
-            true_walk.add(series.time[new], pose.part(new), is_last=seen == ticks)
+            lifts = track.lifts - clock_offset_s
+            true_walk.add(series.time[new], pose.part(new), is_last=seen == ticks, lifts=lifts)
             contacts.add(track, clock_offset_s, float(time_s[-1]))
             true_poses.append(pose.part(kept))
             contact.append(track.contact_at(time_s[kept]))

@@ -13,6 +13,8 @@ clock               0                           the transport's clock at the run
 truth               the world's                 of a simulated robot: doubles, `boebot.boards.TRUTH` without the time
 pins                transport's clock           of an emulated board, if asked for: a pin's Arduino number and its level
 waits               the world's                 a moving shape has begun or ended to wait for a robot: shape, waited (s)
+shifts              the world's                 a moving shape was put elsewhere: shape, by how much it is off its way
+                                                from then on (m, m, rad)
 brain_step          the run's, of the step      of a brain of processes, doubles: index of the active motor behavior,
                                                 state variables, utilities, gammas
 switch              the run's, of the step      of a brain of processes, JSON: what became inactive, active, and why

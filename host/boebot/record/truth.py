@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boebot.arenas.floor_plan import FloorPlan, Lateness, floor_plan
+from boebot.arenas.floor_plan import FloorPlan, Lateness, Shift, floor_plan
 from boebot.boards import Truth
 from boebot.record.series import Bools, Floats, Pose
 
@@ -19,6 +19,8 @@ COLUMNS = ("x", "y", "heading", "speed", "turn_rate", "left", "right", "contact"
 """Of the stream "truth": m, m, rad, m/s, rad/s, wheel speeds along the ground (m/s), 1: touched since the last row."""
 _ROW = np.dtype([(name, "<f8") for name in COLUMNS])
 _WAIT = np.dtype([("shape", "<f8"), ("waited", "<f8")])
+_SHIFT = np.dtype([(name, "<f8") for name in ("shape", "x", "y", "heading")])
+LIFTED_S = 1e-6  # two rows of the truth that are nearer in time: the robot was put elsewhere between them
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,12 @@ class Track:
             np.arctan2(np.sin(heading), np.cos(heading)),
         )
 
+    @property
+    def lifts(self) -> Floats:
+        """When the robot was put elsewhere: between the two rows (s)."""
+        before = np.flatnonzero(np.diff(self.time) < LIFTED_S)
+        return (self.time[before] + self.time[before + 1]) / 2
+
     def contact_at(self, times: Floats) -> Bools:
         """Whether it touched something, in the row at or after each of these instants."""
         moment = np.searchsorted(self.time, times)
@@ -59,7 +67,7 @@ def track_of(record: Record) -> Track:
 def plan_of(record: Record, arena: Arena) -> FloorPlan:
     """The arena, with its moving shapes where they were."""
     begin, end = record.span("truth")
-    return floor_plan(arena, begin, end, lateness(record))
+    return floor_plan(arena, begin, end, lateness(record), shifts(record))
 
 
 def truth_of(record: Record, plan: FloorPlan) -> Truth | None:
@@ -84,3 +92,9 @@ def lateness(record: Record) -> list[Lateness]:
     time, rows = record.times_of("waits"), record.table("waits", _WAIT)
     shapes = (rows["shape"] == shape for shape in range(int(rows["shape"].max(initial=-1)) + 1))
     return [Lateness(time=time[own], waited=rows["waited"][own]) for own in shapes]
+
+
+def shifts(record: Record) -> list[Shift]:
+    """When the arena's moving shapes were put elsewhere, oldest first."""
+    time, rows = record.times_of("shifts").tolist(), record.table("shifts", _SHIFT).tolist()
+    return [Shift(at, int(shape), *off) for at, (shape, *off) in zip(time, rows, strict=True)]

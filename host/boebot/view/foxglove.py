@@ -44,7 +44,7 @@ from boebot.record.brain_record import each_switch
 from boebot.record.parts import Part, events, parts
 from boebot.record.record import KINDS
 from boebot.record.shown import shown_names
-from boebot.record.truth import lateness
+from boebot.record.truth import lateness, shifts
 from boebot.showing import SKETCH, VALUES, Sketch
 from boebot.view import foxglove_numbers, foxglove_scene, style
 
@@ -191,12 +191,12 @@ def _movers(result: RunResult) -> Iterator[Entry]:
     """Where moving shapes are, over time."""
     if not result.has_truth or result.world is None or not result.world.description.moving:
         return
-    late, offset_s = lateness(result.record), result.clock_offset
+    late, moved, offset_s = lateness(result.record), shifts(result.record), result.clock_offset
     _, end_s = result.record.span("truth")
     begin_s = offset_s
     while begin_s < end_s:
         until_s = min(begin_s + MOVERS_AT_ONCE_S, end_s)
-        moving = floor_plan(result.world, begin_s, until_s, late).moving
+        moving = floor_plan(result.world, begin_s, until_s, late, moved).moving
         for index, time_s in enumerate(moving[0].time[:-1].tolist()):
             poses = [(float(one.x[index]), float(one.y[index]), float(one.heading[index])) for one in moving]
             transforms = [_transform(time_s - offset_s, _mover(k), *pose) for k, pose in enumerate(poses)]

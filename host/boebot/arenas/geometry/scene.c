@@ -136,8 +136,8 @@ void scene_moving(const arena *where, double time, double dt, uint32_t first_id,
     path_at(&moving[i].path, time - waited, &at);
     path_at(&moving[i].path, time - waited + dt, &next);
     out[i] = (mover){
-        .x = at.x,
-        .y = at.y,
+        .x = at.x + out[i].shift_x,
+        .y = at.y + out[i].shift_y,
         .vx = (next.x - at.x) / dt, /* over waypoints as well: no jump at the step's end */
         .vy = (next.y - at.y) / dt,
         .turn_rate = number_wrap(next.heading - at.heading) / dt, /* a loop may begin again at another count of turns */
@@ -151,13 +151,15 @@ void scene_moving(const arena *where, double time, double dt, uint32_t first_id,
         .waited = waited,
         .waits = out[i].waits,
         .stops = out[i].stops,
+        .shift_x = out[i].shift_x,
+        .shift_y = out[i].shift_y,
+        .shift_heading = out[i].shift_heading,
     };
-    number_sincos(at.heading, &out[i].sine, &out[i].cosine);
+    number_sincos(at.heading + out[i].shift_heading, &out[i].sine, &out[i].cosine);
   }
 }
 
-/* Distance from (x, y) to the mover; 0 inside. */
-static double mover_distance(const mover *self, double x, double y) {
+double mover_distance(const mover *self, double x, double y) {
   const double dx = x - self->x;
   const double dy = y - self->y;
   const double centre = sqrt(dx * dx + dy * dy);

@@ -28,6 +28,7 @@ typedef struct {
   double waited; /* s by which its path's clock is behind the world's: it waits while it pinches a robot (contact.h) */
   int waits;     /* 1: it waited when the last step ended */
   double stops;  /* s into the step under way at which it stops to wait; only body_step uses it */
+  double shift_x, shift_y, shift_heading; /* by which it was put off its way: m, m, rad */
 } mover;
 
 typedef struct {
@@ -53,12 +54,15 @@ double scene_ray(const scene *self, double x, double y, double cosine, double si
 void scene_fan_movers(const scene *self, const fan_question *question, uint32_t self_id);
 
 /* Where the arena's moving shapes are at `time` (s): arena_moving_count of them, with ids from `first_id` on. Their
- * velocities are those that take them evenly to where their paths lead within `dt`. `waited`, `waits` and `stops` of each are kept:
- * 0 for one whose path was never held up. */
+ * velocities are those that take them evenly to where their paths lead within `dt`. `waited`, `waits` and `stops` of each are kept,
+ * 0 for one whose path was never held up, and so are its shifts, by which it stands and turns off its way. */
 void scene_moving(const arena *where, double time, double dt, uint32_t first_id, mover *out);
 
 /* 1 if a disc of `radius` at (x, y) lies in free space of the arena and outside of all movers but `self_id`. */
 int scene_is_free(const scene *self, double x, double y, double radius, uint32_t self_id);
+
+/* Distance from (x, y) to a mover; 0 inside. */
+double mover_distance(const mover *self, double x, double y);
 
 /* scene_ray for one mover alone, whatever its id and height. */
 double mover_ray(const mover *self, double x, double y, double cosine, double sine, double reach, ray_hit *hit);
