@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 import typer
@@ -70,6 +71,36 @@ RobotNumber = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in place of the table.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print all figures of the run.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
+def _speed(given: str | float) -> float:
+    """Of "0.5", "10" or "max"."""
+    if given == "max":
+        return math.inf
+    try:
+        return float(given)
+    except ValueError:
+        raise typer.BadParameter(f"{given!r} is no speed; expected a number, 1 for real time, or max") from None
+
+
+View = Annotated[
+    bool, typer.Option("--view", help="Show the run in the browser while it goes on, where people may interfere.")
+]
+Speed = Annotated[
+    float | None,
+    typer.Option(
+        "--speed",
+        metavar="X",
+        parser=_speed,
+        help="With --view: how many times as fast as real time a simulated run goes at first, or max. Else 1.",
+    ),
+]
+ViewPort = Annotated[
+    int | None,
+    typer.Option(
+        "--view-port", metavar="PORT", min=0, max=65535, help="With --view: port of the page, on loopback. Else any."
+    ),
+]
 
 
 def names(text: str | None) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from boebot.brains import bundled
-from boebot.cli import completion, options, output, quantity, streams
+from boebot.cli import completion, options, output, quantity, streams, watched
 from boebot.cli.again import run_again
 from boebot.cli.ending import end
 from boebot.cli.run_table import detail
@@ -100,6 +100,9 @@ def run(
     pins: Annotated[
         bool, typer.Option("--pins", help="Record the output edges of emulated boards, too: stream pins of the record.")
     ] = False,
+    view: options.View = False,
+    speed: options.Speed = None,
+    view_port: options.ViewPort = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Where to write record.mcap, run.png, replay.html and summary.json."),
@@ -164,7 +167,12 @@ def run(
                     output.say(str(error))
 
             run_all = execute if count == 1 else execute_together
-            result = run_all(request, progress, folder, put_away)
+            page = shown.enter_context(watched.view(view=view, speed=speed, port=view_port))
+            if page is None:
+                result = run_all(request, progress, folder, put_away)
+            else:
+                again = lambda wanted: run_all(wanted, progress, folder, put_away, page)  # noqa: E731
+                result = watched.run(page, request, again)
         end(result, out, wanted)
 
 

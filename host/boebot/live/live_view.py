@@ -121,14 +121,17 @@ class LiveView:
         """What a page needs first: the run, what has happened so far, and its end."""
         if self._run is None:
             return
-        past = [chunk for chunk in self._past]
-        if past:
-            rows = [
-                one | {"layers": list(layers.values())}
-                for one, layers in zip(past[-1]["runs"], self._layers, strict=True)
-            ]
-            past[-1] = past[-1] | {"runs": rows}
-        page.outbox.begin(self._run, past if self._end is None else [*past, self._end])
+        past = [self._for_page(page, chunk) for chunk in self._past]
+        newest = [
+            rows | {"layers": list(layers.values())}
+            for rows, layers in zip(past[-1]["runs"], self._layers, strict=True)
+        ]
+        past[-1] = past[-1] | {"runs": newest}
+        first = past[0]
+        runs = [known | {"rows": rows} for known, rows in zip(self._run["runs"], first["runs"], strict=True)]
+        begin = self._run | {"runs": runs, "moving": first["moving"]}
+        end = [] if self._end is None else [self._end]
+        page.outbox.begin(begin, [*past[1:], {"type": "state", "state": past[-1]["state"]}, *end])
         self.server.wake(page)
 
     def _send(self, page: Page, message: Message) -> None:
