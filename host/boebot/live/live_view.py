@@ -23,7 +23,7 @@ from boebot.live.pace import Pace
 from boebot.live.page_server import LOOPBACK, Page, PageServer
 from boebot.record.result import RunResult
 from boebot.running.interventions import Deed, Hands, bounds, parameters
-from boebot.view import page_data, replay
+from boebot.view import page_data, scene, web_page
 
 EACH_S = 0.05  # of the wall clock, from chunk to chunk
 EACH_UNSEEN_S = 0.5  # where no page is open
@@ -68,7 +68,7 @@ class LiveView:
         self._rates: deque[tuple[float, float]] = deque(maxlen=40)
         self._state_sent: Message = {}
         self._over = threading.Condition(self._lock)
-        self.server = PageServer(replay.live_page(), self, host=host, port=port)
+        self.server = PageServer(web_page.live, self, host=host, port=port)
         self.url = self.server.url
 
     # ---- pages: in the server's thread -----------------------------------------------------------------------------
@@ -172,7 +172,8 @@ class LiveView:
                 self._due_s = 0.0
             if not self._pace.holds(time_s):
                 return
-            self._send_state(time_s)
+            if self._pace.paused:
+                self._send_state(time_s)
 
     def refuse(self, number: int, error: BoebotError) -> None:
         """See `Onlooker`."""
@@ -224,13 +225,13 @@ class LiveView:
 
     def _first_message(self, chunk: Message) -> Message:
         contents = [chunks.content for chunks in self._chunks]
-        low, high = replay.bounds_of(self._plan, chunk["runs"], contents)
+        low, high = scene.plan_bounds(self._plan, [])
         return {
             "type": "run",
             "number": self._number,
             "format": page_data.FORMAT,
             "plan": page_data.plan_data(self._plan),
-            "bounds": [*low, *high],
+            "bounds": [*low.tolist(), *high.tolist()],
             "runs": contents,
             "live": self._live(),
         }

@@ -45,7 +45,7 @@ class Speed(_Message, frozen=True):
 class Restart(_Message, frozen=True):
     """The same once more, with this seed and without these imperfections."""
 
-    seed: Annotated[int, msgspec.Meta(ge=0, lt=2**63)]
+    seed: Annotated[int, msgspec.Meta(ge=0, le=2**53)]
     without: Annotated[list[Name], msgspec.Meta(max_length=200)]
 
 

@@ -8,13 +8,14 @@ sends rubbish is let go; nothing that a page does slows the run.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hmac
 import http
 import secrets
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio.server import ServerConnection, serve
@@ -32,10 +33,7 @@ MESSAGES_AT_ONCE = 400
 PAGES = 16  # at most
 SILENT_S = 20.0  # a page that answers no ping for so long is gone
 START_S = 5.0
-_CSP = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
-    "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
+_POLICY = "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"  # beside what the page itself says
 
 
 class Page:
@@ -70,8 +68,10 @@ class PageServer:
         url: of the page, with its token.
     """
 
-    def __init__(self, page: bytes, listener: Listener, *, host: str = LOOPBACK, port: int = 0) -> None:
-        """`page`: the HTML. `port`: 0: any free one.
+    def __init__(
+        self, page: Callable[[str], str], listener: Listener, *, host: str = LOOPBACK, port: int = 0
+    ) -> None:
+        """`page`: gives the HTML, by where its stream is, as in ws://127.0.0.1:8080. `port`: 0: any free one.
 
         Raises:
             BoebotError: the port is taken, or there is no such address.
@@ -100,20 +100,15 @@ class PageServer:
 
     def wake(self, page: Page) -> None:
         """There is something to be sent to it. Called from any thread."""
-        with self._still_open():
+        with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(page.outbox.ready.set)
 
     def close(self) -> None:
         """Says good-bye to all pages. May be called twice."""
         if self._thread.is_alive():
-            with self._still_open():
+            with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._stop.set)
             self._thread.join(START_S)
-
-    def _still_open(self) -> Any:
-        import contextlib
-
-        return contextlib.suppress(RuntimeError)  # the loop has ended
 
     # ---- in the server's thread ------------------------------------------------------------------------------------
 
@@ -163,7 +158,7 @@ class PageServer:
             return None
         if address.path != "/":
             return _refusal(http.HTTPStatus.NOT_FOUND, "there is one page here: /")
-        return _response(http.HTTPStatus.OK, "text/html; charset=utf-8", self._page, _CSP.format(host=host))
+        return _response(http.HTTPStatus.OK, "text/html; charset=utf-8", self._page(f"ws://{host}").encode(), _POLICY)
 
     def _hosts(self) -> set[str]:
         names = {self._name(self._host)}
