@@ -190,7 +190,7 @@ setup(
         ),
     ],
     package_data={
-        "": ["py.typed", "*.pyi", "*.html"],
+        "": ["py.typed", "*.pyi", "*.html", "*.css", "*.js"],
         "boebot.brains": ["*.toml"],
         "boebot.arenas.bundled": ["*.toml", "*.json"],
     },

@@ -3,6 +3,7 @@
 "use strict";
 const fs = require("fs"), vm = require("vm");
 const page = fs.readFileSync(process.argv[2], "utf-8"), script = /<script>([\s\S]*)<\/script>/.exec(page)[1];
+const palette = Object.fromEntries([.../:root \{(.*?)\}/.exec(page)[1].matchAll(/(--[\w-]+): ([^;]+);/g)].map(([, name, value]) => [name, value]));
 
 let drawn = [];
 function canvasContext() {
@@ -23,14 +24,15 @@ function canvasContext() {
 }
 function element() {
   const cells = [], it = {
-    style: {}, dataset: {}, children: [], cells, textContent: "", checked: true, value: "1", clientWidth: 800, clientHeight: 600,
+    style: { setProperty() {} }, dataset: {}, children: [], cells, textContent: "", checked: true, value: "1", clientWidth: 800, clientHeight: 600, hidden: false,
     classList: { toggle(name, on) { it.on = on; } },
     append(...more) { it.children.push(...more); },
+    replaceChildren(...more) { it.children = more; },
     insertRow() { const row = element(); it.children.push(row); return row; },
     insertCell() { const cell = element(); cells.push(cell); return cell; },
     querySelector(name) { return (it[name] ??= element()); },
     getContext() { return (it.context ??= canvasContext()); },
-    setPointerCapture() {},
+    addEventListener() {}, setPointerCapture() {},
   };
   return it;
 }
@@ -38,8 +40,9 @@ const byId = {}, lamps = [...page.matchAll(/class="lamp" data-bit="(\d+)" data-d
   const lamp = element(); lamp.dataset = { bit, device, colour: "x" }; return lamp;
 });
 Object.assign(globalThis, {
-  document: { getElementById: id => (byId[id] ??= element()), createElement: element, querySelectorAll: () => lamps },
-  location: { hash: "", reload() {} }, addEventListener() {}, requestAnimationFrame() {}, devicePixelRatio: 1,
+  document: { getElementById: id => (byId[id] ??= element()), createElement: element, querySelectorAll: () => lamps, documentElement: {} },
+  getComputedStyle: () => ({ getPropertyValue: name => palette[name] }), matchMedia: () => ({ addEventListener() {} }),
+  location: { hash: "" }, addEventListener() {}, requestAnimationFrame() {}, devicePixelRatio: 1,
 });
 vm.runInThisContext(script);
 const still = drawn;
@@ -48,8 +51,8 @@ for (const time of process.argv.slice(3)) {
   vm.runInThisContext(`seek(${Number(time)})`);
   const texts = Object.fromEntries(Object.entries(byId).map(([id, it]) => [id, it.textContent]));
   const readings = (byId.readings?.table?.children ?? []).map(row => row.cells.map(cell => cell.textContent));
-  const hidden = Object.keys(byId).filter(id => byId[id].style.display === "none");
-  const lit = lamps.filter(lamp => lamp.style.display !== "none").map(lamp => [lamp.dataset.device, lamp.on]);
-  const values = (byId.shown?.children ?? []).filter(row => row.children.length === 2).map(row => row.children.map(cell => cell.textContent));
+  const hidden = Object.keys(byId).filter(id => byId[id].hidden);
+  const lit = lamps.filter(lamp => !lamp.hidden).map(lamp => [lamp.dataset.device, lamp.on]);
+  const values = (byId.shownRows?.children ?? []).filter(row => row.children.length === 2).map(row => row.children.map(cell => cell.textContent));
   console.log(JSON.stringify({ texts, shown: values, readings, hidden, lamps: lit, still, drawn, scale: vm.runInThisContext("[scale, shiftX, shiftY]") }));
 }

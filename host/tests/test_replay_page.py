@@ -113,9 +113,6 @@ def test_page_hides_what_the_robot_has_not(shown: list[dict[str, Any]], tmp_path
     assert moment["texts"]["clock"] == "0.50 / 1.00 s"
 
 
-BODY = "rgba(229,233,240,.94)"
-
-
 @pytest.mark.parametrize("outline", [[], [[-0.08, -0.05], [0.06, -0.05], [0.06, 0.05], [-0.08, 0.05]]])
 def test_page_draws_the_body_as_what_meets_things(outline: list[list[float]], tmp_path: Path) -> None:
     """Each of two robots, in its own frame: the outline, or the circle."""
@@ -124,7 +121,7 @@ def test_page_draws_the_body_as_what_meets_things(outline: list[list[float]], tm
     members = [boebot.Member(brain=lambda robot: None, robot=mine, pose=(x, 0.0, 0.0)) for x in (0.0, 1.0)]
     run = boebot.run_together(members, arena="empty", seconds=0.2)
     (moment,) = moments(run, tmp_path, 0.1)  # type: ignore[arg-type]
-    bodies = [row["path"] for row in moment["drawn"] if row.get("fill") == BODY]
+    bodies = [row["path"] for row in moment["drawn"] if row.get("fill") == style.BODY]
     assert bodies == [outline or [[0, 0, run.robots[0].robot.body.radius_m]]] * 2
 
 
@@ -268,7 +265,9 @@ def test_sweeps_take_bounded_room_in_the_page(
         (content,) = json.loads((tmp_path / "page.html").read_text().partition("const page = ")[2].partition(";\n")[0])[
             "runs"
         ]
-        room = sum(len(value) for one in content["swept"] for value in (one["time"], one["distances"], *one["pose"]))
+        room = sum(
+            len(value) for one in content["rows"]["swept"] for value in (one["time"], one["distances"], *one["pose"])
+        )
         assert room <= most * 2 * 4 / 3 + 100
     assert sizes[1] < sizes[0] - 5_000
     ahead = scene.view(scanned).swept[0]

@@ -24,7 +24,7 @@ from boebot.record.reading import read_run
 from boebot.record.result import RunResult
 from boebot.running import board_driver as board
 from boebot.running import runner
-from boebot.view import picture, replay, scene, tables
+from boebot.view import page_data, picture, replay, scene, tables
 from peer import InProcess, Peer
 
 
@@ -186,22 +186,22 @@ def test_replay_page_needs_nothing_from_outside(folder: Path) -> None:
 
 def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
     data = data_of((folder / "replay.html").read_text())
-    time, x = (np.frombuffer(base64.b64decode(text), "<f4") for text in (data["time"], data["path"][0]))
-    flags = np.frombuffer(base64.b64decode(data["flags"]), np.uint8)
+    time, x = (np.frombuffer(base64.b64decode(text), "<f4") for text in (data["rows"]["time"], data["rows"]["path"][0]))
+    flags = np.frombuffer(base64.b64decode(data["rows"]["flags"]), np.uint8)
     assert len(time) == len(x) == len(flags) == result.ticks
     assert time[-1] == 30.0
     assert np.allclose(x, result.true_pose.x, atol=1e-6)  # type: ignore[union-attr]
-    assert np.array_equal(flags & replay.LEFT_WHISKER != 0, result.series.flag("whisker_left", "pressed"))
-    assert len(data["true_contacts"]) == 1 and data["known"]
+    assert np.array_equal(flags & page_data.LEFT_WHISKER != 0, result.series.flag("whisker_left", "pressed"))
+    assert len(data["rows"]["true_contacts"]) == 1 and data["known"]
 
 
 def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("boebot.record.overview.POINTS", 1000)
     long = dataclasses.replace(result)
     data = replay.run_data(long, scene.view(long))
-    count = len(base64.b64decode(data["time"])) // 4
+    count = len(base64.b64decode(data["rows"]["time"])) // 4
     assert 700 < count <= 1001
-    assert len(base64.b64decode(data["flags"])) == count
+    assert len(base64.b64decode(data["rows"]["flags"])) == count
 
 
 def test_text_cannot_break_out_of_the_page(result: RunResult, tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pyt
     assert result.odometry_error is None
     content = content_of((tmp_path / "replay.html").read_text())
     data = content["runs"][0]
-    assert not data["known"] and data["estimate"] is None and content["plan"]["solids"] == []
+    assert not data["known"] and not data["has_estimate"] and content["plan"]["solids"] == []
     header = tables.columns(result)
     assert "odometry_x_m" in header and "true_x_m" not in header
 

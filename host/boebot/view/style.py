@@ -13,6 +13,11 @@ FLOOR = "#ffffff"
 INK = "#2e3440"
 FAINT = "#6b7280"
 GRID = "#e3e5ea"
+RULE = "#d5d7de"  # around panels
+QUIET = "#eef0f4"  # what is there but empty
+ACCENT = "#0072b2"  # of what can be pressed
+ON_ACCENT = "#ffffff"
+ALERT = "#b3261e"
 
 EDGE = "#39415a"  # of what is solid
 SOLID = "#c3c9d6"
@@ -43,6 +48,17 @@ BEHAVIORS = ("#0072b2", "#cc79a7", "#009e73", "#e69f00", "#56b4e9", "#4b3f99", "
 
 LAYERS = ("#7b4fa3", "#8a6d00", "#c2185b", "#3b8a8c", "#56b4e9", "#6b7280")
 """Of the layers that a brain sketches, in their order, over and over."""
+
+DARK = {
+    "paper": "#12151b", "floor": "#1b1f27", "ink": "#e6e9ef", "faint": "#9aa3b2", "grid": "#2a303b", "rule": "#39414f",
+    "quiet": "#2a303b", "accent": "#5db2e8", "on-accent": "#0b1218", "alert": "#ff8a80", "edge": "#aeb8cb",
+    "solid": "#485164", "dull": "#6d7688", "low": "#3a3527", "paint-dark": "#8b95a9", "paint-bright": "#07090c",
+    "rough": "#4a3f26", "smooth": "#1f3c4d", "charger": "#2fc596", "lamp": "#f0e442", "moving": "#e69f00",
+    "start": "#2fc596", "end": "#5db2e8", "estimate": "#ff8a3d", "touch": "#ffb627", "contact": "#f4f6fa",
+    "body": "#39414f",
+}  # fmt: skip
+"""What the page has in their place where one prefers dark; lightness is turned round, so paint that is darker than the
+floor is brighter here."""
 
 CELL = (0.05, 0.75)  # how opaque a cell of a sketched grid is: free, occupied
 

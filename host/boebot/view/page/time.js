@@ -1,0 +1,81 @@
+// The moment that is shown: playing, scrubbing, going from event to event, by mouse and by keys; and drawing it.
+
+let playing = false, previous = null; // stamp of the last frame that was played
+let floorDirty = true, drawAsked = false;
+
+// ---- drawing: each part only if it has changed ----
+function requestDraw() {
+  if (drawAsked) return;
+  drawAsked = true;
+  requestAnimationFrame(() => { if (drawAsked) draw(); });
+}
+function viewChanged() { floorDirty = true; trailChanged(); requestDraw(); }
+function draw() {
+  drawAsked = false;
+  if (!run || !run.time.length) return;
+  if (following) { const [x, y] = placeOf(run); centre(x, y); floorDirty = true; trailChanged(); }
+  if (floorDirty) { drawFloor(); floorDirty = false; $("stage").classList.toggle("zoomed", !fitted); }
+  drawTrail(); drawStage();
+  keepCursorInside();
+  if (tracksDirty) drawTracks();
+  drawCursor(); tellMoment();
+  $("slider").value = tickOf(run);
+  $("cursor").ariaValueNow = now.toFixed(2); $("cursor").ariaValueText = now.toFixed(2) + " seconds";
+}
+
+// ---- playing and scrubbing ----
+function setPlaying(on) {
+  if (on && now >= run.duration) now = 0;
+  playing = on; previous = null; $("play").textContent = on ? "Pause" : "Play";
+  if (on) requestAnimationFrame(advance);
+}
+function advance(stamp) {
+  if (!playing) return;
+  if (previous !== null) now = Math.min(run.duration, now + (stamp - previous) / 1000 * Number($("speed").value));
+  previous = stamp;
+  draw();
+  if (now >= run.duration) setPlaying(false); else requestAnimationFrame(advance);
+}
+function seek(t) { now = Math.max(0, Math.min(run.duration, t)); draw(); }
+function goToEvent(forward) {
+  const found = forward ? run.events.find(event => event.time > now + 5e-3) : run.events.findLast(event => event.time < now - 5e-3);
+  if (found) seek(found.time);
+  say("event", found ? eventText(found) : forward ? "no event after this" : "no event before this");
+}
+function chooseRobot(index) { // the same moment, seen from another robot
+  const moment = now + run.begin;
+  run = runs[index]; now = Math.max(0, Math.min(run.duration, moment - run.begin));
+  $("slider").max = run.last; $("cursor").ariaValueMax = run.duration;
+  makePanels(); hooks.chosen();
+  resize();
+}
+
+// ---- keys ----
+const STEP = 0.05, LEAP = 5; // s
+function replayKey(e) { // true: it was one of them
+  const step = e.shiftKey ? LEAP : STEP;
+  if (e.key === " ") { if (e.target.tagName === "BUTTON") return false; setPlaying(!playing); } // a button takes it for itself
+  else if (e.key === "ArrowLeft") seek(now - step);
+  else if (e.key === "ArrowRight") seek(now + step);
+  else if (e.key === "Home") seek(0);
+  else if (e.key === "End") seek(run.duration);
+  else if (e.key === "n" || e.key === "N") goToEvent(true);
+  else if (e.key === "p" || e.key === "P") goToEvent(false);
+  else return false;
+  return true;
+}
+function onKey(e) {
+  if (!run || e.ctrlKey || e.metaKey || e.altKey) return;
+  if (e.target.tagName === "SELECT" || e.target.type === "number") return;
+  if (e.target === $("cursor") && (e.key === "+" || e.key === "-")) { e.preventDefault(); zoomTime(e.key === "+" ? 0.5 : 2); return; }
+  if (hooks.key(e) || arenaKey(e) || replayKey(e)) e.preventDefault();
+}
+function listenToTime() {
+  $("play").onclick = () => setPlaying(!playing);
+  $("slider").oninput = () => seek(run.time.values[$("slider").value]);
+  $("whole").onchange = () => { trailChanged(); draw(); };
+  $("before").onclick = () => goToEvent(false);
+  $("after").onclick = () => goToEvent(true);
+  $("robot").onchange = e => chooseRobot(Number(e.target.value) - 1);
+  addEventListener("keydown", onKey);
+}

@@ -1,0 +1,397 @@
+"""What the page of a run gets, of a replay and of a live view alike: of each robot what does not change (`robot_data`),
+and *rows*, what it did in some stretch of time (`rows_data`). A replay has the whole run in one stretch; a live view
+sends a stretch of a few ticks many times a second, and the page appends them.
+
+format   number of the data's form, which page and data share
+plan     what stands in the arena (boebot.arenas.floor_plan); `moving`: the moving shapes in their own frames
+bounds   of what there is to see, from where the page fits its view
+runs     one per robot: `robot_data`, with its `rows`
+moving   poses of the moving shapes, on the clock of the truth, which begins `begin` before a run's own
+live     null; or what can be done while the run goes on (boebot.live)
+
+Of rows: `flags` are the bits below; `shown` and `layers`: what the brain showed and sketched; `mind`: what a brain of
+processes did, or null; `events`: time, kind ("contact", "touch", "fault", "lost", "reset" or "intervention") and a
+text, to which the page adds the switches of `mind`; `pins`: output edges of a board's pins, where they were recorded
+(`time`: float64); `swept`: of each sensor with a fan of rays, of each sweep its time, the sensor's pose and the rays'
+distances, sweep after sweep (uint16: 65535 is `reach`, in m), of at most `RAYS_AT_MOST` rays.
+
+Arrays are little-endian float32 in base64 (`flags`, `motor` and `level`: uint8), one entry per tick; those of `mind`
+one per step of the brain.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import numpy as np
+
+from boebot.description import robots
+from boebot.devices.device import pin_name
+from boebot.link.messages import Status
+from boebot.record.series import touch_indices
+from boebot.view import scene, style
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from boebot.arenas.floor_plan import FloorPlan, Moving, Solid
+    from boebot.devices.device import Readout
+    from boebot.record.brain_record import BrainNames, BrainRecord
+    from boebot.record.record import Record
+    from boebot.record.series import Bools, Floats, Pose, Series
+    from boebot.record.shown import Layer, Shown
+
+FORMAT = 9
+RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
+WHOLE = 65535  # such a number for the whole reach
+EVENTS_AT_MOST = 2_000  # of a stretch
+EDGES_AT_MOST = 50_000  # of a pin in a stretch: its first ones
+
+# bits of the page's `flags` array
+LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF, FALLBACK = (1 << bit for bit in range(8))
+
+FAULTS = {
+    Status.DEAD_MAN: "motors stopped by the dead-man",
+    Status.LATCHED: "motors latched off",
+    Status.TICK_OVERRUN: "a control tick took too long",
+    Status.RECEIVE_OVERRUN: "the board lost received bytes",
+    Status.WATCHDOG_RESET: "the watchdog reset the board",
+    Status.SUPPLY_LOW: "the supply is low",
+    Status.FALLBACK: "the board's own brain took over",
+}
+GAP = 1.5  # usual steps in time from tick to tick: from here on frames are missing
+
+Event = tuple[float, str, str]
+"""Time (s), kind, text."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """What one robot did in some time.
+
+    Attributes:
+        series: its ticks as arrays.
+        path: the true pose at each of them, where it is known; else by odometry, or zeros.
+        estimate: the odometry as it lies in the arena, at each of them; None: there is no truth, or no odometry.
+        contact: whether the body touches something, at each of them.
+        start: pose in which the run began, in the frame of `path`: m, m, rad.
+        shown, layers: what the brain showed and sketched.
+        brain: steps and switches of a brain of processes; None: a brain of another kind, or no step yet.
+        swept: what sensors with fans of rays measured.
+        true_contacts, touches: where, shape (n, 2).
+        events: as the page has them.
+        load: share of the tick that the board's work took, at each of them; None: not known.
+        pins: output edges by the name of the pin: times (s of the run) and levels.
+    """
+
+    series: Series
+    path: Pose
+    estimate: Pose | None
+    contact: Bools
+    start: tuple[float, float, float]
+    shown: Shown
+    layers: Sequence[Layer] = ()
+    brain: BrainRecord | None = None
+    swept: Sequence[scene.Swept] = ()
+    true_contacts: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    touches: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    events: Sequence[Event] = ()
+    load: Floats | None = None
+    pins: dict[str, tuple[Floats, NDArray[np.uint8]]] = field(default_factory=dict)
+
+
+# ---- what does not change --------------------------------------------------------------------------------------------
+
+
+def plan_data(plan: FloorPlan) -> dict[str, Any]:
+    """The plan as the page has it (m, rad)."""
+    charger = plan.charger
+    return {
+        "solids": [_solid(solid) for solid in plan.solids],
+        "patches": [
+            {"points": _points(patch.corners), "grip": patch.grip, "rough": patch.grip > plan.grip}
+            for patch in plan.patches
+        ],
+        "lines": [{"points": _points(line.points), "width": line.width, "dark": line.is_dark} for line in plan.lines],
+        "lamps": [[lamp.x_m, lamp.y_m] for lamp in plan.lamps],
+        "charger": None if charger is None else [charger.x_m, charger.y_m, charger.radius_m],
+        "moving": [{"solid": _solid(moving.solid)} for moving in plan.moving],
+    }
+
+
+def robot_data(
+    robot: robots.RobotDescription,
+    series: Series,
+    *,
+    number: int,
+    title: str,
+    brain: str,
+    begin: float,
+    known: bool,
+    has_estimate: bool,
+    table: dict[str, Any],
+    way: Sequence[str] = (),
+    names: BrainNames | None = None,
+    cognitive: Sequence[str] = (),
+) -> dict[str, Any]:
+    """What the page knows of a robot from the start.
+
+    Args:
+        series: any of its ticks, even none: which readings and sweeps it has.
+        number: of the robot in the run, from 1.
+        title, brain, table, way: as `RunResult` has them.
+        begin: the transport's clock at the run's time 0 (s).
+        known: its true pose is known. has_estimate: so is its odometry, as it lies in the arena.
+        names: what a brain of processes is made of. cognitive: those of its cognitive processes that are drawn.
+    """
+    mind = names and {
+        "behaviors": [{"name": name, "colour": style.behavior(index)} for index, name in enumerate(names.behaviors)],
+        "cognitive": [{"name": name} for name in cognitive],
+    }
+    return {
+        "title": title,
+        "brain": brain,
+        "begin": begin,
+        "known": known,
+        "table": table,
+        "way": list(way),
+        "robot": _robot(robot),
+        "colour": style.colour(number),
+        "cell": style.CELL,
+        "has_estimate": has_estimate,
+        "readings": [_reading(readout) for readout in series.readouts()],
+        "mind": mind,
+        "swept": [
+            {"reach": sweeps.reach, "angles": _array(sweeps.angles[_rays(sweeps.angles)])} for sweeps in series.sweeps()
+        ],
+    }
+
+
+def _solid(solid: Solid) -> dict[str, Any]:
+    return {
+        "kind": solid.kind,
+        "points": _points(solid.points),
+        "radius": solid.radius,
+        "low": solid.is_low,
+        "dull": solid.is_dull,
+        "remarks": ", ".join(solid.remarks),
+        "top": [float(value) for value in ((solid.box[0][0] + solid.box[1][0]) / 2, solid.box[1][1])],
+    }
+
+
+def _reading(readout: Readout) -> dict[str, Any]:
+    return {"name": readout.device.replace("_", " "), "unit": readout.unit, "digits": readout.digits}
+
+
+def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
+    """What the page needs to draw the robot (m, rad): its body, and what it has."""
+    return {
+        "radius": robot.body.radius_m,
+        "outline": _points(np.array(robot.body.outline_m).reshape(-1, 2)),  # none: the circle
+        "front": robot.body.front_m,
+        "track": robot.body.track_width_m,
+        "wheel": robot.body.wheel_radius_m,
+        "shapes": [
+            {"device": device, "form": type(shape).__name__.lower(), **shape._asdict()}
+            for device, shape in scene.shapes(robot)
+        ],
+    }
+
+
+# ---- what a stretch of time adds -------------------------------------------------------------------------------------
+
+
+def moving_data(moving: Sequence[Moving]) -> list[dict[str, Any]]:
+    """Where the moving shapes were; `time` on the clock of the truth (s)."""
+    return [{"time": _array(one.time), "pose": [_array(row) for row in (one.x, one.y, one.heading)]} for one in moving]
+
+
+def rows_data(
+    stretch: Stretch, *, cognitive: Sequence[str] = (), steps_at_most: int | None = None, sweeps_room: int | None = None
+) -> dict[str, Any]:
+    """What a robot did in a stretch of time, which the page appends to what it has.
+
+    Args:
+        stretch: what it did.
+        cognitive: as of `robot_data`.
+        steps_at_most: of the brain; None: all.
+        sweeps_room: how many numbers of two bytes the sweeps of each sensor may take; None: all of them.
+    """
+    series = stretch.series
+    pulses = [series.number(name, "pulse") for name in ("servo_left", "servo_right")]
+    readouts = series.readouts()
+    return {
+        "time": _array(series.time),
+        "path": _pose(stretch.path),
+        "estimate": None if stretch.estimate is None else _pose(stretch.estimate),
+        "turret": _array(np.nan_to_num(series.number("turret", "angle"), nan=0.0)),
+        "left": _array(series.signals[0]),
+        "right": _array(series.signals[1]),
+        "pulses": None if any(np.isnan(each).all() for each in pulses) else [_array(each) for each in pulses],
+        "ping": _array(np.nan_to_num(series.number("ping", "distance"), nan=-1.0)),
+        "flags": _small(flags(series, stretch.contact)),
+        "readings": [{"values": _array(one.values), "ages": _array(one.ages)} for one in readouts],
+        "shown": _shown(stretch.shown),
+        "layers": [_layer(layer, stretch.start) for layer in stretch.layers],
+        "swept": [_swept(one, sweeps_room) for one in stretch.swept],
+        "mind": None if stretch.brain is None else _mind(stretch.brain, cognitive, steps_at_most),
+        "true_contacts": np.round(stretch.true_contacts, 4).tolist(),
+        "touches": np.round(stretch.touches, 4).tolist(),
+        "events": [[round(time, 4), kind, text] for time, kind, text in stretch.events[:EVENTS_AT_MOST]],
+        "load": None if stretch.load is None else _array(stretch.load),
+        "pins": [_pin(name, time, level) for name, (time, level) in stretch.pins.items()],
+    }
+
+
+def flags(series: Series, contact: Bools) -> NDArray[np.intp]:
+    """The bits of each tick."""
+    status = series.status
+    found: NDArray[np.intp] = (
+        series.flag("whisker_left", "pressed") * LEFT_WHISKER
+        | series.flag("whisker_right", "pressed") * RIGHT_WHISKER
+        | series.flag("infrared_left", "detected") * LEFT_IR
+        | series.flag("infrared_right", "detected") * RIGHT_IR
+        | contact * CONTACT
+        | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
+        | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
+        | ((status & int(Status.FALLBACK)) != 0) * FALLBACK
+    )
+    return found
+
+
+def events(series: Series, contact: Bools, whiskers: Sequence[str], *, first: int = 0) -> list[Event]:
+    """What happened to a robot, by its ticks: contacts, touches, faults, lost frames, restarts of the board; oldest
+    first. `first`: index of the first tick that is new; one before it only says how things were."""
+    time = series.time
+    if not len(time):
+        return []
+    found = [(index, "contact", "true contact") for index in touch_indices(time, contact)]
+    for name in whiskers:
+        pressed = series.flag(name, "pressed")
+        found += [(index, "touch", f"{name.replace('_', ' ')} pressed") for index in _rises(pressed)]
+    for flag, text in FAULTS.items():
+        found += [(index, "fault", text) for index in _rises((series.status & int(flag)) != 0)]
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    for index in np.flatnonzero(steps > GAP * usual) + 1:
+        lost = round(float(steps[index - 1]) / usual) - 1 if usual else 0
+        found.append((index, "lost", f"{lost} {'frame' if lost == 1 else 'frames'} of telemetry lost"))
+    ticks = np.diff(series.raw["tick"].astype(np.uint32)).astype(np.int32)
+    found += [(index + 1, "reset", "the board restarted") for index in np.flatnonzero(ticks < 0)]
+    return [(float(time[index]), kind, text) for index, kind, text in sorted(found) if index >= first]
+
+
+def pins(record: Record, robot: robots.RobotDescription, begin: float) -> dict[str, tuple[Floats, NDArray[np.uint8]]]:
+    """Output edges in a record by the name of the pin, on the run's clock, which begins at `begin` (s)."""
+    times, rows = record.times_of("pins"), record.table("pins", np.dtype([("pin", "u1"), ("level", "u1")]))
+    devices: dict[int, list[str]] = {}
+    for name, device in robot.device.items():
+        for pin in device.pins().values() if device.on else ():
+            devices.setdefault(pin, []).append(name.replace("_", " "))
+    found = {}
+    for pin in np.unique(rows["pin"][times > begin]).tolist():  # pins that do something
+        own = rows["pin"] == pin
+        name = " ".join([pin_name(pin), *devices.get(pin, [])[:1]])
+        found[name] = times[own] - begin, rows["level"][own]
+    return found
+
+
+def _rises(flags: Bools) -> NDArray[np.intp]:
+    """Where a flag goes up; not where it is up from the start."""
+    return np.flatnonzero(flags[1:] & ~flags[:-1]) + 1
+
+
+def _shown(shown: Shown) -> dict[str, Any]:
+    """What the brain showed: numbers as arrays, texts as indices into the list of all their words."""
+    texts = []
+    for name, values in shown.texts.items():
+        words = sorted(set(values))
+        place = {word: index for index, word in enumerate(words)}
+        texts.append({"name": name, "words": words, "index": [place[value] for value in values]})
+    numbers = [{"name": name, "values": _array(values)} for name, values in shown.numbers.items()]
+    return {"time": _array(shown.time), "numbers": numbers, "texts": texts}
+
+
+def _layer(layer: Layer, start: tuple[float, float, float]) -> dict[str, Any]:
+    """What the brain sketched: arrays of points are x and y in turn (m); `origin` null: where the robot is."""
+    origins = {"robot": None, "start": start, "arena": (0.0, 0.0, 0.0)}
+    sketches = []
+    for sketch in layer.sketches:
+        whole = msgspec.to_builtins(sketch)
+        kept = {key: whole[key] for key in ("lines", "points", "grid")}
+        sketches.append(kept | {"origin": origins[sketch.frame]})
+    return {"name": layer.name, "time": _array(layer.time), "sketches": sketches}
+
+
+def _rays(angles: Floats) -> NDArray[np.intp]:
+    """Which of a sweep's rays the page has; the outermost are among them."""
+    return np.linspace(0, len(angles) - 1, min(len(angles), RAYS_AT_MOST)).round().astype(np.intp)
+
+
+POSE_NUMBERS = 8  # as many numbers of two bytes as time and place of a sweep take
+
+
+def _swept(swept: scene.Swept, room: int | None) -> dict[str, Any]:
+    """The sweeps of one sensor; every n-th, where all have no room."""
+    rays, stride = _rays(swept.sweeps.angles), 1
+    if room is not None:
+        stride = max(1, math.ceil(len(swept.time) / max(1, room // (len(rays) + POSE_NUMBERS))))
+    which = np.arange(0, len(swept.time), stride)
+    shares = np.minimum(swept.distances(which, rays) / swept.sweeps.reach, 1.0)
+    return {
+        "time": _array(swept.time[which]),
+        "pose": _pose(swept.pose.part(which)),
+        "distances": _base64((shares * WHOLE).round().astype("<u2")),
+    }
+
+
+def _mind(record: BrainRecord, cognitive: Sequence[str], most: int | None) -> dict[str, Any]:
+    """Of each kept step its utilities and the active behavior; the last switches before each."""
+    stride = 1 if most is None else max(1, math.ceil(len(record) / most))
+    thin, time = slice(None, None, stride), record.time[::stride]
+    switches = [switch for switch in record.switches if switch.on in record.names.behaviors]
+    if stride > 1:  # switches between kept steps are left out
+        last = np.searchsorted([switch.time for switch in switches], time, side="right") - 1
+        switches = [switches[index] for index in np.unique(last)]
+    return {
+        "time": _array(time),
+        "motor": _small(record.motor[thin]),
+        "behaviors": [_array(record.utility_of(name)[thin]) for name in record.names.behaviors],
+        "cognitive": [_array(record.utility_of(name)[thin]) for name in cognitive],
+        "switches": [[round(switch.time, 3), switch.on, switch.reason] for switch in switches],
+    }
+
+
+def _pin(name: str, time: Floats, level: NDArray[np.uint8]) -> dict[str, Any]:
+    return {
+        "name": name,
+        "time": _base64(time[:EDGES_AT_MOST].astype("<f8")),
+        "level": _small(level[:EDGES_AT_MOST]),
+    }
+
+
+def _pose(pose: Pose) -> list[str]:
+    return [_array(values) for values in (pose.x, pose.y, pose.heading)]
+
+
+def _points(points: Floats) -> list[list[float]]:
+    rounded: list[list[float]] = np.round(points, 4).tolist()
+    return rounded
+
+
+def _array(values: Floats) -> str:
+    with np.errstate(over="ignore"):  # what a brain shows may be beyond float32: infinite on the page
+        return _base64(values.astype("<f4"))
+
+
+def _small(values: NDArray[Any]) -> str:
+    return _base64(values.astype(np.uint8))
+
+
+def _base64(values: NDArray[Any]) -> str:
+    return base64.b64encode(values.tobytes()).decode("ascii")
