@@ -155,8 +155,9 @@ def run(
         with contextlib.ExitStack() as shown:
             if json:  # it stands alone on standard output, whatever a brain prints
                 shown.enter_context(streams.kept_for_the_answer())
-            bar = shown.enter_context(output.progress_bar(name if on is None else f"{name} on {on}", seconds, quiet))
-            progress = shown.enter_context(output.step_watch(bar))
+            title = name if on is None else f"{name} on {on}"
+            bar = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
+            progress = None if view else shown.enter_context(output.step_watch(bar))
 
             def put_away(result: RunResult | TogetherResult) -> None:
                 """What this function cannot do itself: a brain goes on after Ctrl-C."""

@@ -27,6 +27,7 @@ from boebot.view import page_data, scene, web_page
 
 EACH_S = 0.05  # of the wall clock, from chunk to chunk
 EACH_UNSEEN_S = 0.5  # where no page is open
+EACH_AT_MOST_S = 1.0
 SHARE = 30  # a chunk may take this part of the time of a run that is not paced
 PAST = 1_200  # chunks that are kept for pages that come later
 RATE_S = 1.0  # over which the speed of a run is measured
@@ -189,7 +190,12 @@ class LiveView:
         self._make_chunk(time_s)
         took = time.perf_counter() - now
         each = EACH_S if self._pages else EACH_UNSEEN_S
-        self._due_s = now + (each if self._pace.speed is not None else max(each, SHARE * took))
+        self._due_s = now + (max(each, min(SHARE * took, EACH_AT_MOST_S)) if self._hurries else each)
+
+    @property
+    def _hurries(self) -> bool:
+        """The run goes as fast as possible."""
+        return self._controls is not None and "speed" in self._controls.can and self._pace.speed is None
 
     def _make_chunk(self, time_s: float) -> None:
         rows = [chunks.make() for chunks in self._chunks]
@@ -225,7 +231,8 @@ class LiveView:
 
     def _first_message(self, chunk: Message) -> Message:
         contents = [chunks.content for chunks in self._chunks]
-        low, high = scene.plan_bounds(self._plan, [])
+        poses = [pose for pose in map(_pose_now, self._robots) if pose is not None]
+        low, high = scene.plan_bounds(self._plan, [(x, y) for x, y, _ in poses or [(0.0, 0.0, 0.0)]])
         return {
             "type": "run",
             "number": self._number,
