@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TextIO
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
@@ -46,12 +46,18 @@ class LiveView:
         url: their address.
     """
 
-    def __init__(self, *, host: str = LOOPBACK, port: int = 0, speed: float | None = 1.0) -> None:
-        """`speed`: at first, simulated seconds in one of the wall clock; None: as fast as possible.
+    def __init__(
+        self, show: Callable[[str], None], *, host: str = LOOPBACK, port: int = 0, speed: float | None = 1.0
+    ) -> None:
+        """
+        Args:
+            show: is told the address as the first run begins.
+            speed: at first, simulated seconds in one of the wall clock; None: as fast as possible.
 
         Raises:
             BoebotError: the port is taken.
         """
+        self._show = show
         self._lock = threading.Lock()  # of all that both threads touch
         self._pages: dict[int, Page] = {}
         self._speed = speed
@@ -159,6 +165,8 @@ class LiveView:
             self._number += 1
             self._rates.clear()
         self._plan, self._due_s = plan, 0.0
+        if self._number == 1:
+            self._show(self.url)
 
     def before_step(self, number: int, time_s: float) -> Iterator[Deed]:
         """See `Onlooker`. While time stands still, what people do is carried out at once."""

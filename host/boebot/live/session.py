@@ -20,17 +20,21 @@ Result = TypeVar("Result", RunResult, TogetherResult)
 
 @contextlib.contextmanager
 def opened(say: Callable[[str], None], *, port: int = 0, speed: float | None = 1.0) -> Iterator[LiveView]:
-    """A live view, which is shown in the browser where there is a display. `say`: is told its address.
+    """A live view, which is shown in the browser, where there is a display, as the first run begins. `say`: is then
+    told its address.
 
     Raises:
         BoebotError: the port is taken.
     """
-    view = LiveView(port=port, speed=speed)
-    try:
-        say(view.url)
+
+    def show(url: str) -> None:
+        say(url)
         if has_display():
             with contextlib.suppress(webbrowser.Error):
-                webbrowser.open(view.url)
+                webbrowser.open(url)
+
+    view = LiveView(show, port=port, speed=speed)
+    try:
         yield view
     finally:
         view.close()
