@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import struct
 import sys
 from collections import defaultdict
 from functools import cache
@@ -24,6 +25,7 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from mcap.reader import make_reader
 
 import boebot
+from boebot.arenas.floor_plan import floor_plan
 from boebot.record import windows
 from boebot.record.reading import robots_of
 from boebot.record.result import RunResult, TogetherResult
@@ -194,6 +196,23 @@ def test_scene_has_arena_movers_and_robot(tmp_path: Path) -> None:
             x, y, angle = moving.pose(time + result.clock_offset)
             assert (one.translation.x, one.translation.y) == pytest.approx((x, y), abs=2e-4)
             assert math.cos(heading(one.rotation) - angle) == pytest.approx(1, abs=1e-6)
+
+
+def test_movers_that_were_put_elsewhere(tmp_path: Path) -> None:
+    """The first one half a metre to the right of its way from 0.5 s of the world's clock on, between two rows."""
+    result = boebot.run("wander", arena="showcase", seconds=1)
+    result.record.append("shifts", 0.5123, struct.pack("<4d", 0, 0.5, 0.0, 0.25))
+    way = floor_plan(result.world, 0.0, 2.0).moving[0]
+    moved = 0
+    for time, message in saved(result, tmp_path)["/tf"]:
+        for one in message.transforms:
+            if one.child_frame_id == "mover-1" and abs(time + result.clock_offset - 0.5123) > 1e-5:
+                x, y, angle = way.pose(time + result.clock_offset)
+                off = time + result.clock_offset > 0.5123
+                assert (one.translation.x, one.translation.y) == pytest.approx((x + 0.5 * off, y), abs=2e-4)
+                assert math.cos(heading(one.rotation) - angle - 0.25 * off) == pytest.approx(1, abs=1e-6)
+                moved += off
+    assert moved > 5
 
 
 def test_windows_of_any_size_give_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
