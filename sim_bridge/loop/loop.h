@@ -154,18 +154,17 @@ uint64_t sim_reset_at(const sim *self, int robot);
 /* What a person does to the things in the arena, between two steps of the world. A robot is lifted and put elsewhere: body
  * and wheels are at rest there, and touch nothing. All else is as it was: motors go on as they are told, wheels have the
  * angles that they had, so that encoders and odometers know nothing of it, and no distance is counted. Sensors look from
- * the new place on. In the truth it is two rows a cycle apart. A moving shape goes along its way shifted by as much, and
+ * there; those of a robot without a board read again at the end of the next step. In the truth it is two rows a cycle apart. A moving shape goes along its way shifted by as much, and
  * turned in itself; the direction of the way stays. SIM_NOT_FREE, and nothing has changed: something is in the circle
  * around the robot, or a robot's circle in the shape. */
 int sim_place(sim *self, int robot, double x, double y, double heading);
 int sim_place_shape(sim *self, int shape, double x, double y, double heading);
 
-/* For tests: a pin taken from its part
- * and driven at a cycle, or by a square wave of that half period for that long; whisker held (0, 1) or not (-1); length of
- * every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part at a pin pulled out (1) or put in
- * again (0); voltage of the rail that board and servos run
- * on, 0: what the regulator gives; bytes put into the EEPROM, or into the data space of a board that has one; what
- * becomes of a cell whose write is cut short. Return SIM_OK or an error. */
+/* For tests: a pin taken from its part and driven at a cycle, or by a square wave of that half period for that long;
+ * whisker held (0, 1) or not (-1); length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the
+ * plug of the part at a pin pulled out (1) or put in again (0); voltage of the rail that board and servos run on, 0: what
+ * the regulator gives; bytes put into the EEPROM, or into the data space of a board that has one; what becomes of a cell
+ * whose write is cut short. Return SIM_OK or an error. */
 int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
 int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
