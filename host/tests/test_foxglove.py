@@ -202,6 +202,7 @@ def test_movers_that_were_put_elsewhere(tmp_path: Path) -> None:
     """The first one half a metre to the right of its way from 0.5 s of the world's clock on, between two rows."""
     result = boebot.run("wander", arena="showcase", seconds=1)
     result.record.append("shifts", 0.5123, struct.pack("<4d", 0, 0.5, 0.0, 0.25))
+    assert result.world is not None
     way = floor_plan(result.world, 0.0, 2.0).moving[0]
     moved = 0
     for time, message in saved(result, tmp_path)["/tf"]:

@@ -366,8 +366,9 @@ def test_what_is_made_of_a_run_with_lifts(on: str, sessions: list[Any], tmp_path
     assert result.truth is not None and np.isfinite(result.truth.x).all()
     assert (np.diff(result.truth.time) > 0).all()
     assert result.overview.true_pose is not None
-    drawn = [result.overview.true_pose, *result.plan.moving]
-    assert all(np.isfinite((each.x, each.y, each.heading)).all() for each in drawn)
+    poses = [(each.x, each.y, each.heading) for each in result.plan.moving]
+    path = result.overview.true_pose
+    assert all(np.isfinite(pose).all() for pose in [(path.x, path.y, path.heading), *poses])
     assert (out / "replay.html").exists() and (out / "run.png").exists()
     shape = result.plan.moving[0]
     moment = shifts(result.record)[0].time
