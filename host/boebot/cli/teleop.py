@@ -15,7 +15,7 @@ from typing import Annotated, TextIO
 
 import typer
 
-from boebot.cli import options, output, quantity
+from boebot.cli import options, output, quantity, watched
 from boebot.cli.ending import end
 from boebot.cli.run_table import detail
 from boebot.errors import BoebotError
@@ -111,6 +111,8 @@ def teleop(
     seconds: Annotated[
         float, typer.Option(metavar="TIME", parser=quantity.parser("s"), help="End by itself after this time.")
     ] = float("inf"),
+    view: options.View = False,
+    view_port: options.ViewPort = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write the record.")] = None,
     json: options.Json = False,
     verbose: options.Verbose = False,
@@ -134,7 +136,11 @@ def teleop(
                 realtime=True,
                 without=options.names(without),
             )
-            result = execute(request, folder=folder)
+            with watched.view(view=view, speed=None, port=view_port) as page:
+                if page is None:
+                    result = execute(request, folder=folder)
+                else:
+                    result = watched.run(page, request, functools.partial(execute, folder=folder, onlooker=page), waits=False)
         with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
             output.line(file=screen)
         end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, wanted)

@@ -34,11 +34,11 @@ def view(
     return opened(_tell, port=port or 0, speed=1.0 if speed is None else usual_speed(speed))
 
 
-def run(page: LiveView, request: Request, run_all: Callable[[Request], Result]) -> Result:
-    """Runs it, and again as often as a page asks for that, as long as one is open."""
+def run(page: LiveView, request: Request, run_all: Callable[[Request], Result], *, waits: bool = True) -> Result:
+    """Runs it, and again as often as a page asks for that; `waits`: at the end as long as one is open."""
     from boebot.live.session import run_viewed
 
-    return run_viewed(page, request, run_all, waits=True)  # type: ignore[type-var]
+    return run_viewed(page, request, run_all, waits=waits)  # type: ignore[type-var]
 
 
 def _tell(url: str) -> None:

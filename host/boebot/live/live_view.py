@@ -22,7 +22,8 @@ from boebot.live.outbox import LETTERS, Message, merged
 from boebot.live.pace import Pace
 from boebot.live.page_server import LOOPBACK, Page, PageServer
 from boebot.record.result import RunResult
-from boebot.running.interventions import Deed, Hands, bounds, parameters
+from boebot.running.brain_parameters import bounds, meaning, parameters
+from boebot.running.interventions import Deed, Hands
 from boebot.view import page_data, scene, web_page
 
 EACH_S = 0.05  # of the wall clock, from chunk to chunk
@@ -389,7 +390,8 @@ def _sliders(robot: Hands) -> Iterable[Message]:
     sliders = []
     for name, value in parameters(brain).items():
         least, most = bounds(brain, name)
-        sliders.append({"name": name, "value": value, "least": least, "most": most, "unit": "", "text": ""})
+        text = meaning(brain, name)
+        sliders.append({"name": name, "value": value, "least": least, "most": most, "unit": "", "text": text})
     return sliders
 
 

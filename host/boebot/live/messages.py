@@ -1,4 +1,4 @@
-"""What pages ask for, checked; docs/explanation/live-view.md has the same in words."""
+"""What pages ask for, checked: one JSON text each, `type` names which."""
 
 from __future__ import annotations
 

@@ -7,18 +7,16 @@ bit for bit: `boebot run --again` takes them from the record.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import msgspec
 
-from boebot.errors import BoebotError, BrainError
+from boebot.errors import BoebotError
+from boebot.running.brain_parameters import set_parameter
 
 if TYPE_CHECKING:
-    from boebot.brain import Process
-    from boebot.brains import LoadedBrain
     from boebot.record.record import Record
     from boebot.record.result import RunResult
     from boebot.running.driver import Driver, Task
@@ -215,66 +213,3 @@ def touched(record: Record) -> int:
         count += one.COUNTS or (isinstance(one, Hand) and not by_hand)
         by_hand = isinstance(one, Hand) or (by_hand and not isinstance(one, Release))
     return count
-
-
-# ---- parameters of a brain ---------------------------------------------------------------------------------------------
-
-
-def parameters(brain: LoadedBrain) -> dict[str, float]:
-    """The numbers that its processes declare, by name, as "avoid.turn"."""
-    return {f"{process.name}.{name}": getattr(process, name) for process, name in _declared(brain)}
-
-
-def _declared(brain: LoadedBrain) -> list[tuple[Process, str]]:
-    if brain.brain is None:
-        return []
-    found = []
-    for process in brain.brain.processes:
-        for one in dataclasses.fields(process):
-            value = getattr(process, one.name)
-            if one.name != "period" and one.init and isinstance(value, float | int) and not isinstance(value, bool):
-                found.append((process, one.name))
-    return found
-
-
-def set_parameter(brain: LoadedBrain, name: str, value: float) -> None:
-    """Gives a parameter another value, if its process takes it.
-
-    Raises:
-        BrainError: there is no such parameter, or the process refuses the value.
-    """
-    process, field = _find(brain, name)
-    kind = type(getattr(process, field))
-    check_parameter(process, field, kind(value))
-    setattr(process, field, kind(value))
-
-
-def _find(brain: LoadedBrain, name: str) -> tuple[Process, str]:
-    for process, field in _declared(brain):
-        if f"{process.name}.{field}" == name:
-            return process, field
-    raise BrainError(f"the brain has no parameter {name!r}; expected one of {', '.join(parameters(brain)) or 'none'}")
-
-
-def check_parameter(process: Process, field: str, value: float) -> None:
-    """Raises BrainError where the process would refuse that value when it is made."""
-    dataclasses.replace(process, **{field: value})
-
-
-def bounds(brain: LoadedBrain, name: str) -> tuple[float, float]:
-    """Between which values a slider for a parameter lies: about three times its present value, and within what its
-    process takes."""
-    process, field = _find(brain, name)
-    value = getattr(process, field)
-    far = 3.0 * abs(value) or 1.0
-    most = next(one for one in (far, 2 / 3 * far, 1.0, value) if one >= value and _takes(process, field, one))
-    least = next(one for one in (-far if value < 0 else 0.0, -1.0, value) if one <= value and _takes(process, field, one))
-    return float(least), float(most)
-
-
-def _takes(process: Process, field: str, value: float) -> bool:
-    try:
-        check_parameter(process, field, type(getattr(process, field))(value))
-    except BrainError:
-        return False
-    return True
