@@ -1,0 +1,189 @@
+"""The parts of the live view, each by itself: what people want, how fast a run goes, what waits for a slow page."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import pytest
+
+from boebot.brains import load_brain
+from boebot.errors import BoebotError
+from boebot.live import messages
+from boebot.live.controls import SILENT_S, Controls
+from boebot.live.outbox import EVENTS, LETTERS, Outbox
+from boebot.live.pace import Pace
+from boebot.running.brain_parameters import bounds, meaning, parameters, set_parameter
+from boebot.running.interventions import Arm, Hand, Place, Release, Stop
+
+ALL = frozenset({"pause", "step", "speed", "restart", "drag", "hand", "parameters"})
+
+
+def controls(can: frozenset[str] = ALL, *, robots: int = 1, speed: float | None = 1.0) -> Controls:
+    """With pages 1 and 2 open."""
+    made = Controls(robots, 0, can, Pace(speed))
+    for page in (1, 2):
+        made.came(page)
+    return made
+
+
+def test_deeds_are_given_once_and_in_their_order() -> None:
+    wanted = controls()
+    for asked in (messages.Stop(0), messages.Place(0, (1.0, 2.0, 3.0)), messages.Arm(0)):
+        wanted.heard(1, asked)
+    assert wanted.due(0, None) == [Stop(), Place(1.0, 2.0, 3.0), Arm()]
+    assert wanted.due(0, None) == []
+
+
+def test_hand_that_falls_silent_stops_the_robot_and_keeps_it() -> None:
+    wanted = controls()
+    wanted.heard(1, messages.Hand(0, 0.5, -0.5))
+    (hand,) = wanted.due(0, None)
+    assert hand == Hand(0.5, -0.5)
+    assert wanted.due(0, hand) == []  # the same: said once
+    time.sleep(SILENT_S + 0.05)
+    assert wanted.due(0, hand) == [Hand(0.0, 0.0)]
+    wanted.heard(1, messages.Release(0))
+    assert wanted.due(0, Hand(0.0, 0.0)) == [Release()]
+
+
+@pytest.mark.parametrize("how", ["hidden", "closed"])
+def test_page_that_is_hidden_or_closed_drives_nothing(how: str) -> None:
+    wanted = controls()
+    wanted.heard(1, messages.Hand(0, 0.5, 0.5))
+    if how == "hidden":
+        wanted.heard(1, messages.Visible(False))
+    else:
+        wanted.went(1)
+    assert wanted.due(0, Hand(0.5, 0.5)) == [Hand(0.0, 0.0)]
+
+
+def test_one_page_drives_at_a_time() -> None:
+    wanted = controls(robots=2)
+    wanted.heard(1, messages.Hand(0, 0.5, 0.5))
+    wanted.heard(2, messages.Hand(1, 0.1, 0.1))  # the other robot is free
+    with pytest.raises(BoebotError, match="another page drives robot 1"):
+        wanted.heard(2, messages.Hand(0, 0.1, 0.1))
+    with pytest.raises(BoebotError, match="another page drives robot 1"):
+        wanted.heard(2, messages.Release(0))
+    wanted.heard(2, messages.Stop(0))  # anybody may stop it
+    wanted.went(1)
+    wanted.heard(2, messages.Hand(0, 0.1, 0.1))
+    assert wanted.drivers() == [2, 2]
+
+
+def test_driving_by_hand_is_never_faster_than_real_time() -> None:
+    wanted = controls(speed=None)
+    wanted.heard(1, messages.Hand(0, 0.5, 0.5))
+    assert wanted.pace.speed == 1.0
+
+
+def test_what_cannot_be_done_here_is_refused() -> None:
+    wanted = controls(frozenset({"hand"}))
+    for asked in (messages.Pause(), messages.Speed(2.0), messages.Place(0, (0.0, 0.0, 0.0)), messages.Restart(1, [])):
+        with pytest.raises(BoebotError, match="cannot be done here"):
+            wanted.heard(1, asked)
+    with pytest.raises(BoebotError, match="there is no robot 2"):
+        wanted.heard(1, messages.Stop(1))
+    for _ in range(200):
+        try:
+            wanted.heard(1, messages.Stop(0))
+        except BoebotError as error:
+            assert "wait already" in str(error)
+            return
+    pytest.fail("deeds are queued without end")
+
+
+def test_run_that_stands_still_goes_on_with_its_last_page() -> None:
+    wanted = controls()
+    wanted.heard(1, messages.Pause())
+    wanted.went(1)
+    assert wanted.pace.paused
+    wanted.went(2)
+    assert not wanted.pace.paused
+
+
+def test_pace_steps_through_instants() -> None:
+    pace = Pace(None)
+    assert not pace.holds(0.0)
+    pace.pause()
+    assert pace.holds(0.05)
+    pace.step()
+    assert not pace.holds(0.05)  # a robot steps,
+    assert not pace.holds(0.05)  # and another one at the same instant
+    assert pace.holds(0.10)
+    pace.resume()
+    assert not pace.holds(0.10)
+
+
+def test_pace_holds_a_run_to_its_speed() -> None:
+    pace = Pace(4.0)
+    begun = time.perf_counter()
+    for step in range(21):
+        while pace.holds(step * 0.05):
+            pass
+    assert time.perf_counter() - begun >= 1.0 / 4.0
+
+
+def test_pace_that_waits_hears_at_once() -> None:
+    pace = Pace(0.01)
+    pace.holds(0.0)
+    threading.Timer(0.05, pace.set_speed, [None]).start()
+    begun = time.perf_counter()
+    while pace.holds(10.0):
+        pass
+    assert time.perf_counter() - begun < 5.0  # not a thousand seconds
+
+
+def chunk(number: int, **rows: Any) -> dict[str, Any]:
+    """One of a robot."""
+    empty: dict[str, Any] = {"events": [], "true_contacts": [], "touches": [], "layers": [], "mind": None}
+    return {"type": "chunk", "number": number, "runs": [empty | rows], "printed": f"{number}\n"}
+
+
+def test_slow_page_gets_the_newest_and_what_must_not_be_lost() -> None:
+    box = Outbox()
+    box.put(chunk(1, events=[[0.1, "touch", "left"]], layers=[{"name": "a", "n": 1}, {"name": "b", "n": 1}]))
+    box.put(chunk(2, events=[[0.2, "touch", "right"]], layers=[{"name": "a", "n": 2}]))
+    (text,) = box.take()
+    assert '"number":2' in text and "left" in text and "right" in text and '"printed":"1\\n2\\n"' in text
+    assert '{"name":"a","n":2}' in text and '{"name":"b","n":1}' in text and '{"name":"a","n":1}' not in text
+    assert box.take() == []
+
+
+def test_outbox_is_bounded() -> None:
+    box = Outbox()
+    for number in range(5_000):
+        box.put(chunk(number, events=[[0.0, "touch", "x"]]))
+        box.put({"type": "refused", "sentence": "no"})
+    *others, last = box.take()
+    assert len(others) <= EVENTS
+    assert last.count('"touch"') <= EVENTS and len(last) < LETTERS + EVENTS * 30
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", '{"type":"fly"}', '{"type":"speed","speed":0}', '{"type":"place","robot":0,"pose":[1,2]}',
+     '{"type":"hand","robot":0,"left":2,"right":0}', '{"type":"hand","robot":-1,"left":0,"right":0}',
+     '{"type":"place","robot":0,"pose":[1,2,1e999]}', '{"type":"parameter","robot":0,"name":"a","value":1e999}',
+     "[" * 10_000],
+)  # fmt: skip
+def test_rubbish_is_one_sentence(text: str) -> None:
+    with pytest.raises(BoebotError) as error:
+        messages.decode(text)
+    assert "\n" not in str(error.value)
+
+
+def test_every_slider_of_the_bundled_brain_stays_within_what_its_process_takes() -> None:
+    brain = load_brain("demo")
+    for name, value in parameters(brain).items():
+        least, most = bounds(brain, name)
+        assert least <= value <= most, name
+        for one in (least, most, value):
+            set_parameter(brain, name, one)
+    assert meaning(brain, "avoid.after") == "s to turn on once both are clear."
+    with pytest.raises(BoebotError, match="has no parameter 'avoid.fly'"):
+        set_parameter(brain, "avoid.fly", 1.0)
+    with pytest.raises(BoebotError, match=r"avoid: turn"):
+        set_parameter(brain, "avoid.turn", 2.0)

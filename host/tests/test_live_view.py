@@ -1,0 +1,242 @@
+"""The live view as a browser meets it: a run in a process of its own, its page over HTTP, its stream over a WebSocket."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from boebot.view.page_data import FORMAT
+
+LIMIT_S = 20.0
+
+
+class Run:
+    """`boebot run ... --view` as a process."""
+
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "boebot", *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stderr is not None
+        line = self.process.stderr.readline()
+        found = re.search(r"http://\S+", line)
+        assert found, line + self.process.stderr.read()
+        self.url = urlsplit(found[0])
+
+    def stream(self, *, token: str | None = None, origin: str | None = None) -> ClientConnection:
+        """Its stream."""
+        query = self.url.query if token is None else f"token={token}"
+        origin = f"http://{self.url.netloc}" if origin is None else origin
+        return connect(f"ws://{self.url.netloc}/stream?{query}", origin=origin, max_size=None, compression=None)  # type: ignore[arg-type]
+
+    def end(self) -> tuple[int, str, str]:
+        """Exit code, standard output and standard error."""
+        out, error = self.process.communicate(timeout=LIMIT_S)
+        return self.process.returncode, out, error
+
+
+class Page:
+    """What a browser's page does."""
+
+    def __init__(self, stream: ClientConnection) -> None:
+        self.stream = stream
+        self.say(type="hello", format=FORMAT)
+
+    def say(self, **message: Any) -> None:
+        """Sends it."""
+        self.stream.send(json.dumps(message))
+
+    def until(self, kind: str, *, where: Any = lambda message: True) -> Any:
+        """The next message of a kind of which that is true."""
+        deadline = time.monotonic() + LIMIT_S
+        while time.monotonic() < deadline:
+            message = json.loads(self.stream.recv(timeout=LIMIT_S))
+            if message["type"] == kind and where(message):
+                return message
+        raise AssertionError(f"no {kind}")
+
+    def state(self, where: Any = lambda state: True) -> Any:
+        """The next state, with a chunk or by itself, of which that is true."""
+        deadline = time.monotonic() + LIMIT_S
+        while time.monotonic() < deadline:
+            message = json.loads(self.stream.recv(timeout=LIMIT_S))
+            if "state" in message and where(message["state"]):
+                return message["state"]
+        raise AssertionError("no such state")
+
+
+@pytest.fixture(scope="module")
+def endless() -> Iterator[Run]:
+    """A run that goes on until the tests are done with it."""
+    run = Run("run", "wander", "--view", "--seconds", "inf")
+    yield run
+    run.process.send_signal(signal.SIGTERM)
+    code, _, error = run.end()
+    assert code == 143, error
+
+
+def get(run: Run, path: str, **headers: str) -> tuple[int, str, Any]:
+    """Status, body and headers of a page of that run."""
+    connection = http.client.HTTPConnection(run.url.hostname or "", run.url.port or 0, timeout=LIMIT_S)
+    connection.request("GET", path, headers=headers)
+    response = connection.getresponse()
+    return response.status, response.read().decode(), response.headers
+
+
+def test_page_is_for_who_has_its_address(endless: Run) -> None:
+    status, body, headers = get(endless, f"/?{endless.url.query}")
+    assert status == 200 and "<canvas" in body and headers["Cache-Control"] == "no-store"
+    assert re.search(r"(src|href)=.?https?:", body) is None  # nothing from the internet
+    assert get(endless, "/")[0] == 403
+    assert get(endless, "/?token=wrong")[0] == 403
+    assert get(endless, f"/other?{endless.url.query}")[0] == 404
+    status, body, _ = get(endless, f"/?{endless.url.query}", Host="example.org")  # as a rebound name would say
+    assert status == 403 and body.count("\n") == 1
+
+
+def test_stream_is_refused_to_other_pages_and_without_token(endless: Run) -> None:
+    for wrong in ({"origin": "http://example.org"}, {"token": "wrong"}, {"origin": "null"}):
+        with pytest.raises(InvalidStatus), endless.stream(**wrong):
+            pass
+
+
+def test_rubbish_floods_and_old_pages_are_let_go_and_the_run_goes_on(endless: Run) -> None:
+    for messages in (["rubbish"], [json.dumps({"type": "hello", "format": 1})], [b"\x00" * 100], ["x" * 100_000]):
+        with endless.stream() as stream:
+            for message in messages:
+                stream.send(message)
+            with pytest.raises(ConnectionClosed):
+                while True:
+                    stream.recv(timeout=LIMIT_S)
+    with endless.stream() as stream:
+        page = Page(stream)
+        with pytest.raises(ConnectionClosed):
+            for _ in range(100_000):
+                page.say(type="visible", visible=True)
+    with endless.stream() as stream:
+        page = Page(stream)
+        assert page.until("run")["live"]["can"] == ["drag", "hand", "pause", "restart", "speed", "step"]
+        first = page.state()
+        assert page.state(lambda state: state["time"] > first["time"] + 0.5)["rate"] > 0
+
+
+def test_two_pages_one_drives(endless: Run) -> None:
+    with endless.stream() as one, endless.stream() as two:
+        pages = Page(one), Page(two)
+        pages[0].say(type="hand", robot=0, left=0.4, right=0.4)
+        assert pages[0].state(lambda state: state["driver"])["driver"] == "you"
+        assert pages[1].state(lambda state: state["driver"])["driver"] == "another"
+        pages[1].say(type="hand", robot=0, left=-1, right=-1)
+        assert "another page drives" in pages[1].until("refused")["sentence"]
+        pages[0].say(type="release", robot=0)
+        pages[0].state(lambda state: not state["driver"])
+
+
+def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    run = Run("run", "demo", "--robot", "shieldbot-charging", "--view", "--seconds", "3", "--out", str(folder), "--json")
+    with run.stream() as stream:
+        page = Page(stream)
+        page.until("run")
+        page.say(type="pause")
+        page.state(lambda state: state["paused"])
+        page.say(type="place", robot=0, pose=[0.0, 0.0, 1.0])
+        state = page.state(lambda state: state["touched"] == 1)
+        assert state["robots"][0]["pose"] == [0.0, 0.0, 1.0]
+        page.say(type="place", robot=0, pose=[9.0, 9.0, 0.0])
+        assert "cannot stand at 9.00 m, 9.00 m" in page.until("refused")["sentence"]
+        page.say(type="parameter", robot=0, name="wander.forward", value=0.3)
+        page.say(type="step")
+        later = page.state(lambda now: now["time"] > state["time"])
+        assert later["paused"] and later["robots"][0]["parameters"]["wander.forward"] == 0.3
+        page.say(type="hand", robot=0, left=0.5, right=-0.5)
+        page.say(type="resume")
+        page.state(lambda now: now["robots"][0]["driver"] == "you")
+        page.say(type="speed", speed=None)
+        assert page.until("end")["ended"] == "complete"
+    code, out, error = run.end()
+    assert code == 0, error
+    assert json.loads(out)["touched"] == 3  # lifted, a parameter, by hand
+    again = subprocess.run(
+        [sys.executable, "-m", "boebot", "run", "--again", str(folder), "--json"], capture_output=True, text=True, check=False
+    )
+    assert again.returncode == 0, again.stdout + again.stderr
+
+
+def test_page_begins_a_run_afresh_also_after_its_end() -> None:
+    run = Run("run", "wander", "--view", "--seconds", "2", "--speed", "max", "--json")
+    with run.stream() as stream:
+        page = Page(stream)
+        assert page.until("end")["again"]
+        page.say(type="restart", seed=7, without=["slip"])
+        assert page.until("run")["live"]["seed"] == 7
+        assert page.until("end")["tables"][0]["without"] == "slip"
+    code, out, error = run.end()
+    assert code == 0, error
+    assert json.loads(out)["seed"] == 7
+
+
+def test_ctrl_c_ends_a_run_that_stands_still() -> None:
+    run = Run("run", "wander", "--view", "--seconds", "inf")
+    with run.stream() as stream:
+        page = Page(stream)
+        page.until("run")
+        page.say(type="pause")
+        page.state(lambda state: state["paused"])
+        run.process.send_signal(signal.SIGINT)
+        assert page.until("end")
+    assert run.end()[0] == 130
+
+
+def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> None:
+    brain = tmp_path / "talks.py"
+    brain.write_text(
+        "def step(robot):\n    print('hello', robot.time)\n    robot.show('x', robot.time)\n"
+        "    robot.sketch('line', lines=[[(0, 0), (0.5, robot.time)]])\n    robot.drive(0.3, 0.3)\n"
+    )
+    run = Run("run", str(brain), "wander", "--view", "--seconds", "2", "--json")
+    with run.stream() as stream:
+        page = Page(stream)
+        assert len(page.until("run")["runs"]) == 2
+        chunk = page.until("chunk", where=lambda chunk: chunk["printed"] and chunk["runs"][0]["layers"])
+        assert chunk["printed"].startswith("hello")
+        assert [one["name"] for one in chunk["runs"][0]["shown"]["numbers"]] == ["x"]
+        page.until("end")
+    code, out, error = run.end()
+    assert code == 0, error
+    assert set(json.loads(out)) >= {"robots"}  # JSON alone on standard output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--speed", "2"], "expected --view with them"),
+        (["--view", "--speed", "0"], "expected 0.01 to 10000, or max"),
+        (["--view", "--speed", "quick"], "'quick' is no speed"),
+    ],
+)
+def test_wrong_options_are_one_sentence(arguments: list[str], sentence: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "boebot", "run", "wander", *arguments], capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0 and "Traceback" not in done.stderr
+    assert sentence in " ".join(done.stderr.split())
+
+
+def test_taken_port_is_one_sentence(endless: Run) -> None:
+    arguments = ["run", "wander", "--view", "--view-port", str(endless.url.port)]
+    done = subprocess.run([sys.executable, "-m", "boebot", *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "Traceback" not in done.stderr
+    assert "cannot be served at 127.0.0.1" in done.stderr
