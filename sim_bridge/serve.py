@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from boebot.boards import BoardRequest, Visit
+from boebot.boards import BoardRequest, TruthNow, Visit
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.served_ports.port import Port
@@ -29,6 +29,9 @@ BRISK_S = 0.0002  # and for a while after one came, so that its answer is not la
 BRISK_FOR_S = 0.004
 AHEAD_CYCLES = CLOCK_HZ // 100  # bytes for this time are put on the line at most
 BITS_PER_BYTE = 10
+LOOK_S = 0.05  # between two looks at where the robot is
+
+Look = Callable[[TruthNow, Mapping[str, float]], None]
 
 
 class LineToBoard:
@@ -58,8 +61,9 @@ def carry(
     port: Port,
     running: Callable[[], bool],
     visit: Callable[[Visit], None],
+    look: Look | None = None,
 ) -> None:
-    """Carries bytes between `session` and `port` at real-time pace until `running()` is false.
+    """Carries bytes between `session` and `port` at real-time pace until `running()` is false; `look` as of `serve`.
 
     Raises:
         BoardError: the board's program crashed.
@@ -68,7 +72,7 @@ def carry(
     pace = Pace(sim)
     line = LineToBoard(session)
     baud = None
-    brisk_until = 0.0
+    brisk_until = look_at = 0.0
     while running():
         for event in port.look():
             if event.what == "came":
@@ -83,6 +87,9 @@ def carry(
             brisk_until = time.monotonic() + BRISK_FOR_S
         if data := session.robot.receive():
             port.write(data)
+        if look is not None and time.monotonic() >= look_at:
+            look_at = time.monotonic() + LOOK_S
+            look(session.truth_now(), session.counters())
         port.wait(BRISK_S if time.monotonic() < brisk_until else IDLE_S)
 
 
@@ -94,6 +101,7 @@ def serve(
     announce: Callable[[str], None],
     visit: Callable[[Visit], None],
     running: Callable[[], bool],
+    look: Look | None = None,
 ) -> None:
     """Serves the board of that kind ("native" or "avr") until `running()` is false or Ctrl-C (boebot.boards.Server).
 
@@ -110,4 +118,4 @@ def serve(
         stack.callback(port.close)
         announce(port.url)
         with contextlib.suppress(KeyboardInterrupt):
-            carry(session, port, running, visit)
+            carry(session, port, running, visit, look)

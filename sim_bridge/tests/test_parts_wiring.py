@@ -107,7 +107,7 @@ def test_a_start_on_a_robot_or_on_an_obstacle_on_its_way_is_refused() -> None:
         if free:
             second.pins.place(x, 0.0, 0.0)
         else:
-            with pytest.raises(ArenaError, match="no free space"):
+            with pytest.raises(ArenaError, match="cannot stand at"):
                 second.pins.place(x, 0.0, 0.0)
     first.pins.place(0.0, 0.0, 1.0)  # a robot is not in its own way
 

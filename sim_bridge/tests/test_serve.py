@@ -12,12 +12,12 @@ from contextlib import contextmanager
 import pytest
 import serial
 
-from boebot.boards import BoardRequest, Visit, open_port
+from boebot.boards import BoardRequest, TruthNow, Visit, open_port
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.transport import Transport
-from sim_bridge.serve import serve
+from sim_bridge.serve import Look, serve
 
 pytestmark = pytest.mark.wall_clock
 
@@ -29,8 +29,8 @@ def request() -> BoardRequest:
 
 
 @contextmanager
-def served(tcp: int | None, visit: Callable[[Visit], None] = lambda _: None) -> Iterator[str]:
-    """The URL of a served native board; `visit` hears who comes and goes."""
+def served(tcp: int | None, visit: Callable[[Visit], None] = lambda _: None, look: Look | None = None) -> Iterator[str]:
+    """The URL of a served native board; `visit` hears who comes and goes, `look` where the robot is."""
     urls: list[str] = []
     announced, stop = threading.Event(), threading.Event()
 
@@ -39,7 +39,15 @@ def served(tcp: int | None, visit: Callable[[Visit], None] = lambda _: None) -> 
         announced.set()
 
     def work() -> None:
-        serve("native", request(), tcp=tcp, announce=announce, visit=visit, running=lambda: not stop.is_set())
+        serve(
+            "native",
+            request(),
+            tcp=tcp,
+            announce=announce,
+            visit=visit,
+            running=lambda: not stop.is_set(),
+            look=look,
+        )
 
     thread = threading.Thread(target=work)
     thread.start()
@@ -135,3 +143,18 @@ def test_what_cannot_be_served_is_told() -> None:
             serve("native", request(), tcp=taken, announce=print, visit=print, running=lambda: False)
     with pytest.raises(BoardError, match="no emulated board 'toaster'"):
         serve("toaster", request(), tcp=0, announce=print, visit=print, running=lambda: False)
+
+
+def test_somebody_looks_where_the_robot_is() -> None:
+    """With a client or without, twenty times a second and in order of time."""
+    seen: list[tuple[TruthNow, float]] = []
+    with served(0, look=lambda truth, counters: seen.append((truth, counters["time_s"]))) as url:
+        time.sleep(0.5)
+        client = open_port(url, 500_000)
+        client.read(0.5)
+        client.close()
+        time.sleep(0.5)
+    times = [time_s for _, time_s in seen]
+    assert times == sorted(times)
+    assert 0.8 * 20 <= (len(times) - 1) / (times[-1] - times[0]) <= 20.5
+    assert all(truth.pose == seen[0][0].pose and truth.contacts == 0 for truth, _ in seen)
