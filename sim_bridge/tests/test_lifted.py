@@ -32,6 +32,7 @@ from boebot.record.truth import shifts, track_of
 from boebot.robot import Robot
 from boebot.running import runner, together
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, scripted, square
 
@@ -231,14 +232,14 @@ def test_the_plan_has_shapes_where_they_were() -> None:
 def test_saved_and_restored_with_all_that_was_moved() -> None:
     def build() -> Sim:
         sim = Sim(street())
-        sim.add(None, ARSIM)
-        add_vehicle = sim.add(None, ARSIM, pose=(2, 0, 0))
-        add_vehicle.signals(0.3, 0.2)
+        sim.add(None, ARSIM).signals(0.3, 0.2)
+        sim.add(native_board(native_library(SHIELDBOT.pin_map)), SHIELDBOT, pose=(2, 0, 0))
         return sim
 
     here, there = build(), build()
     run(here, 0.5)
     here.robot(0).place(-1, -1, 1)
+    here.robot(1).place(1, -1, 1)
     here.place_shape(0, (0, 3, 1))
     run(here, 0.3)
     assert here.shifts()
