@@ -658,8 +658,7 @@ class SimRobot(FormerNames):
     def truth_now(self) -> TruthNow:
         """What only a simulator knows, as it stands now."""
         body = self.body()
-        shapes = self.sim.shapes()
-        return TruthNow((body.x, body.y, body.heading), self.true_contacts, shapes)
+        return TruthNow((body.x, body.y, body.heading), self.true_contacts, self.sim.shapes())
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Lifts the robot and puts it elsewhere, at rest (m, m, rad): see `sim_place` of loop/loop.h.
@@ -684,7 +683,8 @@ class SimRobot(FormerNames):
         return dict(zip(columns, table.reshape(-1, len(columns)).T, strict=True))
 
     def truth(self) -> dict[str, Floats]:
-        """Columns `TRUTH`, one row every 10 ms; empty without recording."""
+        """Columns `TRUTH`, one row every 10 ms, and two a cycle apart where it was put elsewhere; empty without
+        recording."""
         return self._rows(lib.sim_record(self._handle, self.number, self._count), TRUTH)
 
     def truth_to_now(self) -> dict[str, Floats]:

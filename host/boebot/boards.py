@@ -121,8 +121,8 @@ class BoardSession(Protocol):
         nobody knows. `ended`: the run has ended now."""
 
     def truth_now(self) -> TruthNow | None:
-        """What only a simulator knows, as it stands now; None where nobody knows. As all of a session, not
-        while time passes."""
+        """What only a simulator knows, as it stands now; None where nobody knows. As all else of a session it is asked
+        only while no time passes there."""
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Lifts a simulated robot and puts it there (m, m, rad), at rest; its motors go on as they are told.

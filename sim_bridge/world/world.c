@@ -73,7 +73,6 @@ int world_place_obstacle(world *self, size_t obstacle, double x, double y, doubl
   m->shift_x = x - way.x;
   m->shift_y = y - way.y;
   m->shift_heading = number_wrap(heading - way.heading);
-  m->waits = 0;
   world_update(self);
   if (!meets_a_robot(self, m)) return 1;
   *m = before;

@@ -62,8 +62,8 @@ static inline scene world_obstacles(const world *self) {
 /* 1 if a disc of `radius` at (x, y) lies in free space, outside of all obstacles and of all robots but `self_id`. */
 int world_is_free(const world *self, double x, double y, double radius, uint32_t self_id);
 
-/* Puts an obstacle elsewhere: from now on it goes along its way shifted and turned by as much, and waits no longer.
- * Returns 0, and nothing has changed, where the circle around a robot is in that place. */
+/* Puts an obstacle elsewhere: from now on it goes along its way shifted and turned by as much. Returns 0, and nothing has
+ * changed, where the circle around a robot is in that place. */
 int world_place_obstacle(world *self, size_t obstacle, double x, double y, double heading);
 
 #endif

@@ -54,8 +54,8 @@ double scene_ray(const scene *self, double x, double y, double cosine, double si
 void scene_fan_movers(const scene *self, const fan_question *question, uint32_t self_id);
 
 /* Where the arena's moving shapes are at `time` (s): arena_moving_count of them, with ids from `first_id` on. Their
- * velocities are those that take them evenly to where their paths lead within `dt`. `waited`, `waits` and `stops` of each are kept,
- * 0 for one whose path was never held up, and so are its shifts, by which it stands and turns off its way. */
+ * velocities are those that take them evenly to where their paths lead within `dt`. Of each are kept `waited`, `waits` and
+ * `stops`, 0 where its path was never held up, and its shift, by which it stands and turns off its way. */
 void scene_moving(const arena *where, double time, double dt, uint32_t first_id, mover *out);
 
 /* 1 if a disc of `radius` at (x, y) lies in free space of the arena and outside of all movers but `self_id`. */
