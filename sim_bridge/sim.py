@@ -342,8 +342,9 @@ class Sim:
 
     def shifts(self) -> list[Shift]:
         """Truth: when moving shapes were put elsewhere, oldest first; empty without recording."""
-        rows = lib.sim_shifts(self.handle, self._count)
-        return [Shift(row.time, int(row.shape), row.x, row.y, row.heading) for row in rows[0 : self._count[0]]]
+        count = ffi.new("size_t *")
+        rows = lib.sim_shifts(self.handle, count)
+        return [Shift(row.time, int(row.shape), row.x, row.y, row.heading) for row in rows[0 : count[0]]]
 
     def lateness(self) -> list[Lateness]:
         """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had

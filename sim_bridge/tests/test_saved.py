@@ -27,6 +27,7 @@ from boebot.link import messages
 from boebot.link.link import Link
 from boebot.record.result import RunResult
 from boebot.robot import Robot
+from boebot.running import stepping
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
 from sim_bridge.pins import BoardPins
@@ -165,6 +166,7 @@ def test_run_of_a_brain_goes_on_identically(kind: str, count: int, monkeypatch: 
         return opened[-1]
 
     monkeypatch.setattr(with_board, "new_sim", watched)
+    monkeypatch.setattr(stepping, "_LASTS_S", math.inf)  # on a slow machine the record would get what happens astray
     wander = load_brain("wander")
 
     def run(at_step: int | None) -> list[str]:
