@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Polygon
 from matplotlib.transforms import Affine2D
 
@@ -18,6 +17,7 @@ from boebot.description.outlines import way_out
 from boebot.errors import BoebotError
 from boebot.view import style
 from boebot.view.arena_drawing import draw_arena, frame
+from boebot.view.notebook_figure import NotebookFigure
 from boebot.view.robot_drawing import body_patch
 from boebot.view.scene import plan_bounds
 from sim_bridge._core import ffi, lib
@@ -36,7 +36,7 @@ class View:
     def __init__(self, vehicle: Vehicle, *, rays: bool = True, ghost: bool = True) -> None:
         """`rays`: of its sensors that look. `ghost`: where its odometer, if it has one of that name, believes it is."""
         self.vehicle = vehicle
-        self.figure = Figure(figsize=(5.0, 5.0), dpi=110, layout="constrained")
+        self.figure = NotebookFigure(figsize=(5.0, 5.0), dpi=110, layout="constrained")
         FigureCanvasAgg(self.figure)
         self._axes = self.figure.subplots()
         plan = floor_plan(vehicle.arena, 0.0, 0.0)

@@ -7,6 +7,7 @@ import io
 import os
 import re
 import sys
+from html.parser import HTMLParser
 from pathlib import Path
 
 import pandas
@@ -17,6 +18,7 @@ from PIL import Image
 import boebot
 from boebot.errors import BoebotError
 from boebot.record.result import RunResult, TogetherResult
+from boebot.view import on_screen
 from copied_process import python
 
 ROBOTS = [boebot.Member(brain="wander", robot="arsim", pose=(x, 0.0, 0.0)) for x in (0.0, 1.0)]
@@ -87,6 +89,49 @@ def test_page_is_opened_where_there_is_a_display(tmp_path: Path, monkeypatch: py
         page = Path(done.stdout.strip())
         assert page.is_relative_to(tmp_path) and "<title>" in page.read_text()
     assert opened.read_text() == f"{page.as_uri()}\n"
+
+
+class Reader(HTMLParser):
+    """What a browser makes of a piece of HTML: its tags, and the text between them."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        "",
+        '<p title="it\'s">1 &lt; 2 &amp; 3</p>',
+        "</iframe><script>alert(1)</script>",
+        '" onload="alert(1)',
+        "&quot;&#34;&amp;quot; &copy &notit; ✓ \n\t",
+    ],
+)
+def test_frame_holds_any_page_as_it_is(page: str) -> None:
+    read = Reader(on_screen.html_frame(page))
+    ((tag, attributes),) = read.tags
+    assert (tag, attributes["srcdoc"], read.text) == ("iframe", page, "")
+
+
+def test_ipython_in_a_terminal_is_no_notebook(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    shell = "from IPython.core.interactiveshell import InteractiveShell; InteractiveShell.instance()"
+    done = python(f"{shell}\n{BROWSE}", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "<title>" in Path(done.stdout.strip()).read_text()
 
 
 def test_columns_are_those_of_the_file(result: RunResult, tmp_path: Path) -> None:

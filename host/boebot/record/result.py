@@ -376,9 +376,9 @@ class RunResult(FormerNames):
 
         return on_screen.drawn(self).figure
 
-    def replay(self) -> Path:
-        """Opens the run in the browser, to play and scrub, where there is a display. Returns the page's path, a
-        temporary file.
+    def replay(self) -> Path | None:
+        """The run, to play and scrub. In a notebook it is shown below the cell. Elsewhere it is opened in the browser,
+        where there is a display; returns the page's path, a temporary file.
 
         Raises:
             BoebotError: no control tick of the run was recorded.
@@ -447,8 +447,8 @@ class TogetherResult:
 
         return on_screen.drawn_together(self).figure
 
-    def replay(self) -> Path:
-        """Opens the run of all robots in the browser. See `RunResult.replay`."""
+    def replay(self) -> Path | None:
+        """The run of all robots, to play and scrub. See `RunResult.replay`."""
         from boebot.view import on_screen
 
         return on_screen.play(self.robots)

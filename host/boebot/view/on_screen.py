@@ -1,15 +1,16 @@
-"""A run where somebody looks at it: its page in a browser, its picture within a notebook."""
+"""A run where somebody looks at it: its page in a browser or within a notebook, its picture within a notebook."""
 
 from __future__ import annotations
 
 import base64
+import html
 import os
 import sys
 import tempfile
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from boebot.errors import BoebotError
 from boebot.view import picture, replay, together_picture
@@ -17,6 +18,8 @@ from boebot.view import picture, replay, together_picture
 if TYPE_CHECKING:
     from boebot.record.result import RunResult, TogetherResult
     from boebot.view.sheet import Sheet
+
+FRAME_HEIGHT = 680  # pixels: the page fills what it is given
 
 
 def drawn(result: RunResult) -> Sheet:
@@ -39,18 +42,33 @@ def drawn_together(result: TogetherResult) -> Sheet:
     return together_picture.draw(result)
 
 
-def play(results: Sequence[RunResult]) -> Path:
-    """Writes the page of the robots of a run to a temporary file, and opens it in the browser where there is a display.
+def play(results: Sequence[RunResult]) -> Path | None:
+    """Shows the page of the robots of a run: in a notebook below the cell. Elsewhere it is written to a temporary file,
+    and opened in the browser where there is a display; returns its path.
 
     Raises:
         BoebotError: as `drawn`.
     """
     _check(results)
+    recorded = [result for result in results if result.ticks]
+    notebook = kernel_shell()
+    if notebook is not None:
+        shown = {"text/html": html_frame(replay.page_text(recorded)), "text/plain": "<replay of the run>"}
+        notebook.display_pub.publish(shown)
+        return None
     path = Path(tempfile.mkdtemp(prefix="boebot-")) / "replay.html"
-    replay.write([result for result in results if result.ticks], path)
+    replay.write(recorded, path)
     if has_display():
         webbrowser.open(path.as_uri())
     return path
+
+
+def kernel_shell() -> Any:
+    """IPython's shell, where it is that of a kernel of Jupyter: a notebook shows what it publishes. Else None, as in a
+    terminal."""
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    return None if getattr(shell, "kernel", None) is None else shell
 
 
 def has_display() -> bool:
@@ -62,6 +80,12 @@ def html_image(sheet: Sheet) -> str:
     """A picture within HTML, which needs no file beside it."""
     data = base64.b64encode(sheet.png()).decode("ascii")
     return f'<img alt="the run from above" width="{sheet.width}" src="data:image/png;base64,{data}">'
+
+
+def html_frame(page: str) -> str:
+    """A page within HTML, which needs no file beside it. Its scripts run, and cannot reach what is around it."""
+    opening = f'<iframe title="replay of the run" sandbox="allow-scripts" width="100%" height="{FRAME_HEIGHT}"'
+    return f'{opening} style="border: 0" srcdoc="{html.escape(page)}"></iframe>'
 
 
 def _check(results: Sequence[RunResult]) -> None:

@@ -19,8 +19,13 @@ SWEPT_AT_MOST = 1_000_000  # numbers of two bytes, of all sweeps of all robots: 
 
 def write(results: Sequence[RunResult], path: Path) -> Path:
     """Writes the page of the robots of one run."""
-    path.write_text(web_page.replay(content(results)), encoding="utf-8")
+    path.write_text(page_text(results), encoding="utf-8")
     return path
+
+
+def page_text(results: Sequence[RunResult]) -> str:
+    """The page of the robots of one run."""
+    return web_page.replay(content(results))
 
 
 def content(results: Sequence[RunResult]) -> dict[str, Any]:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from boebot.view import style
 from boebot.view.arena_drawing import frame
+from boebot.view.notebook_figure import NotebookFigure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,7 +66,7 @@ class Sheet:
         panel_in = PANEL_IN + ROW_IN * panel_rows + 0.15 + PANEL_BELOW_IN if panel_rows else 0.0
         below = 0.5 + panel_in + foot
         tall = height * scale + above + below
-        self.figure = Figure(figsize=(style.WIDTH_IN, tall), dpi=style.DPI, facecolor=style.PAPER)
+        self.figure = NotebookFigure(figsize=(style.WIDTH_IN, tall), dpi=style.DPI, facecolor=style.PAPER)
         FigureCanvasAgg(self.figure)
         inset = (across - width * scale) / 2
         self.axes = self.figure.add_axes(
