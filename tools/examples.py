@@ -1,4 +1,4 @@
-"""Types of the examples: mypy on the Python blocks of the documentation, and on what `boebot new` writes.
+"""Types of the examples: mypy on the Python blocks of the documentation, its notebooks, and what `boebot new` writes.
 
 python -m tools.examples
 
@@ -7,6 +7,7 @@ Each becomes a file in build/examples. Unlike the sources they need not heed Non
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -29,6 +30,10 @@ def examples() -> dict[str, str]:
         for page in pages
         for number, code in enumerate(BLOCK.findall(page.read_text(encoding="utf-8")), 1)
     }
+    for notebook in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")):
+        cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+        code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+        found[f"notebook_{notebook.stem.replace('-', '_')}.py"] = "\n".join(code)
     for name, template in {"first": FIRST_BRAIN, "from_top": FROM_TOP, "behaviors": SEVERAL_BEHAVIORS}.items():
         found[f"new_{name}.py"] = template.format(name=name, file=f"{name}.py", stem=name)
     return found
