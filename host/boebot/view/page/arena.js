@@ -45,11 +45,12 @@ function drawGrid(c) {
 function drawNumbers(c) { // over what stands there
   const { width, height } = $("floor"), step = gridStep(), digits = step < 1 ? 1 : 0;
   const number = v => minus((Math.abs(v) < step / 2 ? 0 : v).toFixed(digits));
-  c.fillStyle = colours.faint; font(c, 11); c.textAlign = "center"; c.textBaseline = "bottom";
-  for (let k = Math.ceil(backX(0) / step) + 1; k * step < backX(width) - step / 2; k++) c.fillText(number(k * step), X(k * step), height - 3 * ratio);
+  const write = (text, x, y) => { c.strokeText(text, x, y); c.fillText(text, x, y); }; // with a rim, over walls
+  c.fillStyle = colours.faint; c.strokeStyle = colours.paper; c.lineWidth = 3 * ratio; c.lineJoin = "round"; font(c, 11); c.textAlign = "center"; c.textBaseline = "bottom";
+  for (let k = Math.ceil(backX(0) / step) + 1; k * step < backX(width) - step / 2; k++) write(number(k * step), X(k * step), height - 3 * ratio);
   c.textAlign = "left"; c.textBaseline = "middle";
-  for (let k = Math.ceil(backY(height) / step) + 1; k * step <= backY(0) - step / 2; k++) c.fillText(number(k * step), 4 * ratio, Y(k * step));
-  c.textAlign = "right"; c.textBaseline = "bottom"; c.fillText("m", width - 5 * ratio, height - 3 * ratio); c.textAlign = "left";
+  for (let k = Math.ceil(backY(height) / step) + 1; k * step <= backY(0) - step / 2; k++) write(number(k * step), 4 * ratio, Y(k * step));
+  c.textAlign = "right"; c.textBaseline = "bottom"; write("m", width - 5 * ratio, height - 3 * ratio); c.textAlign = "left";
 }
 function word(c, text, x, y) {
   c.fillStyle = colours.ink; font(c, 11); c.textAlign = "center"; c.textBaseline = "middle"; c.fillText(text, X(x), Y(y)); c.textAlign = "left";

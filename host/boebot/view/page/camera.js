@@ -7,14 +7,16 @@ let fitted = true, following = false;
 const X = x => shiftX + x * scale, Y = y => shiftY - y * scale;
 const backX = px => (px - shiftX) / scale, backY = py => (shiftY - py) / scale;
 
+const PAD = { left: 34, right: 8, top: 8, bottom: 20 }; // the numbers stand at the left and below
 function fitScale() {
-  const [x0, y0, x1, y1] = bounds, pad = 10 * ratio;
-  return Math.max(1e-6, Math.min(($("stage").width - 2 * pad) / (x1 - x0), ($("stage").height - 2 * pad) / (y1 - y0)));
+  const [x0, y0, x1, y1] = bounds, { width, height } = $("stage");
+  return Math.max(1e-6, Math.min((width - (PAD.left + PAD.right) * ratio) / (x1 - x0), (height - (PAD.top + PAD.bottom) * ratio) / (y1 - y0)));
 }
 function centre(x, y) { shiftX = $("stage").width / 2 - x * scale; shiftY = $("stage").height / 2 + y * scale; }
 function fitView() {
   const [x0, y0, x1, y1] = bounds;
   scale = fitScale(); centre((x0 + x1) / 2, (y0 + y1) / 2);
+  shiftX += (PAD.left - PAD.right) / 2 * ratio; shiftY += (PAD.top - PAD.bottom) / 2 * ratio;
   fitted = true; setFollowing(false);
 }
 function zoom(factor, px = $("stage").width / 2, py = $("stage").height / 2) { // about a point of the canvas
@@ -54,10 +56,14 @@ function listenToArena() {
   const stage = $("stage");
   stage.addEventListener("wheel", e => {
     e.preventDefault();
+    if (hooks.dragging()) { hooks.turn(e.deltaY > 0 ? -Math.PI / 12 : Math.PI / 12); return; }
     zoom(Math.exp(-e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), e.offsetX * ratio, e.offsetY * ratio);
   }, { passive: false });
-  stage.addEventListener("pointerdown", e => { stage.setPointerCapture(e.pointerId); fingers.set(e.pointerId, { x: e.offsetX * ratio, y: e.offsetY * ratio }); });
-  stage.addEventListener("pointermove", e => { if (fingers.has(e.pointerId) && !hooks.dragging()) fingersMoved(e); });
+  stage.addEventListener("pointerdown", e => {
+    stage.setPointerCapture(e.pointerId);
+    if (fingers.size || !hooks.grab(e)) fingers.set(e.pointerId, { x: e.offsetX * ratio, y: e.offsetY * ratio });
+  });
+  stage.addEventListener("pointermove", e => { if (fingers.has(e.pointerId)) fingersMoved(e); });
   for (const end of ["pointerup", "pointercancel"]) stage.addEventListener(end, e => fingers.delete(e.pointerId));
   $("zoomIn").onclick = () => zoom(1.4);
   $("zoomOut").onclick = () => zoom(1 / 1.4);

@@ -10,7 +10,9 @@ function requestDraw() {
   requestAnimationFrame(() => { if (drawAsked) draw(); });
 }
 function viewChanged() { floorDirty = true; trailChanged(); requestDraw(); }
-function draw() {
+const TELL_MS = 60; // numbers that change faster cannot be read
+let toldAt = 0;
+function draw(inMotion = false) { // in motion: as one of many frames
   drawAsked = false;
   if (!run || !run.time.length) return;
   if (following) { const [x, y] = placeOf(run); centre(x, y); floorDirty = true; trailChanged(); }
@@ -18,7 +20,10 @@ function draw() {
   drawTrail(); drawStage();
   keepCursorInside();
   if (tracksDirty) drawTracks();
-  drawCursor(); tellMoment();
+  drawCursor();
+  if (inMotion && performance.now() - toldAt < TELL_MS) return;
+  toldAt = performance.now();
+  tellMoment();
   $("slider").value = tickOf(run);
   $("cursor").ariaValueNow = now.toFixed(2); $("cursor").ariaValueText = now.toFixed(2) + " seconds";
 }
@@ -33,10 +38,10 @@ function advance(stamp) {
   if (!playing) return;
   if (previous !== null) now = Math.min(run.duration, now + (stamp - previous) / 1000 * Number($("speed").value));
   previous = stamp;
-  draw();
+  draw(now < run.duration);
   if (now >= run.duration) setPlaying(false); else requestAnimationFrame(advance);
 }
-function seek(t) { now = Math.max(0, Math.min(run.duration, t)); draw(); }
+function seek(t) { hooks.sought(); now = Math.max(0, Math.min(run.duration, t)); draw(); }
 function goToEvent(forward) {
   const found = forward ? run.events.find(event => event.time > now + 5e-3) : run.events.findLast(event => event.time < now - 5e-3);
   if (found) seek(found.time);
@@ -66,7 +71,9 @@ function replayKey(e) { // true: it was one of them
 }
 function onKey(e) {
   if (!run || e.ctrlKey || e.metaKey || e.altKey) return;
-  if (e.target.tagName === "SELECT" || e.target.type === "number") return;
+  const { tagName, type, id } = e.target;
+  if (tagName === "SELECT" || type === "number" || tagName === "PRE" || document.querySelector("dialog[open]")) return;
+  if (type === "range" && id !== "slider" && e.key !== " ") return;
   if (e.target === $("cursor") && (e.key === "+" || e.key === "-")) { e.preventDefault(); zoomTime(e.key === "+" ? 0.5 : 2); return; }
   if (hooks.key(e) || arenaKey(e) || replayKey(e)) e.preventDefault();
 }

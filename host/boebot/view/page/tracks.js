@@ -1,7 +1,7 @@
 // Signals over time in lanes under a time axis: the canvas "tracks" (drawn when time goes beyond it, or there is more to
 // show) and above it the canvas "cursor". A lane has a name, a height in pixels, `draw` and `at`, its value as text.
 
-const GUTTER = 92, AXIS = 20, RIGHT = 10;
+const GUTTER = 112, AXIS = 20, RIGHT = 10;
 const HEIGHTS = { events: 20, utility: 112, signal: 42, ping: 40, curve: 36, flags: 19, pin: 19 };
 const CURVES = 4; // of the numbers that the brain shows have a lane; the others are in the list only
 const SHORTEST = 1e-3; // s, of the time that is shown
@@ -56,7 +56,7 @@ const flagsLane = (name, first, second, colour, words) => ({
   at(t) { const bits = run.flags.values[tickAt(t)]; return [first, second].map((bit, k) => bits & bit ? words[k] : "").filter(Boolean).join(" and ") || "none"; },
 });
 const tickAt = t => indexIn(run.time.values, t);
-const inGutter = name => name.length > 13 ? name.slice(0, 12) + "…" : name;
+const inGutter = name => name.length > 14 ? name.slice(0, 13) + "…" : name;
 
 // ---- drawing them ----
 function laneBoxes() { // where each lane is, in pixels of the canvas
@@ -81,7 +81,7 @@ function drawTracks() {
     c.strokeStyle = colours.grid; c.lineWidth = ratio; c.beginPath(); c.moveTo(0, box.top); c.lineTo(canvas.width, box.top); c.stroke();
     c.fillStyle = colours.faint; font(c, 11.5); c.textBaseline = "middle"; c.textAlign = "left";
     c.fillText(inGutter(box.lane.name), 8 * ratio, box.middle);
-    c.save(); c.beginPath(); c.rect(box.left - 34 * ratio, box.top, box.right - box.left + 36 * ratio, box.height); c.clip();
+    c.save(); c.beginPath(); c.rect(box.left - 46 * ratio, box.top, box.width + 48 * ratio, box.height); c.clip();
     box.lane.draw(c, box);
     c.restore();
   }
