@@ -81,7 +81,7 @@ function drawFloor() {
   }
   for (const [x, y] of plan.lamps) star(c, x, y);
   c.setLineDash([5 * ratio, 3 * ratio]); c.strokeStyle = colours.moving; c.lineWidth = 1.2 * ratio;
-  for (const one of moving) trace(c, one.pose, 0, one.time.length - 1);
+  if (!pageIsLive) for (const one of moving) trace(c, one.pose, 0, one.time.length - 1);
   c.setLineDash([]);
   drawNumbers(c);
 }

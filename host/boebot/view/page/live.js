@@ -151,7 +151,11 @@ function askRestart() {
 }
 
 // ---- what is told of the run ----
-function tellConnection(text, kind = "") { const it = $("connection"); it.hidden = false; it.dataset.kind = kind; if (it.textContent !== text) it.textContent = text; }
+function tellConnection(text, kind = "") { // screen readers hear it where it is of another kind, not with each new rate
+  const it = $("connection");
+  if (it.dataset.kind !== kind) say("announced", text);
+  it.hidden = false; it.dataset.kind = kind; say("connection", text);
+}
 function tellState() {
   if (ended !== null) tellConnection(endedText(), "ended");
   else if (state) {
@@ -198,7 +202,7 @@ function makeParameters() {
   $("parameters").replaceChildren($("parameters").querySelector("h2"), ...sliders.map(one => one.whole));
 }
 function makeSlider(parameter) {
-  const range = parameter.least != null && parameter.most != null, output = element("output", {});
+  const range = parameter.least != null && parameter.most != null, output = element("span", { className: "value" });
   const input = element("input", range ? { type: "range", min: parameter.least, max: parameter.most, step: "any" } : { type: "number", step: "any" });
   const one = { parameter, input, output, changed: -Infinity, due: null };
   input.value = parameter.value; input.ariaLabel = parameter.name + (parameter.unit ? ", " + parameter.unit : "");

@@ -25,7 +25,7 @@ function draw(inMotion = false) { // in motion: as one of many frames
   toldAt = performance.now();
   tellMoment();
   $("slider").value = tickOf(run);
-  $("cursor").ariaValueNow = now.toFixed(2); $("cursor").ariaValueText = now.toFixed(2) + " seconds";
+  $("cursor").ariaValueNow = now.toFixed(2); $("cursor").ariaValueText = $("slider").ariaValueText = now.toFixed(2) + " seconds";
 }
 
 // ---- playing and scrubbing ----
@@ -69,11 +69,13 @@ function replayKey(e) { // true: it was one of them
   else return false;
   return true;
 }
+const SCROLL_KEYS = ["ArrowUp", "ArrowDown", "PageUp", "PageDown", "Home", "End"];
 function onKey(e) {
   if (!run || e.ctrlKey || e.metaKey || e.altKey) return;
   const { tagName, type, id } = e.target;
   if (tagName === "SELECT" || type === "number" || tagName === "PRE" || document.querySelector("dialog[open]")) return;
   if (type === "range" && id !== "slider" && e.key !== " ") return;
+  if (id === "panels" && SCROLL_KEYS.includes(e.key)) return;
   if (e.target === $("cursor") && (e.key === "+" || e.key === "-")) { e.preventDefault(); zoomTime(e.key === "+" ? 0.5 : 2); return; }
   if (hooks.key(e) || arenaKey(e) || replayKey(e)) e.preventDefault();
 }

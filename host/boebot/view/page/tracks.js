@@ -1,5 +1,5 @@
 // Signals over time in lanes under a time axis: the canvas "tracks" (drawn when time goes beyond it, or there is more to
-// show) and above it the canvas "cursor". A lane has a name, a height in pixels, `draw` and `at`, its value as text.
+// show) and above it the canvas "cursor". A lane has a name, a height in pixels, `draw`, `at`, its value as text, and maybe `label`, which writes its scale.
 
 const GUTTER = 112, AXIS = 20, RIGHT = 10;
 const HEIGHTS = { events: 20, utility: 112, signal: 42, ping: 40, curve: 36, flags: 19, pin: 19 };
@@ -36,17 +36,16 @@ function zoomTime(factor, about = now) {
 
 // ---- lanes ----
 function makeLanes() {
-  const signals = [["L", run.left, "end"], ["R", run.right, "estimate"]];
   lanes = [{ name: "events", height: HEIGHTS.events, draw: drawEvents, at: eventAt }];
-  if (run.mind) lanes.push({ name: "utility", height: HEIGHTS.utility, draw: drawUtilities, at: utilityAt });
-  lanes.push({ name: "motors", height: HEIGHTS.signal, draw: (c, box) => drawSignals(c, box, signals), at: signalsAt });
-  if (run.has("ping")) lanes.push({ name: "Ping", height: HEIGHTS.ping, draw: drawPing, at: t => pingText(tickAt(t)) });
+  if (run.mind) lanes.push({ name: "utility", height: HEIGHTS.utility, draw: drawUtilities, label: labelUtilities, at: utilityAt });
+  lanes.push({ name: "motors", height: HEIGHTS.signal, draw: drawSignals, label: labelSignals, at: signalsAt });
+  if (run.has("ping")) lanes.push({ name: "Ping", height: HEIGHTS.ping, draw: drawPing, label: (c, box) => write(c, box, farthestEcho().toFixed(1) + " m", 0.5), at: t => pingText(tickAt(t)) });
   if (run.has("infrared_left") || run.has("infrared_right")) lanes.push(flagsLane("IR", 4, 8, "charger", ["left", "right"]));
   if (run.has("whisker_left") || run.has("whisker_right")) lanes.push(flagsLane("whiskers", 1, 2, "touch", ["left", "right"]));
   if (run.known) lanes.push(flagsLane("true contact", CONTACT_BIT, 0, "estimate", ["contact"]));
-  if (run.load) lanes.push({ name: "load of tick", height: HEIGHTS.curve, draw: drawLoad, at: t => (100 * run.load.values[tickAt(t)]).toFixed(0) + " %" });
+  if (run.load) lanes.push({ name: "load of tick", height: HEIGHTS.curve, draw: drawLoad, label: (c, box) => write(c, box, "100 %", 0.2), at: t => (100 * run.load.values[tickAt(t)]).toFixed(0) + " %" });
   for (const one of run.numbers.slice(0, CURVES))
-    lanes.push({ name: one.name, height: HEIGHTS.curve, draw: (c, box) => drawShown(c, box, one.values.values), at: t => shownText(one, t) });
+    lanes.push({ name: one.name, height: HEIGHTS.curve, draw: (c, box) => drawShown(c, box, one.values.values), label: (c, box) => labelShown(c, box, one.values.values), at: t => shownText(one, t) });
   for (const pin of run.pins) lanes.push({ name: pin.name, height: HEIGHTS.pin, draw: (c, box) => drawPin(c, box, pin), at: t => pinText(pin, t) });
   $("signals").style.setProperty("--height", AXIS + lanes.reduce((sum, lane) => sum + lane.height, 0) + "px");
 }
@@ -81,7 +80,8 @@ function drawTracks() {
     c.strokeStyle = colours.grid; c.lineWidth = ratio; c.beginPath(); c.moveTo(0, box.top); c.lineTo(canvas.width, box.top); c.stroke();
     c.fillStyle = colours.faint; font(c, 11.5); c.textBaseline = "middle"; c.textAlign = "left";
     c.fillText(inGutter(box.lane.name), 8 * ratio, box.middle);
-    c.save(); c.beginPath(); c.rect(box.left - 46 * ratio, box.top, box.width + 48 * ratio, box.height); c.clip();
+    c.textAlign = "right"; font(c, 10); box.lane.label?.(c, box);
+    c.save(); c.beginPath(); c.rect(box.left, box.top, box.width, box.height); c.clip();
     box.lane.draw(c, box);
     c.restore();
   }
@@ -116,26 +116,32 @@ function drawCurve(c, box, times, values, y) {
   }
   c.stroke();
 }
-function drawSignals(c, box, signals) {
+const write = (c, box, text, at) => c.fillText(text, box.left - 5 * ratio, box.top + at * box.height); // of the scale, beside the lane
+const SIGNALS = [["L", "left", "end"], ["R", "right", "estimate"]];
+function drawSignals(c, box) {
   const y = v => box.middle - v * box.height * 0.42;
-  signals.forEach(([name, column, colour], k) => {
-    c.strokeStyle = c.fillStyle = colours[colour]; c.lineWidth = 1.2 * ratio;
-    drawCurve(c, box, run.time.values, column.values, y);
-    c.textAlign = "left"; c.fillText(name, box.left - (30 - 12 * k) * ratio, box.middle);
-  });
+  c.lineWidth = 1.2 * ratio;
+  for (const [, name, colour] of SIGNALS) { c.strokeStyle = colours[colour]; drawCurve(c, box, run.time.values, run[name].values, y); }
+}
+function labelSignals(c, box) {
+  font(c, 11.5); c.textAlign = "left";
+  SIGNALS.forEach(([sign, , colour], k) => { c.fillStyle = colours[colour]; c.fillText(sign, box.left - (30 - 12 * k) * ratio, box.middle); });
 }
 const signalsAt = t => "left " + signed(run.left.values[tickAt(t)]) + ", right " + signed(run.right.values[tickAt(t)]);
 function drawLoad(c, box) {
   c.strokeStyle = colours.end; c.lineWidth = 1.2 * ratio;
   drawCurve(c, box, run.time.values, run.load.values, v => box.top + box.height * (0.94 - 0.86 * Math.min(1, v)));
-  c.fillStyle = colours.faint; c.textAlign = "right"; c.fillText("100 %", box.left - 3 * ratio, box.top + box.height * 0.2);
 }
+const farthestEcho = () => run.ping.values.reduce((a, b) => Math.max(a, b), 0.1);
 function drawPing(c, box) {
-  const times = run.time.values, far = Math.max(0.1, run.ping.values.reduce((a, b) => Math.max(a, b), 0));
-  const first = indexIn(times, box.from), end = Math.min(run.last, indexIn(times, box.to) + 1), wide = Math.max(ratio, box.width / Math.max(1, end - first));
-  c.fillStyle = colours.end; c.globalAlpha = 0.6;
-  for (let i = first; i <= end; i++) if (run.ping.values[i] > 0) c.fillRect(box.px(times[i]), box.top + box.height * (0.94 - 0.86 * run.ping.values[i] / far), wide, 1.6 * ratio);
-  c.globalAlpha = 1; c.fillStyle = colours.faint; c.textAlign = "right"; c.fillText(far.toFixed(1) + " m", box.left - 5 * ratio, box.middle);
+  const times = run.time.values, far = farthestEcho(), end = Math.min(run.last, indexIn(times, box.to) + 1);
+  c.fillStyle = colours.end; c.globalAlpha = 0.7;
+  for (let i = indexIn(times, box.from); i <= end; i++) {
+    if (run.ping.values[i] <= 0) continue;
+    const x = box.px(times[i]), wide = i < run.last ? box.px(times[i + 1]) - x : ratio;
+    c.fillRect(x, box.top + box.height * (0.94 - 0.86 * run.ping.values[i] / far), Math.max(ratio, wide), 1.6 * ratio);
+  }
+  c.globalAlpha = 1;
 }
 function drawFlags(c, box, bit, at, tall, colour) { // a bar while the bit is set
   const times = run.time.values, flags = run.flags.values, end = Math.min(run.last, indexIn(times, box.to) + 1);
@@ -150,21 +156,25 @@ function drawFlags(c, box, bit, at, tall, colour) { // a bar while the bit is se
   }
 }
 // A value that the brain shows, between its least and its greatest; it holds until the next one.
-function drawShown(c, box, values) {
-  const times = run.shownTime.values;
-  let least = Infinity, most = -Infinity, before = NaN;
+function extent(values) {
+  let least = Infinity, most = -Infinity;
   for (const v of values) if (Number.isFinite(v)) { if (v < least) least = v; if (v > most) most = v; }
+  return [least, most];
+}
+function drawShown(c, box, values) {
+  const times = run.shownTime.values, [least, most] = extent(values);
   const y = v => box.top + box.height * (most > least ? 0.92 - 0.84 * (v - least) / (most - least) : 0.5);
   c.strokeStyle = colours.charger; c.lineWidth = 1.3 * ratio; c.beginPath();
-  for (let i = indexIn(times, box.from); i < values.length && (times[i] <= box.to || !i); i++) {
-    const v = values[i], from = box.px(times[i]), to = Math.min(box.right, i + 1 < values.length ? box.px(times[i + 1]) : box.px(run.duration));
+  for (let i = indexIn(times, box.from), before = NaN; i < values.length && (times[i] <= box.to || !i); i++) {
+    const v = values[i], from = box.px(times[i]), to = i + 1 < values.length ? box.px(times[i + 1]) : box.px(run.duration);
     if (!Number.isNaN(v)) { if (Number.isNaN(before)) c.moveTo(from, y(v)); else c.lineTo(from, y(v)); c.lineTo(to, y(v)); }
     before = v;
   }
   c.stroke();
-  if (most < least) return;
-  font(c, 9); c.textAlign = "right"; c.fillStyle = colours.faint;
-  if (most > least) { c.fillText(short(most), box.left - 4 * ratio, box.top + 8 * ratio); c.fillText(short(least), box.left - 4 * ratio, box.top + box.height - 7 * ratio); }
+}
+function labelShown(c, box, values) {
+  const [least, most] = extent(values);
+  if (most > least) { font(c, 9); write(c, box, short(most), 0.22); write(c, box, short(least), 0.8); }
 }
 function shownText(one, t) { // numbers are in a column, texts in a list
   const i = shownAt(run.shownTime.values, t);
@@ -173,16 +183,18 @@ function shownText(one, t) { // numbers are in a column, texts in a list
 }
 
 // A line for each process, from -1 to 1, and below them a band in the colour of the active motor behavior.
+const utilityShare = u => 0.42 - 0.36 * u; // of the lane's height
 function drawUtilities(c, box) {
-  const times = run.mind.time.values, y = u => box.top + box.height * (0.42 - 0.36 * u);
-  c.strokeStyle = colours.grid; c.lineWidth = ratio; c.fillStyle = colours.faint; c.textAlign = "right"; font(c, 10);
-  for (const u of [-1, 0, 1]) { c.beginPath(); c.moveTo(box.left, y(u)); c.lineTo(box.right, y(u)); c.stroke(); c.fillText(minus(String(u)), box.left - 5 * ratio, y(u)); }
+  const times = run.mind.time.values, y = u => box.top + box.height * utilityShare(u);
+  c.strokeStyle = colours.grid; c.lineWidth = ratio;
+  for (const u of [-1, 0, 1]) { c.beginPath(); c.moveTo(box.left, y(u)); c.lineTo(box.right, y(u)); c.stroke(); }
   c.lineWidth = 0.8 * ratio; c.strokeStyle = colours.faint;
   for (const process of run.mind.cognitive) drawCurve(c, box, times, process.utility.values, y);
   c.lineWidth = 1.6 * ratio;
   for (const behavior of run.mind.behaviors) { c.strokeStyle = readable(behavior.colour); drawCurve(c, box, times, behavior.utility.values, y); }
   drawBand(c, box, times, run.mind.motor.values);
 }
+const labelUtilities = (c, box) => { for (const u of [-1, 0, 1]) write(c, box, minus(String(u)), utilityShare(u)); };
 function drawBand(c, box, times, motor) {
   const from = indexIn(times, box.from), end = indexIn(times, box.to);
   if (!times.length) return;
@@ -200,23 +212,26 @@ function utilityAt(t) {
 }
 
 // ---- pins: a line that is low or high, or in the middle while the pin is released ----
+const PIN_WORDS = ["low", "high", "released", "pulled up"], PIN_SHARES = [0.8, 0.2, 0.55, 0.4]; // of the lane's height
 function drawPin(c, box, pin) {
-  const times = pin.time.values, levels = pin.level.values, y = level => box.top + box.height * [0.8, 0.2, 0.5][level];
-  const first = indexIn(times, box.from), end = Math.min(times.length - 1, indexIn(times, box.to) + 1);
+  const times = pin.time.values, levels = pin.level.values, y = level => box.top + box.height * PIN_SHARES[level];
+  let i = shownAt(times, box.from);
   c.strokeStyle = colours.ink; c.lineWidth = ratio; c.beginPath();
-  let pixel = -1;
-  for (let i = first; i <= end; i++) {
-    const x = Math.max(box.left, Math.min(box.right, box.px(times[i])));
-    if (Math.floor(x) === pixel && i < end) { c.lineTo(x, y(levels[i])); while (i + 1 < end && Math.floor(box.px(times[i + 1])) === pixel) i++; continue; } // many edges in a pixel
-    pixel = Math.floor(x);
-    if (i > first) c.lineTo(x, y(levels[i - 1])); else if (times[i] > box.from) { c.moveTo(box.left, y(levels[i] ? 0 : 1)); c.lineTo(x, y(levels[i] ? 0 : 1)); }
-    if (i === first && times[i] <= box.from) c.moveTo(x, y(levels[i])); else c.lineTo(x, y(levels[i]));
+  if (i < 0) c.moveTo(box.px(times[++i]), y(levels[i])); else c.moveTo(box.left, y(levels[i])); // before its first edge nobody knows
+  for (i++; i < times.length && times[i] <= box.to; i++) {
+    const x = box.px(times[i]), pixel = Math.floor(x);
+    c.lineTo(x, y(levels[i - 1]));
+    if (i + 1 < times.length && Math.floor(box.px(times[i + 1])) === pixel) { // several edges in a pixel
+      while (i + 1 < times.length && Math.floor(box.px(times[i + 1])) === pixel) i++;
+      c.lineTo(x, y(0)); c.lineTo(x, y(1));
+    }
+    c.lineTo(x, y(levels[i]));
   }
-  if (end >= 0 && times[end] < box.to) c.lineTo(Math.min(box.right, box.px(run.duration)), y(levels[end]));
+  c.lineTo(Math.min(box.right, box.px(i < times.length ? times[i] : run.duration)), y(levels[i - 1]));
   c.stroke();
 }
 function pinText(pin, t) {
-  const times = pin.time.values, i = indexIn(times, t), word = ["low", "high", "released"][pin.level.values[i]];
+  const times = pin.time.values, i = indexIn(times, t), word = PIN_WORDS[pin.level.values[i]];
   if (times[i] > t || i + 1 >= times.length) return word;
   const us = (times[i + 1] - times[i]) * 1e6;
   return word + " for " + (us < 1e4 ? us.toFixed(us < 100 ? 2 : 0) + " µs" : (us / 1e3).toFixed(1) + " ms");
