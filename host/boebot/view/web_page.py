@@ -17,13 +17,19 @@ SCRIPTS = (
     "camera.js",  # which part of the arena is seen
     "arena.js",  # what stands and moves in the arena
     "robot.js",  # robots, what their sensors see, their paths
-    "tracks.js",  # signals over time
+    "tracks.js",  # signals over time: which time, its axis, the cursor
+    "lanes.js",  # a lane for each signal
     "panels.js",  # signals at a moment
     "hover.js",  # values under the pointer
     "time.js",  # the moment that is shown: playing, scrubbing
     "main.js",  # puts them together and begins
 )
-LIVE_SCRIPTS = ("live.js", "drive.js", "drag.js")  # of a run that goes on
+LIVE_SCRIPTS = (
+    "live.js",  # the connection, and the newest moment
+    "controls.js",  # pause, speed, restart, parameters, what is told of the run
+    "drive.js",  # by hand
+    "drag.js",  # robots and shapes to other places
+)
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 
 

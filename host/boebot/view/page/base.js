@@ -5,7 +5,15 @@ const LAYER_COLOURS = /*LAYERS*/[];
 const pageIsLive = page === null || page.live !== null;
 
 // What a live page adds to the page of a replay; it puts its own functions here.
-const hooks = { dragging: () => false, grab: () => false, turn: () => {}, key: () => false, drawOver: () => {}, chosen: () => {}, sought: () => {} };
+const hooks = {
+  dragging: () => false,
+  grab: () => false,
+  turn: () => {},
+  key: () => false,
+  drawOver: () => {},
+  chosen: () => {},
+  sought: () => {},
+};
 
 const $ = id => document.getElementById(id);
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
@@ -17,22 +25,52 @@ function element(tag, properties = {}, ...children) {
   made.append(...children);
   return made;
 }
-function row(name, value = "") { // of a panel; returns the row and its right cell
+// Of a panel; returns the row and its right cell.
+function row(name, value = "") {
   const cell = element("span", { textContent: value });
   return [element("div", { className: "row" }, element("span", { textContent: name }), cell), cell];
 }
 // Writes only what is new: a text that is written anew is laid out anew.
-function say(id, text) { const it = $(id); if (it.textContent !== text) it.textContent = text; }
+function say(id, text) {
+  const it = $(id);
+  if (it.textContent !== text) it.textContent = text;
+}
 
 // ---- numbers as text ----
 const minus = text => text.replace("-", "−");
 const signed = v => (v < 0 ? "−" : v > 0 ? "+" : " ") + Math.abs(v).toFixed(2);
-const short = v => Number.isNaN(v) ? "–" : minus(String(Number(v.toPrecision(4))));
-const asPose = p => minus(p[0].toFixed(2)) + ", " + minus(p[1].toFixed(2)) + " m, " + minus((p[2] * 180 / Math.PI).toFixed(0)) + "°";
+const short = v => (Number.isNaN(v) ? "–" : minus(String(Number(v.toPrecision(4)))));
+const asPose = p =>
+  minus(p[0].toFixed(2)) + ", " + minus(p[1].toFixed(2)) + " m, " + minus(((p[2] * 180) / Math.PI).toFixed(0)) + "°";
 
 // ---- the palette of style.py, light or dark, from the CSS variables ----
-const COLOURS = ["paper", "floor", "ink", "faint", "grid", "rule", "accent", "alert", "edge", "solid", "dull", "low", "paint-dark", "paint-bright",
-  "rough", "smooth", "charger", "lamp", "moving", "start", "end", "estimate", "touch", "contact", "body"];
+const COLOURS = [
+  "paper",
+  "floor",
+  "ink",
+  "faint",
+  "grid",
+  "rule",
+  "accent",
+  "alert",
+  "edge",
+  "solid",
+  "dull",
+  "low",
+  "paint-dark",
+  "paint-bright",
+  "rough",
+  "smooth",
+  "charger",
+  "lamp",
+  "moving",
+  "start",
+  "end",
+  "estimate",
+  "touch",
+  "contact",
+  "body",
+];
 const colours = {};
 let readableCache = {};
 function readColours() {
@@ -41,8 +79,9 @@ function readColours() {
   readableCache = {};
 }
 const channels = colour => [1, 3, 5].map(k => parseInt(colour.slice(k, k + 2), 16));
-function luminance(rgb) { // of WCAG
-  const [r, g, b] = rgb.map(v => v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4);
+// Of WCAG.
+function luminance(rgb) {
+  const [r, g, b] = rgb.map(v => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }
 // A colour of robots, behaviors or layers, which are chosen for paper: on a dark floor with as much white as it needs.
@@ -50,6 +89,7 @@ function readable(colour) {
   if (readableCache[colour]) return readableCache[colour];
   const floor = luminance(channels(colours.floor));
   let rgb = channels(colour);
-  if (floor < 0.2) while ((luminance(rgb) + 0.05) / (floor + 0.05) < 4.5) rgb = rgb.map(v => Math.min(255, v + 0.08 * (255 - v) + 1));
-  return readableCache[colour] = "#" + rgb.map(v => Math.round(v).toString(16).padStart(2, "0")).join("");
+  if (floor < 0.2)
+    while ((luminance(rgb) + 0.05) / (floor + 0.05) < 4.5) rgb = rgb.map(v => Math.min(255, v + 0.08 * (255 - v) + 1));
+  return (readableCache[colour] = "#" + rgb.map(v => Math.round(v).toString(16).padStart(2, "0")).join(""));
 }

@@ -2,25 +2,42 @@
 
 function tip(event, lines) {
   const it = $("tip");
-  it.textContent = lines; it.hidden = !lines;
+  it.textContent = lines;
+  it.hidden = !lines;
   if (!lines) return;
-  const x = Math.min(event.clientX + 14, innerWidth - it.offsetWidth - 8), y = event.clientY + 18 + it.offsetHeight > innerHeight ? event.clientY - it.offsetHeight - 12 : event.clientY + 18;
+  const x = Math.min(event.clientX + 14, innerWidth - it.offsetWidth - 8),
+    y = event.clientY + 18 + it.offsetHeight > innerHeight ? event.clientY - it.offsetHeight - 12 : event.clientY + 18;
   it.style.transform = `translate(${Math.max(4, x)}px, ${Math.max(4, y)}px)`;
 }
 function hoverTracks(event) {
-  const t = timeOfPixel(event.offsetX), [from, to] = span();
+  const t = timeOfPixel(event.offsetX),
+    [from, to] = span();
   const box = laneBoxes().find(one => event.offsetY * ratio >= one.top && event.offsetY * ratio < one.top + one.height);
   const inside = event.offsetX >= GUTTER && t >= from && t <= Math.min(to, run.duration);
   hoverTime = inside ? t : null;
-  tip(event, inside ? (to - from < 0.5 ? t.toFixed(5) : t.toFixed(2)) + " s" + (box ? "\n" + box.lane.name + ": " + box.lane.at(t) : "") : box ? box.lane.name : "");
+  tip(
+    event,
+    inside
+      ? (to - from < 0.5 ? t.toFixed(5) : t.toFixed(2)) +
+          " s" +
+          (box ? "\n" + box.lane.name + ": " + box.lane.at(t) : "")
+      : box
+        ? box.lane.name
+        : "",
+  );
   requestDraw();
 }
 const NEAR = 9; // pixels
 function hoverArena(event) {
-  const x = backX(event.offsetX * ratio), y = backY(event.offsetY * ratio), lines = [];
-  runs.forEach((one, i) => { if (one.time.length) lines.push(...aboutRobot(one, i, x, y)); });
+  const x = backX(event.offsetX * ratio),
+    y = backY(event.offsetY * ratio),
+    lines = [];
+  runs.forEach((one, i) => {
+    if (one.time.length) lines.push(...aboutRobot(one, i, x, y));
+  });
   if (!lines.length) lines.push(...aboutPath(x, y));
-  for (const solid of plan.solids) if (solid.remarks && solid.kind !== "outline" && within(solid, x, y)) lines.push(solid.remarks);
+  for (const solid of plan.solids)
+    if (solid.remarks && solid.kind !== "outline" && within(solid, x, y)) lines.push(solid.remarks);
   lines.push(minus(x.toFixed(2)) + ", " + minus(y.toFixed(2)) + " m");
   tip(event, lines.join("\n"));
 }
@@ -29,15 +46,25 @@ function aboutRobot(one, i, x, y) {
   if (Math.hypot(place[0] - x, place[1] - y) > one.robot.radius) return [];
   return [(runs.length > 1 ? "robot " + (i + 1) + ": " : "") + one.brain, "at " + asPose(place)];
 }
-function aboutPath(x, y) { // when the robot was there
+// When the robot was there.
+function aboutPath(x, y) {
   const i = nearestTick(run, x, y);
   if (i < 0) return [];
   return ["here at " + run.time.values[i].toFixed(2) + " s"];
 }
-function nearestTick(one, x, y) { // of the path so far, or of the whole one where that is shown; -1: none is near
-  const [xs, ys] = one.path.map(column => column.values), end = $("whole").checked ? one.last : tickOf(one);
-  let best = (NEAR * ratio / scale) ** 2, found = -1;
-  for (let i = 0; i <= end; i++) { const far = (xs[i] - x) ** 2 + (ys[i] - y) ** 2; if (far < best) { best = far; found = i; } }
+// Of the path so far, or of the whole one where that is shown; -1: none is near.
+function nearestTick(one, x, y) {
+  const [xs, ys] = one.path.map(column => column.values),
+    end = $("whole").checked ? one.last : tickOf(one);
+  let best = ((NEAR * ratio) / scale) ** 2,
+    found = -1;
+  for (let i = 0; i <= end; i++) {
+    const far = (xs[i] - x) ** 2 + (ys[i] - y) ** 2;
+    if (far < best) {
+      best = far;
+      found = i;
+    }
+  }
   return found;
 }
 function within(solid, x, y) {
@@ -45,12 +72,19 @@ function within(solid, x, y) {
   let inside = false;
   solid.points.forEach(([ax, ay], i) => {
     const [bx, by] = solid.points[(i + 1) % solid.points.length];
-    if ((ay > y) !== (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax)) inside = !inside;
+    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) inside = !inside;
   });
   return inside;
 }
 function listenToPointer() {
   $("cursor").addEventListener("pointermove", hoverTracks);
-  $("stage").addEventListener("pointermove", event => { if (fingers.size < 2 && !hooks.dragging()) hoverArena(event); });
-  for (const id of ["cursor", "stage"]) $(id).addEventListener("pointerleave", event => { hoverTime = null; tip(event, ""); requestDraw(); });
+  $("stage").addEventListener("pointermove", event => {
+    if (fingers.size < 2 && !hooks.dragging()) hoverArena(event);
+  });
+  for (const id of ["cursor", "stage"])
+    $(id).addEventListener("pointerleave", event => {
+      hoverTime = null;
+      tip(event, "");
+      requestDraw();
+    });
 }

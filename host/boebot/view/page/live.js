@@ -3,8 +3,12 @@
 
 const FORMAT = 9; // of the data, as in page_data.py
 const RETRY_S = [1, 1, 2, 4, 8]; // from one attempt to connect to the next one
-let socket = null, attempts = 0;
-let live = null, can = new Set(), state = null, ended = null;
+let socket = null;
+let attempts = 0; // to connect again
+let live = null; // what can be done: LIVE of docs/explanation/live-view.md
+let can = new Set();
+let state = null; // how the run is now
+let ended = null; // why it has ended; null: it goes on
 let newest = true; // the newest moment is shown; or one has gone back
 const arrivals = []; // [wall clock, newest time], both in s, of late
 
@@ -14,214 +18,173 @@ function connect() {
   address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
   tellConnection("connecting …");
   socket = new WebSocket(address);
-  socket.onopen = () => { attempts = 0; send({ type: "hello", format: FORMAT }); send({ type: "visible", visible: !document.hidden }); };
-  socket.onmessage = event => { const message = JSON.parse(event.data); receive[message.type]?.(message); };
+  socket.onopen = () => {
+    attempts = 0;
+    send({ type: "hello", format: FORMAT });
+    send({ type: "visible", visible: !document.hidden });
+  };
+  socket.onmessage = event => {
+    const message = JSON.parse(event.data);
+    receive[message.type]?.(message);
+  };
   socket.onclose = disconnected;
 }
 function disconnected(event) {
-  letGo(); setControls(false);
-  if (event.code === 1008 && event.reason) { tellConnection(event.reason, "lost"); return; } // asked again it would say the same
-  if (ended !== null) { tellConnection(endedText() + " boebot has closed this view; what was shown stays here.", "ended"); return; }
-  if (attempts >= RETRY_S.length) { tellConnection("Connection lost: boebot does not answer. Load the page again to try once more.", "lost"); return; }
+  letGo();
+  setControls(false);
+  if (event.code === 1008 && event.reason) {
+    tellConnection(event.reason, "lost"); // asked again it would say the same
+    return;
+  }
+  if (ended !== null) {
+    tellConnection(endedText() + " boebot has closed this view; what was shown stays here.", "ended");
+    return;
+  }
+  if (attempts >= RETRY_S.length) {
+    tellConnection("Connection lost: boebot does not answer. Load the page again to try once more.", "lost");
+    return;
+  }
   tellConnection("Connection lost; trying again …", "lost");
   setTimeout(connect, 1000 * RETRY_S[attempts++]);
 }
-function send(message) { if (socket && socket.readyState === 1) socket.send(JSON.stringify(message)); }
-document.addEventListener("visibilitychange", () => { letGo(); send({ type: "visible", visible: !document.hidden }); });
+function send(message) {
+  if (socket && socket.readyState === 1) socket.send(JSON.stringify(message));
+}
+document.addEventListener("visibilitychange", () => {
+  letGo();
+  send({ type: "visible", visible: !document.hidden });
+});
 
 const receive = {
   run(content) {
     const chosen = run ? runs.indexOf(run) : 0;
-    live = content.live || { can: [], robots: [] }; can = new Set(live.can); ended = null; newest = true; arrivals.length = 0;
-    $("print").textContent = ""; hide("printed", true); say("event", "");
+    live = content.live || { can: [], robots: [] };
+    can = new Set(live.can);
+    ended = null;
+    newest = true;
+    arrivals.length = 0;
+    $("print").textContent = "";
+    hide("printed", true);
+    say("event", "");
     begin(content);
-    run = runs[Math.min(chosen, runs.length - 1)]; now = run.duration;
-    makeControls(); fitted = true; spanLength ??= 20; spanBegin = 0;
+    run = runs[Math.min(chosen, runs.length - 1)];
+    now = run.duration;
+    makeControls();
+    fitted = true;
+    spanLength ??= 20;
+    spanBegin = 0;
     chooseRobot(runs.indexOf(run));
     setControls(true);
-    if (!ticking) { ticking = true; requestAnimationFrame(tick); }
+    if (!ticking) {
+      ticking = true;
+      requestAnimationFrame(tick);
+    }
   },
   chunk(message) {
-    message.runs.forEach((rows, k) => runs[k].append(rows));
+    message.runs.forEach((rows, k) => {
+      runs[k].placed = null;
+      runs[k].append(rows);
+    });
     message.moving.forEach((rows, k) => moving[k].append(rows));
     arrivals.push([performance.now() / 1000, run.duration]);
     while (arrivals.length > 2 && arrivals.at(-1)[0] - arrivals[0][0] > 1) arrivals.shift();
-    growBounds(); makeShown(); tellPrinted(message.printed);
+    growBounds();
+    makeShown();
+    tellPrinted(message.printed);
     receive.state(message);
   },
-  state(message) { state = message.state; tellState(); },
-  end(message) {
-    ended = message.ended;
-    message.tables.forEach((table, k) => { if (table) runs[k].table = table; });
-    makeFigures(); letGo(); setControls(message.again);
+  state(message) {
+    state = message.state;
+    if (message.type === "state" && state.paused) {
+      // what has been put elsewhere meanwhile is there now
+      state.robots.forEach((robot, k) => {
+        runs[k].placed = robot.pose ?? null;
+      });
+      requestDraw();
+    }
     tellState();
   },
-  refused(message) { notice(message.sentence); },
+  end(message) {
+    ended = message.ended;
+    message.tables.forEach((table, k) => {
+      if (table) runs[k].table = table;
+    });
+    makeFigures();
+    letGo();
+    setControls(message.again);
+    tellState();
+  },
+  refused(message) {
+    notice(message.sentence);
+  },
 };
-function endedText() { return ended === "complete" ? "The run is over." : "The run has ended: " + ended + (/[.!]$/.test(ended) ? "" : "."); }
+function endedText() {
+  return ended === "complete" ? "The run is over." : "The run has ended: " + ended + (/[.!]$/.test(ended) ? "" : ".");
+}
 
 // ---- the newest moment, about a chunk behind what has come: so poses in between are known and the robot moves evenly ----
-let ticking = false, tickedAt = 0, tracksAt = 0;
-function rateOfLate() { // simulated seconds per second of the wall clock, and seconds per chunk
+let ticking = false;
+let tickedAt = 0;
+let tracksAt = 0;
+// Simulated seconds per second of the wall clock, and seconds per chunk.
+function rateOfLate() {
   if (arrivals.length < 2) return [0, 0];
   const [first, last] = [arrivals[0], arrivals.at(-1)];
   return [(last[1] - first[1]) / Math.max(1e-3, last[0] - first[0]), (last[1] - first[1]) / (arrivals.length - 1)];
 }
 function tick(stamp) {
   requestAnimationFrame(tick);
-  const passed = Math.min(0.2, Math.max(0, (stamp - tickedAt) / 1000)), before = now;
+  const passed = Math.min(0.2, Math.max(0, (stamp - tickedAt) / 1000)),
+    before = now;
   tickedAt = stamp;
   if (!run || !run.time.length) return;
   if (newest) now = nextMoment(passed);
-  if (stamp - tracksAt > 250 && (now !== before || !newest)) { tracksAt = stamp; tracksDirty ||= run.duration !== drawnDuration; tellTime(); }
+  if (stamp - tracksAt > 250 && (now !== before || !newest)) {
+    tracksAt = stamp;
+    tracksDirty ||= run.duration !== drawnDuration;
+    tellTime();
+  }
   if (now !== before || drawAsked || tracksDirty) draw(true);
 }
 let drawnDuration = -1;
 function nextMoment(passed) {
-  const [rate, chunk] = rateOfLate(), head = run.duration;
-  if (ended !== null || !arrivals.length || state && state.paused) return Math.min(head, now + Math.max(0.02, (head - now) * 8 * passed)); // up to the very last
-  const since = performance.now() / 1000 - arrivals.at(-1)[0], goal = head + rate * Math.min(since, 0.2) - 1.6 * chunk;
+  const [rate, chunk] = rateOfLate(),
+    head = run.duration;
+  if (ended !== null || !arrivals.length || (state && state.paused))
+    return Math.min(head, now + Math.max(0.02, (head - now) * 8 * passed)); // up to the very last
+  const since = performance.now() / 1000 - arrivals.at(-1)[0],
+    goal = head + rate * Math.min(since, 0.2) - 1.6 * chunk;
   if (Math.abs(goal - now) > 6 * chunk + 0.3 * rate) return Math.max(0, Math.min(head, goal)); // far off: at once
   return Math.min(head, Math.max(now, now + passed * rate + (goal - now) * Math.min(1, 4 * passed)));
 }
-function tellTime() { drawnDuration = run.duration; $("slider").max = run.last; $("cursor").ariaValueMax = run.duration.toFixed(2); }
+function tellTime() {
+  drawnDuration = run.duration;
+  $("slider").max = run.last;
+  $("cursor").ariaValueMax = run.duration.toFixed(2);
+}
 hooks.sought = () => setNewest(false);
 function setNewest(on) {
-  newest = on; $("newest").ariaPressed = String(on);
-  if (on) { letGoOfDrag(); now = run.duration; trailChanged(); requestDraw(); }
+  newest = on;
+  $("newest").ariaPressed = String(on);
+  if (on) {
+    letGoOfDrag();
+    now = run.duration;
+    trailChanged();
+    requestDraw();
+  }
 }
-function growBounds() { // in an open field a robot may leave what is seen
-  const [x0, y0, x1, y1] = bounds, edge = 0.1 * (x1 - x0);
+// In an open field a robot may leave what is seen.
+function growBounds() {
+  const [x0, y0, x1, y1] = bounds,
+    edge = 0.1 * (x1 - x0);
   for (const one of runs) {
-    const x = one.path[0].last, y = one.path[1].last;
+    const x = one.path[0].last,
+      y = one.path[1].last;
     if (x > x0 && x < x1 && y > y0 && y < y1) continue;
     bounds = [Math.min(x0, x - edge), Math.min(y0, y - edge), Math.max(x1, x + edge), Math.max(y1, y + edge)];
-    if (fitted) { fitView(); viewChanged(); }
+    if (fitted) {
+      fitView();
+      viewChanged();
+    }
   }
 }
-
-// ---- controls: only what can be done ----
-function makeControls() {
-  const make = (id, text, title, onclick, more = {}) => element("button", { id, textContent: text, title, onclick, className: "live", ...more });
-  document.querySelectorAll("#controls .live, #tools .live").forEach(it => it.remove());
-  hide("play", true); hide("wholeLabel", true); hide("speedLabel", !can.has("speed"));
-  const buttons = [];
-  if (can.has("hand")) buttons.push(make("stop", "Stop", "Emergency stop of this robot (space)", stopRobot, { className: "live alert" }));
-  if (can.has("pause")) buttons.push(make("pause", "Pause", "Pause the run, or go on", () => send({ type: state && state.paused ? "resume" : "pause" }), { className: "live main" }));
-  if (can.has("step")) buttons.push(make("step", "Step", "One step of the brain, then pause", () => { setNewest(true); send({ type: "step" }); }));
-  if (can.has("restart")) buttons.push(make("restart", "Restart …", "Begin the run anew", askRestart));
-  $("controls").prepend(...buttons);
-  $("clock").after(make("newest", "Live", "Show the newest moment (End)", () => setNewest(true), { ariaPressed: "true" }));
-  if (can.has("drag")) $("tools").append(make("move", "move", "Move a robot or a shape (M); or drag it", pickUp));
-  if (can.has("speed")) makeSpeeds();
-  makeDrive();
-}
-const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
-function makeSpeeds() {
-  $("speed").replaceChildren(...SPEEDS.map(v => element("option", { value: v, textContent: v + " ×" })), element("option", { value: "", textContent: "as fast as possible" }));
-  $("speed").onchange = () => send({ type: "speed", speed: $("speed").value === "" ? null : Number($("speed").value) });
-}
-function tellSpeed() {
-  if (!can.has("speed") || document.activeElement === $("speed")) return;
-  const value = state.speed === null ? "" : String(state.speed);
-  if (![...$("speed").options].some(option => option.value === value)) $("speed").append(element("option", { value, textContent: value + " ×" }));
-  $("speed").value = value;
-}
-function setControls(on) { // off: nothing can be asked for, except another run where there may be one
-  const again = ended !== null && on;
-  document.querySelectorAll(".live, #speed, #drive button, #drive input, #parameters input").forEach(it => {
-    it.disabled = it.id === "newest" ? false : it.id === "restart" ? !(on || again) : !on || ended !== null;
-  });
-}
-
-// ---- another run ----
-function askRestart() {
-  const seed = element("input", { type: "number", id: "seed", min: 0, step: 1, value: live.seed ?? 0 });
-  const boxes = (live.imperfections || []).map(one => element("input", { type: "checkbox", name: one.name, checked: !one.off }));
-  const rows = (live.imperfections || []).map((one, k) => element("label", { className: "choice", title: one.text || "" }, boxes[k], element("span", {}, element("b", { textContent: one.name }), " " + (one.text || ""))));
-  const dialog = element("dialog", { id: "restartDialog", ariaLabel: "Restart" });
-  const go = () => { send({ type: "restart", seed: Math.max(0, Math.round(Number(seed.value) || 0)), without: boxes.filter(box => !box.checked).map(box => box.name) }); dialog.close(); };
-  const buttons = element("div", { className: "buttons" }, element("button", { textContent: "Cancel", type: "button", onclick: () => dialog.close() }), element("button", { textContent: "Restart", className: "main" }));
-  const seeds = element("div", { className: "seed" }, element("label", { textContent: "seed ", htmlFor: "seed" }), seed,
-    element("button", { textContent: "another", type: "button", onclick: () => { seed.value = Math.floor(Math.random() * 1e6); } }));
-  const form = element("form", { onsubmit: event => { event.preventDefault(); go(); } }, element("h2", { textContent: "Begin the run anew" }), seeds,
-    ...(rows.length ? [element("h3", { textContent: "Imperfections of the simulated robot" }), element("div", { className: "choices" }, ...rows)] : []), buttons);
-  dialog.append(form); dialog.onclose = () => dialog.remove();
-  document.body.append(dialog); dialog.showModal(); seed.focus();
-}
-
-// ---- what is told of the run ----
-function tellConnection(text, kind = "") { // screen readers hear it where it is of another kind, not with each new rate
-  const it = $("connection");
-  if (it.dataset.kind !== kind) say("announced", text);
-  it.hidden = false; it.dataset.kind = kind; say("connection", text);
-}
-function tellState() {
-  if (ended !== null) tellConnection(endedText(), "ended");
-  else if (state) {
-    const rate = state.paused ? "paused" : "live, " + (state.rate < 9.95 ? state.rate.toFixed(1) : state.rate.toFixed(0)) + " × real time";
-    tellConnection([rate, state.touched ? "touched: " + state.touched : ""].filter(Boolean).join("  ·  "), state.paused ? "paused" : "live");
-  }
-  if (!state) return;
-  if ($("pause")) { const text = state.paused ? "Resume" : "Pause"; if ($("pause").textContent !== text) $("pause").textContent = text; }
-  tellSpeed(); tellDrive(); tellParameters(); tellLink();
-}
-function notice(sentence) {
-  const it = $("notice");
-  it.textContent = sentence; it.hidden = false;
-  clearTimeout(notice.timer); notice.timer = setTimeout(() => { it.hidden = true; }, 6000);
-}
-const PRINTED = 20000; // letters that stay
-function tellPrinted(text) {
-  if (!text) return;
-  const it = $("print"), atEnd = it.scrollTop + it.clientHeight > it.scrollHeight - 8;
-  it.textContent = (it.textContent + text).slice(-PRINTED); hide("printed", false);
-  if (atEnd) it.scrollTop = it.scrollHeight;
-}
-function robotState() { return state && state.robots && state.robots[runs.indexOf(run)] || {}; }
-let linkCells = null;
-function tellLink() {
-  const { link, load } = robotState();
-  hide("linkCard", !link && load == null);
-  if (!link && load == null) return;
-  if (!linkCells) {
-    linkCells = Object.fromEntries(["lost frames", "damaged frames", "round trip", "sessions lost", "resets", "load of the tick"].map(name => [name, row(name, " ")]));
-    $("linkCard").append(...Object.values(linkCells).map(([it]) => it));
-  }
-  const values = { "lost frames": link?.lost, "damaged frames": link?.bad, "round trip": link?.round_trip == null ? null : (1000 * link.round_trip).toFixed(1) + " ms",
-    "sessions lost": link?.sessions_lost, resets: link?.resets, "load of the tick": load == null ? null : (100 * load).toFixed(0) + " %" };
-  for (const [name, [it, cell]] of Object.entries(linkCells)) { it.hidden = values[name] == null; cell.textContent = values[name] ?? ""; }
-}
-
-// ---- a brain's parameters ----
-let sliders = [];
-function makeParameters() {
-  const list = live && live.robots[runs.indexOf(run)]?.parameters || [];
-  hide("parameters", !can.has("parameters") || !list.length);
-  sliders = list.map(makeSlider);
-  $("parameters").replaceChildren($("parameters").querySelector("h2"), ...sliders.map(one => one.whole));
-}
-function makeSlider(parameter) {
-  const range = parameter.least != null && parameter.most != null, output = element("span", { className: "value" });
-  const input = element("input", range ? { type: "range", min: parameter.least, max: parameter.most, step: "any" } : { type: "number", step: "any" });
-  const one = { parameter, input, output, changed: -Infinity, due: null };
-  input.value = parameter.value; input.ariaLabel = parameter.name + (parameter.unit ? ", " + parameter.unit : "");
-  input.oninput = () => { one.changed = performance.now(); tellSlider(one); sendSoon(one); };
-  one.whole = element("label", { className: "parameter", title: parameter.text || "" }, element("span", { textContent: parameter.name }), output, input);
-  tellSlider(one);
-  return one;
-}
-function tellSlider({ parameter, input, output }) { output.textContent = short(Number(input.value)) + (parameter.unit ? " " + parameter.unit : ""); }
-function sendSoon(one) { // ten times a second at most, and the last value surely
-  const robot = runs.indexOf(run);
-  one.due ??= setTimeout(() => { one.due = null; send({ type: "parameter", robot, name: one.parameter.name, value: Number(one.input.value) }); }, 100);
-}
-function tellParameters() {
-  const values = robotState().parameters || {};
-  for (const one of sliders) {
-    const value = values[one.parameter.name];
-    if (value === undefined || performance.now() - one.changed < 1000 || Number(one.input.value) === value) continue;
-    one.input.value = value; tellSlider(one);
-  }
-}
-hooks.chosen = () => { makeParameters(); if (state) tellState(); };

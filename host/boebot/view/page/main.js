@@ -2,15 +2,30 @@
 
 function start() {
   readColours();
-  listenToArena(); listenToTracks(); listenToPointer(); listenToTime();
-  addEventListener("resize", () => { if (run) resize(); });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { readColours(); if (run) { namesShown = -1; makePanels(); viewChanged(); tracksChanged(); } });
-  if (pageIsLive) connect(); else show(page);
+  listenToArena();
+  listenToTracks();
+  listenToPointer();
+  listenToTime();
+  addEventListener("resize", () => {
+    if (run) resize();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    readColours();
+    if (run) {
+      namesShown = -1;
+      makePanels();
+      viewChanged();
+      tracksChanged();
+    }
+  });
+  if (pageIsLive) connect();
+  else show(page);
 }
 // #t=12.3 in the address opens the page at that moment, #robot=2&t=12.3 with another robot's signals.
 function show(content) {
   begin(content);
-  const chosen = Number((/[#&]robot=(\d+)/.exec(location.hash) || [0, 1])[1]), at = /[#&]t=([\d.]+)/.exec(location.hash);
+  const chosen = Number((/[#&]robot=(\d+)/.exec(location.hash) || [0, 1])[1]),
+    at = /[#&]t=([\d.]+)/.exec(location.hash);
   run = runs[Math.min(runs.length, Math.max(1, chosen)) - 1];
   now = at ? Math.min(run.duration, Number(at[1])) : 0;
   chooseRobot(runs.indexOf(run));

@@ -1,23 +1,42 @@
 // The moment that is shown: playing, scrubbing, going from event to event, by mouse and by keys; and drawing it.
 
-let playing = false, previous = null; // stamp of the last frame that was played
-let floorDirty = true, drawAsked = false;
+let playing = false;
+let previous = null; // stamp of the last frame that was played
+let floorDirty = true;
+let drawAsked = false;
 
 // ---- drawing: each part only if it has changed ----
 function requestDraw() {
   if (drawAsked) return;
   drawAsked = true;
-  requestAnimationFrame(() => { if (drawAsked) draw(); });
+  requestAnimationFrame(() => {
+    if (drawAsked) draw();
+  });
 }
-function viewChanged() { floorDirty = true; trailChanged(); requestDraw(); }
+function viewChanged() {
+  floorDirty = true;
+  trailChanged();
+  requestDraw();
+}
 const TELL_MS = 60; // numbers that change faster cannot be read
 let toldAt = 0;
-function draw(inMotion = false) { // in motion: as one of many frames
+// In motion: as one of many frames.
+function draw(inMotion = false) {
   drawAsked = false;
   if (!run || !run.time.length) return;
-  if (following) { const [x, y] = placeOf(run); centre(x, y); floorDirty = true; trailChanged(); }
-  if (floorDirty) { drawFloor(); floorDirty = false; $("stage").classList.toggle("zoomed", !fitted); }
-  drawTrail(); drawStage();
+  if (following) {
+    const [x, y] = placeOf(run);
+    centre(x, y);
+    floorDirty = true;
+    trailChanged();
+  }
+  if (floorDirty) {
+    drawFloor();
+    floorDirty = false;
+    $("stage").classList.toggle("zoomed", !fitted);
+  }
+  drawTrail();
+  drawStage();
   keepCursorInside();
   if (tracksDirty) drawTracks();
   drawCursor();
@@ -25,42 +44,60 @@ function draw(inMotion = false) { // in motion: as one of many frames
   toldAt = performance.now();
   tellMoment();
   $("slider").value = tickOf(run);
-  $("cursor").ariaValueNow = now.toFixed(2); $("cursor").ariaValueText = $("slider").ariaValueText = now.toFixed(2) + " seconds";
+  $("cursor").ariaValueNow = now.toFixed(2);
+  $("cursor").ariaValueText = $("slider").ariaValueText = now.toFixed(2) + " seconds";
 }
 
 // ---- playing and scrubbing ----
 function setPlaying(on) {
   if (on && now >= run.duration) now = 0;
-  playing = on; previous = null; $("play").textContent = on ? "Pause" : "Play";
+  playing = on;
+  previous = null;
+  $("play").textContent = on ? "Pause" : "Play";
   if (on) requestAnimationFrame(advance);
 }
 function advance(stamp) {
   if (!playing) return;
-  if (previous !== null) now = Math.min(run.duration, now + (stamp - previous) / 1000 * Number($("speed").value));
+  if (previous !== null) now = Math.min(run.duration, now + ((stamp - previous) / 1000) * Number($("speed").value));
   previous = stamp;
   draw(now < run.duration);
-  if (now >= run.duration) setPlaying(false); else requestAnimationFrame(advance);
+  if (now >= run.duration) setPlaying(false);
+  else requestAnimationFrame(advance);
 }
-function seek(t) { hooks.sought(); now = Math.max(0, Math.min(run.duration, t)); draw(); }
+function seek(t) {
+  hooks.sought();
+  now = Math.max(0, Math.min(run.duration, t));
+  draw();
+}
 function goToEvent(forward) {
-  const found = forward ? run.events.find(event => event.time > now + 5e-3) : run.events.findLast(event => event.time < now - 5e-3);
+  const found = forward
+    ? run.events.find(event => event.time > now + 5e-3)
+    : run.events.findLast(event => event.time < now - 5e-3);
   if (found) seek(found.time);
   say("event", found ? eventText(found) : forward ? "no event after this" : "no event before this");
 }
-function chooseRobot(index) { // the same moment, seen from another robot
+// The same moment, seen from another robot.
+function chooseRobot(index) {
   const moment = now + run.begin;
-  run = runs[index]; now = Math.max(0, Math.min(run.duration, moment - run.begin));
-  $("slider").max = run.last; $("cursor").ariaValueMax = run.duration;
-  makePanels(); hooks.chosen();
+  run = runs[index];
+  now = Math.max(0, Math.min(run.duration, moment - run.begin));
+  $("slider").max = run.last;
+  $("cursor").ariaValueMax = run.duration;
+  makePanels();
+  hooks.chosen();
   resize();
 }
 
 // ---- keys ----
-const STEP = 0.05, LEAP = 5; // s
-function replayKey(e) { // true: it was one of them
+const STEP = 0.05;
+const LEAP = 5; // s
+// True: it was one of them.
+function replayKey(e) {
   const step = e.shiftKey ? LEAP : STEP;
-  if (e.key === " ") { if (e.target.tagName === "BUTTON") return false; setPlaying(!playing); } // a button takes it for itself
-  else if (e.key === "ArrowLeft") seek(now - step);
+  if (e.key === " ") {
+    if (e.target.tagName === "BUTTON") return false; // it takes it for itself
+    setPlaying(!playing);
+  } else if (e.key === "ArrowLeft") seek(now - step);
   else if (e.key === "ArrowRight") seek(now + step);
   else if (e.key === "Home") seek(0);
   else if (e.key === "End") seek(run.duration);
@@ -76,13 +113,20 @@ function onKey(e) {
   if (tagName === "SELECT" || type === "number" || tagName === "PRE" || document.querySelector("dialog[open]")) return;
   if (type === "range" && id !== "slider" && e.key !== " ") return;
   if (id === "panels" && SCROLL_KEYS.includes(e.key)) return;
-  if (e.target === $("cursor") && (e.key === "+" || e.key === "-")) { e.preventDefault(); zoomTime(e.key === "+" ? 0.5 : 2); return; }
+  if (e.target === $("cursor") && (e.key === "+" || e.key === "-")) {
+    e.preventDefault();
+    zoomTime(e.key === "+" ? 0.5 : 2);
+    return;
+  }
   if (hooks.key(e) || arenaKey(e) || replayKey(e)) e.preventDefault();
 }
 function listenToTime() {
   $("play").onclick = () => setPlaying(!playing);
   $("slider").oninput = () => seek(run.time.values[$("slider").value]);
-  $("whole").onchange = () => { trailChanged(); draw(); };
+  $("whole").onchange = () => {
+    trailChanged();
+    draw();
+  };
   $("before").onclick = () => goToEvent(false);
   $("after").onclick = () => goToEvent(true);
   $("robot").onchange = e => chooseRobot(Number(e.target.value) - 1);

@@ -1,21 +1,25 @@
 // Signals over time in lanes under a time axis: the canvas "tracks" (drawn when time goes beyond it, or there is more to
-// show) and above it the canvas "cursor". A lane has a name, a height in pixels, `draw`, `at`, its value as text, and maybe `label`, which writes its scale.
+// show) and above it the canvas "cursor". What is in the lanes: lanes.js.
 
-const GUTTER = 112, AXIS = 20, RIGHT = 10;
-const HEIGHTS = { events: 20, utility: 112, signal: 42, ping: 40, curve: 36, flags: 19, pin: 19 };
-const CURVES = 4; // of the numbers that the brain shows have a lane; the others are in the list only
+const [GUTTER, AXIS, RIGHT] = [112, 20, 10]; // pixels: of names at the left, of the time above, free at the right
 const SHORTEST = 1e-3; // s, of the time that is shown
 let lanes = [];
 let tracksDirty = true;
-let spanLength = null, spanBegin = 0; // the time that is shown, in s; null: the whole run
-function tracksChanged() { tracksDirty = true; requestDraw(); }
+let spanLength = null; // of the time that is shown, in s; null: the whole run
+let spanBegin = 0;
+function tracksChanged() {
+  tracksDirty = true;
+  requestDraw();
+}
 
 // ---- which time is shown ----
-function span() { // from, to (s)
-  if (spanLength === null || spanLength >= run.duration && !pageIsLive) return [0, Math.max(run.duration, SHORTEST)];
+// From, to (s).
+function span() {
+  if (spanLength === null || (spanLength >= run.duration && !pageIsLive)) return [0, Math.max(run.duration, SHORTEST)];
   return [spanBegin, spanBegin + spanLength];
 }
-function keepCursorInside() { // as paper that is turned over: half of what was shown stays
+// As paper that is turned over: half of what was shown stays.
+function keepCursorInside() {
   if (spanLength === null) return;
   const before = spanBegin;
   if (now > spanBegin + spanLength) spanBegin = now - spanLength / 2;
@@ -25,271 +29,137 @@ function keepCursorInside() { // as paper that is turned over: half of what was 
   if (spanBegin !== before) tracksDirty = true;
 }
 function zoomTime(factor, about = now) {
-  const [from, to] = span(), length = Math.max(SHORTEST, (to - from) * factor);
+  const [from, to] = span(),
+    length = Math.max(SHORTEST, (to - from) * factor);
   if (length >= run.duration && !pageIsLive) spanLength = null;
   else {
-    spanLength = length; spanBegin = Math.max(0, about - (about - from) / (to - from) * length);
+    spanLength = length;
+    spanBegin = Math.max(0, about - ((about - from) / (to - from)) * length);
     spanBegin = pageIsLive ? spanBegin : Math.min(spanBegin, run.duration - length);
   }
   tracksChanged();
 }
 
-// ---- lanes ----
-function makeLanes() {
-  lanes = [{ name: "events", height: HEIGHTS.events, draw: drawEvents, at: eventAt }];
-  if (run.mind) lanes.push({ name: "utility", height: HEIGHTS.utility, draw: drawUtilities, label: labelUtilities, at: utilityAt });
-  lanes.push({ name: "motors", height: HEIGHTS.signal, draw: drawSignals, label: labelSignals, at: signalsAt });
-  if (run.has("ping")) lanes.push({ name: "Ping", height: HEIGHTS.ping, draw: drawPing, label: (c, box) => write(c, box, farthestEcho().toFixed(1) + " m", 0.5), at: t => pingText(tickAt(t)) });
-  if (run.has("infrared_left") || run.has("infrared_right")) lanes.push(flagsLane("IR", 4, 8, "charger", ["left", "right"]));
-  if (run.has("whisker_left") || run.has("whisker_right")) lanes.push(flagsLane("whiskers", 1, 2, "touch", ["left", "right"]));
-  if (run.known) lanes.push(flagsLane("true contact", CONTACT_BIT, 0, "estimate", ["contact"]));
-  if (run.load) lanes.push({ name: "load of tick", height: HEIGHTS.curve, draw: drawLoad, label: (c, box) => write(c, box, "100 %", 0.2), at: t => (100 * run.load.values[tickAt(t)]).toFixed(0) + " %" });
-  for (const one of run.numbers.slice(0, CURVES))
-    lanes.push({ name: one.name, height: HEIGHTS.curve, draw: (c, box) => drawShown(c, box, one.values.values), label: (c, box) => labelShown(c, box, one.values.values), at: t => shownText(one, t) });
-  for (const pin of run.pins) lanes.push({ name: pin.name, height: HEIGHTS.pin, draw: (c, box) => drawPin(c, box, pin), at: t => pinText(pin, t) });
-  $("signals").style.setProperty("--height", AXIS + lanes.reduce((sum, lane) => sum + lane.height, 0) + "px");
-}
-const flagsLane = (name, first, second, colour, words) => ({
-  name, height: HEIGHTS.flags,
-  draw(c, box) { drawFlags(c, box, first, second ? 0.16 : 0.22, second ? 0.3 : 0.56, colours[colour]); if (second) drawFlags(c, box, second, 0.56, 0.3, colours[colour]); },
-  at(t) { const bits = run.flags.values[tickAt(t)]; return [first, second].map((bit, k) => bits & bit ? words[k] : "").filter(Boolean).join(" and ") || "none"; },
-});
-const tickAt = t => indexIn(run.time.values, t);
-const inGutter = name => name.length > 14 ? name.slice(0, 13) + "…" : name;
-
 // ---- drawing them ----
-function laneBoxes() { // where each lane is, in pixels of the canvas
-  const [from, to] = span(), left = GUTTER * ratio, right = $("tracks").width - RIGHT * ratio, width = right - left;
+// Where each lane is, in pixels of the canvas.
+function laneBoxes() {
+  const [from, to] = span(),
+    left = GUTTER * ratio,
+    right = $("tracks").width - RIGHT * ratio,
+    width = right - left;
   let top = AXIS * ratio;
   return lanes.map(lane => {
-    const height = lane.height * ratio, px = t => left + (t - from) / (to - from) * width;
+    const height = lane.height * ratio,
+      px = t => left + ((t - from) / (to - from)) * width;
     const box = { lane, top, height, middle: top + height / 2, left, right, width, from, to, px };
     top += height;
     return box;
   });
 }
-const timeOfPixel = offsetX => { // of the pointer
-  const [from, to] = span(), width = $("cursor").clientWidth - GUTTER - RIGHT;
-  return from + (offsetX - GUTTER) / width * (to - from);
+const timeOfPixel = offsetX => {
+  // of the pointer
+  const [from, to] = span(),
+    width = $("cursor").clientWidth - GUTTER - RIGHT;
+  return from + ((offsetX - GUTTER) / width) * (to - from);
 };
 function drawTracks() {
-  const canvas = $("tracks"), c = canvas.getContext("2d");
+  const canvas = $("tracks"),
+    c = canvas.getContext("2d");
   c.clearRect(0, 0, canvas.width, canvas.height);
   drawAxis(c);
   for (const box of laneBoxes()) {
-    c.strokeStyle = colours.grid; c.lineWidth = ratio; c.beginPath(); c.moveTo(0, box.top); c.lineTo(canvas.width, box.top); c.stroke();
-    c.fillStyle = colours.faint; font(c, 11.5); c.textBaseline = "middle"; c.textAlign = "left";
+    c.strokeStyle = colours.grid;
+    c.lineWidth = ratio;
+    c.beginPath();
+    c.moveTo(0, box.top);
+    c.lineTo(canvas.width, box.top);
+    c.stroke();
+    c.fillStyle = colours.faint;
+    font(c, 11.5);
+    c.textBaseline = "middle";
+    c.textAlign = "left";
     c.fillText(inGutter(box.lane.name), 8 * ratio, box.middle);
-    c.textAlign = "right"; font(c, 10); box.lane.label?.(c, box);
-    c.save(); c.beginPath(); c.rect(box.left, box.top, box.width, box.height); c.clip();
+    c.textAlign = "right";
+    font(c, 10);
+    box.lane.label?.(c, box);
+    c.save();
+    c.beginPath();
+    c.rect(box.left, box.top, box.width, box.height);
+    c.clip();
     box.lane.draw(c, box);
     c.restore();
   }
   tracksDirty = false;
 }
-const TIME_STEPS = [1, 2, 5].flatMap(k => [-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5].map(e => k * 10 ** e)).sort((a, b) => a - b);
+const TIME_STEPS = [1, 2, 5]
+  .flatMap(k => [-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5].map(e => k * 10 ** e))
+  .sort((a, b) => a - b);
 function drawAxis(c) {
-  const [from, to] = span(), left = GUTTER * ratio, right = $("tracks").width - RIGHT * ratio, width = right - left;
-  const step = TIME_STEPS.find(one => one / (to - from) * width >= 62 * ratio) || 1e6, digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  font(c, 11); c.textBaseline = "middle"; c.textAlign = "center"; c.lineWidth = ratio;
-  c.fillStyle = colours.faint; c.strokeStyle = colours.grid;
+  const [from, to] = span(),
+    left = GUTTER * ratio,
+    right = $("tracks").width - RIGHT * ratio,
+    width = right - left;
+  const step = TIME_STEPS.find(one => (one / (to - from)) * width >= 62 * ratio) || 1e6,
+    digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  font(c, 11);
+  c.textBaseline = "middle";
+  c.textAlign = "center";
+  c.lineWidth = ratio;
+  c.fillStyle = colours.faint;
+  c.strokeStyle = colours.grid;
   for (let k = Math.ceil(from / step - 1e-9); k * step <= to; k++) {
-    const x = left + (k * step - from) / (to - from) * width;
-    c.beginPath(); c.moveTo(x, AXIS * ratio - 4 * ratio); c.lineTo(x, $("tracks").height); c.stroke();
-    if (x < right - 12 * ratio) c.fillText((k * step).toFixed(digits), x, AXIS * ratio / 2);
+    const x = left + ((k * step - from) / (to - from)) * width;
+    c.beginPath();
+    c.moveTo(x, AXIS * ratio - 4 * ratio);
+    c.lineTo(x, $("tracks").height);
+    c.stroke();
+    if (x < right - 12 * ratio) c.fillText((k * step).toFixed(digits), x, (AXIS * ratio) / 2);
   }
-  c.textAlign = "left"; c.fillText("time, s", 8 * ratio, AXIS * ratio / 2);
+  c.textAlign = "left";
+  c.fillText("time, s", 8 * ratio, (AXIS * ratio) / 2);
 }
-// A line through values; where there are many for a pixel, from the least to the greatest of each pixel.
-function drawCurve(c, box, times, values, y) {
-  const first = indexIn(times, box.from), end = Math.min(values.length - 1, indexIn(times, box.to) + 1);
-  c.beginPath();
-  if (end - first < 3 * box.width) {
-    for (let i = first; i <= end; i++) i === first ? c.moveTo(box.px(times[i]), y(values[i])) : c.lineTo(box.px(times[i]), y(values[i]));
-  } else {
-    const each = Math.ceil((end - first) / box.width);
-    for (let i = first; i <= end; i += each) {
-      let least = values[i], most = values[i];
-      for (let j = i; j < Math.min(end + 1, i + each); j++) { least = Math.min(least, values[j]); most = Math.max(most, values[j]); }
-      const x = box.px(times[i]); i === first ? c.moveTo(x, y(least)) : c.lineTo(x, y(least)); c.lineTo(x, y(most));
-    }
-  }
-  c.stroke();
-}
-const write = (c, box, text, at) => c.fillText(text, box.left - 5 * ratio, box.top + at * box.height); // of the scale, beside the lane
-const SIGNALS = [["L", "left", "end"], ["R", "right", "estimate"]];
-function drawSignals(c, box) {
-  const y = v => box.middle - v * box.height * 0.42;
-  c.lineWidth = 1.2 * ratio;
-  for (const [, name, colour] of SIGNALS) { c.strokeStyle = colours[colour]; drawCurve(c, box, run.time.values, run[name].values, y); }
-}
-function labelSignals(c, box) {
-  font(c, 11.5); c.textAlign = "left";
-  SIGNALS.forEach(([sign, , colour], k) => { c.fillStyle = colours[colour]; c.fillText(sign, box.left - (30 - 12 * k) * ratio, box.middle); });
-}
-const signalsAt = t => "left " + signed(run.left.values[tickAt(t)]) + ", right " + signed(run.right.values[tickAt(t)]);
-function drawLoad(c, box) {
-  c.strokeStyle = colours.end; c.lineWidth = 1.2 * ratio;
-  drawCurve(c, box, run.time.values, run.load.values, v => box.top + box.height * (0.94 - 0.86 * Math.min(1, v)));
-}
-const farthestEcho = () => run.ping.values.reduce((a, b) => Math.max(a, b), 0.1);
-function drawPing(c, box) {
-  const times = run.time.values, far = farthestEcho(), end = Math.min(run.last, indexIn(times, box.to) + 1);
-  c.fillStyle = colours.end; c.globalAlpha = 0.7;
-  for (let i = indexIn(times, box.from); i <= end; i++) {
-    if (run.ping.values[i] <= 0) continue;
-    const x = box.px(times[i]), wide = i < run.last ? box.px(times[i + 1]) - x : ratio;
-    c.fillRect(x, box.top + box.height * (0.94 - 0.86 * run.ping.values[i] / far), Math.max(ratio, wide), 1.6 * ratio);
-  }
-  c.globalAlpha = 1;
-}
-function drawFlags(c, box, bit, at, tall, colour) { // a bar while the bit is set
-  const times = run.time.values, flags = run.flags.values, end = Math.min(run.last, indexIn(times, box.to) + 1);
-  c.fillStyle = colour;
-  for (let i = indexIn(times, box.from), begun = -1; i <= end + 1; i++) {
-    const on = i <= end && flags[i] & bit;
-    if (on && begun < 0) begun = i;
-    if (!on && begun >= 0) {
-      c.fillRect(box.px(times[begun]), box.top + box.height * at, Math.max(1.5 * ratio, box.px(times[i - 1]) - box.px(times[begun])), box.height * tall);
-      begun = -1;
-    }
-  }
-}
-// A value that the brain shows, between its least and its greatest; it holds until the next one.
-function extent(values) {
-  let least = Infinity, most = -Infinity;
-  for (const v of values) if (Number.isFinite(v)) { if (v < least) least = v; if (v > most) most = v; }
-  return [least, most];
-}
-function drawShown(c, box, values) {
-  const times = run.shownTime.values, [least, most] = extent(values);
-  const y = v => box.top + box.height * (most > least ? 0.92 - 0.84 * (v - least) / (most - least) : 0.5);
-  c.strokeStyle = colours.charger; c.lineWidth = 1.3 * ratio; c.beginPath();
-  for (let i = indexIn(times, box.from), before = NaN; i < values.length && (times[i] <= box.to || !i); i++) {
-    const v = values[i], from = box.px(times[i]), to = i + 1 < values.length ? box.px(times[i + 1]) : box.px(run.duration);
-    if (!Number.isNaN(v)) { if (Number.isNaN(before)) c.moveTo(from, y(v)); else c.lineTo(from, y(v)); c.lineTo(to, y(v)); }
-    before = v;
-  }
-  c.stroke();
-}
-function labelShown(c, box, values) {
-  const [least, most] = extent(values);
-  if (most > least) { font(c, 9); write(c, box, short(most), 0.22); write(c, box, short(least), 0.8); }
-}
-function shownText(one, t) { // numbers are in a column, texts in a list
-  const i = shownAt(run.shownTime.values, t);
-  if (Array.isArray(one.values)) return i < 0 ? "" : one.values[i] ?? "";
-  return i < 0 ? "–" : short(one.values.values[i] ?? NaN);
-}
-
-// A line for each process, from -1 to 1, and below them a band in the colour of the active motor behavior.
-const utilityShare = u => 0.42 - 0.36 * u; // of the lane's height
-function drawUtilities(c, box) {
-  const times = run.mind.time.values, y = u => box.top + box.height * utilityShare(u);
-  c.strokeStyle = colours.grid; c.lineWidth = ratio;
-  for (const u of [-1, 0, 1]) { c.beginPath(); c.moveTo(box.left, y(u)); c.lineTo(box.right, y(u)); c.stroke(); }
-  c.lineWidth = 0.8 * ratio; c.strokeStyle = colours.faint;
-  for (const process of run.mind.cognitive) drawCurve(c, box, times, process.utility.values, y);
-  c.lineWidth = 1.6 * ratio;
-  for (const behavior of run.mind.behaviors) { c.strokeStyle = readable(behavior.colour); drawCurve(c, box, times, behavior.utility.values, y); }
-  drawBand(c, box, times, run.mind.motor.values);
-}
-const labelUtilities = (c, box) => { for (const u of [-1, 0, 1]) write(c, box, minus(String(u)), utilityShare(u)); };
-function drawBand(c, box, times, motor) {
-  const from = indexIn(times, box.from), end = indexIn(times, box.to);
-  if (!times.length) return;
-  for (let i = from, begun = from; i <= end; i++) if (i === end || motor[i + 1] !== motor[begun]) {
-    const left = Math.max(box.left, box.px(times[begun])), right = Math.min(box.right, i + 1 < times.length ? box.px(times[i + 1]) : box.px(run.duration));
-    c.fillStyle = readable(run.mind.behaviors[motor[begun]].colour);
-    c.fillRect(left, box.top + box.height * 0.84, right - left, box.height * 0.13);
-    begun = i + 1;
-  }
-}
-function utilityAt(t) {
-  const i = indexIn(run.mind.time.values, t + 1e-4), active = run.mind.behaviors[run.mind.motor.values[i]];
-  const values = [...run.mind.behaviors, ...run.mind.cognitive].map(one => one.name + " " + signed(one.utility.values[i] ?? NaN).trim());
-  return (active ? active.name + " is active: " : "") + values.join(", ");
-}
-
-// ---- pins: a line that is low or high, or in the middle while the pin is released ----
-const PIN_WORDS = ["low", "high", "released", "pulled up"], PIN_SHARES = [0.8, 0.2, 0.55, 0.4]; // of the lane's height
-function drawPin(c, box, pin) {
-  const times = pin.time.values, levels = pin.level.values, y = level => box.top + box.height * PIN_SHARES[level];
-  let i = shownAt(times, box.from);
-  c.strokeStyle = colours.ink; c.lineWidth = ratio; c.beginPath();
-  if (i < 0) c.moveTo(box.px(times[++i]), y(levels[i])); else c.moveTo(box.left, y(levels[i])); // before its first edge nobody knows
-  for (i++; i < times.length && times[i] <= box.to; i++) {
-    const x = box.px(times[i]), pixel = Math.floor(x);
-    c.lineTo(x, y(levels[i - 1]));
-    if (i + 1 < times.length && Math.floor(box.px(times[i + 1])) === pixel) { // several edges in a pixel
-      while (i + 1 < times.length && Math.floor(box.px(times[i + 1])) === pixel) i++;
-      c.lineTo(x, y(0)); c.lineTo(x, y(1));
-    }
-    c.lineTo(x, y(levels[i]));
-  }
-  c.lineTo(Math.min(box.right, box.px(i < times.length ? times[i] : run.duration)), y(levels[i - 1]));
-  c.stroke();
-}
-function pinText(pin, t) {
-  const times = pin.time.values, i = indexIn(times, t), word = PIN_WORDS[pin.level.values[i]];
-  if (times[i] > t || i + 1 >= times.length) return word;
-  const us = (times[i + 1] - times[i]) * 1e6;
-  return word + " for " + (us < 1e4 ? us.toFixed(us < 100 ? 2 : 0) + " µs" : (us / 1e3).toFixed(1) + " ms");
-}
-
-// ---- events: a mark each, another form for each kind ----
-const EVENT_KINDS = { switch: "switch", contact: "true contact", touch: "touch", fault: "fault", lost: "lost frames", reset: "restart", intervention: "intervention" };
-function eventColour(event) {
-  const behavior = event.kind === "switch" && run.mind && run.mind.behaviors.find(one => one.name === event.on);
-  if (behavior) return readable(behavior.colour);
-  return { contact: colours.contact, touch: colours.touch, fault: colours.alert, lost: colours.alert, reset: colours.alert, intervention: colours.accent }[event.kind] || colours.faint;
-}
-function eventMark(c, kind, x, y, r) { // adds its form to a path of its own; true: to be filled
-  c.beginPath();
-  if (kind === "switch") { c.moveTo(x, y - r); c.lineTo(x, y + r); return false; }
-  if (kind === "contact") { c.moveTo(x - r, y - r); c.lineTo(x + r, y + r); c.moveTo(x + r, y - r); c.lineTo(x - r, y + r); return false; }
-  if (kind === "touch") { c.arc(x, y, 0.8 * r, 0, 7); return false; }
-  if (kind === "lost") { c.moveTo(x - r, y); c.lineTo(x - r / 3, y); c.moveTo(x + r / 3, y); c.lineTo(x + r, y); return false; }
-  if (kind === "intervention") { c.moveTo(x, y - r); c.lineTo(x + r, y); c.lineTo(x, y + r); c.lineTo(x - r, y); c.closePath(); return true; }
-  if (kind === "reset") { c.arc(x, y, 0.8 * r, 0.8, 6); return false; }
-  c.moveTo(x, y - r); c.lineTo(x + r, y + r); c.lineTo(x - r, y + r); c.closePath(); return true; // a fault
-}
-function drawEvents(c, box) {
-  c.lineWidth = 1.6 * ratio;
-  for (const event of run.events) {
-    if (event.time < box.from || event.time > box.to) continue;
-    c.strokeStyle = c.fillStyle = eventColour(event);
-    if (eventMark(c, event.kind, box.px(event.time), box.middle, 5 * ratio)) c.fill(); else c.stroke();
-  }
-}
-const eventText = event => event.time.toFixed(2) + " s: " + (event.kind === "switch" ? "switch to " : "") + event.text;
-function eventAt(t) { // those about as near as the pointer can tell
-  const [from, to] = span(), near = (to - from) * 6 / Math.max(1, $("cursor").clientWidth);
-  const found = run.events.filter(event => Math.abs(event.time - t) <= near);
-  return found.slice(0, 4).map(eventText).join("\n") + (found.length > 4 ? "\nand " + (found.length - 4) + " more" : "") || "none here";
-}
-
 // ---- the cursor, above them ----
 let hoverTime = null;
 function drawCursor() {
-  const canvas = $("cursor"), c = canvas.getContext("2d"), [from, to] = span(), left = GUTTER * ratio, width = canvas.width - (GUTTER + RIGHT) * ratio;
+  const canvas = $("cursor"),
+    c = canvas.getContext("2d"),
+    [from, to] = span(),
+    left = GUTTER * ratio,
+    width = canvas.width - (GUTTER + RIGHT) * ratio;
   c.clearRect(0, 0, canvas.width, canvas.height);
   const upright = (t, colour, wide) => {
-    const x = left + (t - from) / (to - from) * width;
+    const x = left + ((t - from) / (to - from)) * width;
     if (x < left - 1 || x > left + width + 1) return;
-    c.strokeStyle = colour; c.lineWidth = wide * ratio; c.beginPath(); c.moveTo(x, 0); c.lineTo(x, canvas.height); c.stroke();
+    c.strokeStyle = colour;
+    c.lineWidth = wide * ratio;
+    c.beginPath();
+    c.moveTo(x, 0);
+    c.lineTo(x, canvas.height);
+    c.stroke();
   };
   if (hoverTime !== null) upright(hoverTime, colours.faint, 1);
   upright(now, colours.ink, 1.6);
 }
 function listenToTracks() {
   const cursor = $("cursor");
-  cursor.addEventListener("pointerdown", e => { if (e.offsetX > GUTTER - 8) { cursor.setPointerCapture(e.pointerId); seek(timeOfPixel(e.offsetX)); } });
-  cursor.addEventListener("pointermove", e => { if (e.buttons && cursor.hasPointerCapture(e.pointerId)) seek(timeOfPixel(e.offsetX)); });
-  cursor.addEventListener("wheel", e => {
-    if (e.offsetX < GUTTER) return; // there it scrolls the lanes
-    e.preventDefault(); zoomTime(Math.exp(e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), timeOfPixel(e.offsetX));
-  }, { passive: false });
+  cursor.addEventListener("pointerdown", e => {
+    if (e.offsetX > GUTTER - 8) {
+      cursor.setPointerCapture(e.pointerId);
+      seek(timeOfPixel(e.offsetX));
+    }
+  });
+  cursor.addEventListener("pointermove", e => {
+    if (e.buttons && cursor.hasPointerCapture(e.pointerId)) seek(timeOfPixel(e.offsetX));
+  });
+  cursor.addEventListener(
+    "wheel",
+    e => {
+      if (e.offsetX < GUTTER) return; // there it scrolls the lanes
+      e.preventDefault();
+      zoomTime(Math.exp(e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), timeOfPixel(e.offsetX));
+    },
+    { passive: false },
+  );
   $("shorter").onclick = () => zoomTime(0.5);
   $("longer").onclick = () => zoomTime(2);
 }
