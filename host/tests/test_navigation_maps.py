@@ -150,6 +150,60 @@ def test_map_of_others_with_unknown_cells_and_negated(tmp_path: Path) -> None:
     assert OccupancyMap.load(tmp_path / "m.yaml").values[1][0] == 0
 
 
+SAID = "image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n"
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        b"P5\n# by hand\n3 1\n255\n" + bytes((254, 0, 205)),
+        b"P2\n3 1\n255\n254 0 205\n",
+        b"P5\n3 1\n65535\n" + np.array((65278, 0, 52685), dtype=">u2").tobytes(),
+        b"P2\n3 1\n1000\n996 0 804\n",
+    ],
+    ids=["comment", "as text", "16 bit", "brightest is 1000"],
+)
+def test_pictures_of_all_kinds_are_read(picture: bytes, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(SAID)
+    (tmp_path / "m.pgm").write_bytes(picture)
+    assert OccupancyMap.load(tmp_path / "m.yaml").values.tolist() == [[0.0, 1.0, pytest.approx(math.nan, nan_ok=True)]]
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [b"", b"P5\n3 ", b"P5\n3 1\n255\n\xfe", b"P2\n3 1\n255\n254 0", b"P5\n1000000 1000000\n255\n\xfe"],
+    ids=["empty", "header cut", "cut", "text cut", "huge"],
+)
+def test_picture_that_is_cut_is_one_sentence(picture: bytes, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(SAID)
+    (tmp_path / "m.pgm").write_bytes(picture)
+    with pytest.raises(BrainError, match=r"image 'm\.pgm' cannot be read"):
+        OccupancyMap.load(tmp_path / "m.yaml")
+
+
+def test_name_with_a_dot_is_kept(tmp_path: Path) -> None:
+    files = OccupancyMap(np.zeros((1, 1)), 0.05).save(tmp_path / "hall.v2")
+    assert [path.name for path in files] == ["hall.v2.yaml", "hall.v2.pgm"]
+
+
+def test_cells_that_are_none(office: LineMap) -> None:
+    for cell in (0.0, -1.0, math.nan, 1e-6):
+        for made in (lambda cell: Lattice.of(office, RADIUS, MARGIN, cell), lambda cell: OccupancyMap.of(office, cell)):
+            with pytest.raises(BrainError, match=r"cells of .* m"):
+                made(cell)
+
+
+def test_no_path_begins_in_a_forbidden_cell(lattice: Lattice) -> None:
+    """Also not where a free cell is beside it; and a place in no rectangle is no node."""
+    rows, columns = np.nonzero(~lattice.free[:, :-1] & lattice.free[:, 1:])
+    forbidden = int(rows[0]), int(columns[0])
+    free = forbidden[0], forbidden[1] + 1
+    assert search(lattice, forbidden, free).path == search(lattice, free, forbidden).path == []
+    cells, (outside, inside) = Cells.of(lattice).with_places((9.0, 9.0), BEGIN)
+    assert outside == -1 < inside
+    assert search(cells, outside, inside).path == search(cells, inside, outside).path == []
+
+
 @pytest.mark.parametrize(
     ("said", "sentence"),
     [
@@ -157,8 +211,10 @@ def test_map_of_others_with_unknown_cells_and_negated(tmp_path: Path) -> None:
         ("image: [\n", "is no map: .*expected a YAML file of map_server"),
         ("image: m.pgm\nresolution: none\norigin: [0, 0, 0]\n", "resolution is 'none'; expected a number"),
         ("image: m.pgm\nresolution: 0.05\norigin: [0, 0]\n", r"origin is \[0, 0\]; expected \[x, y, yaw\]"),
+        ("image: m.pgm\nresolution: 0.05\norigin: [.nan, 0, 0]\n", r"origin is \[nan, 0, 0\]; expected"),
+        (SAID + "mode: raw\n", "mode is 'raw'; expected trinary or scale"),
         ("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0.1]\n", "origin is turned by 0.1 rad; expected a yaw of 0"),
-        ("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "image 'm.pgm' cannot be read"),
+        (SAID, "image 'm.pgm' cannot be read"),
     ],
 )
 def test_wrong_map_is_one_sentence(said: str, sentence: str, tmp_path: Path) -> None:

@@ -78,7 +78,9 @@ class Cells:
         return self.doors[node][0]
 
     def neighbours(self, node: int) -> Iterator[tuple[int, float]]:
-        """The doors of the rectangles on both sides, each with the straight way there (m)."""
+        """The doors of the rectangles on both sides, each with the straight way there (m); of -1 there are none."""
+        if node < 0:
+            return
         _, one, other = self.doors[node]
         for number in {number for side in (one, other) for number in self._of_rectangle[side]} - {node}:
             yield number, self.distance(node, number)

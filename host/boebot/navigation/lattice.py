@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.errors import BrainError
+from boebot.showing import Grid
 
 if TYPE_CHECKING:
     from boebot.navigation.line_map import LineMap
@@ -25,6 +26,7 @@ Point = tuple[float, float]
 
 STRAIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
 DIAGONAL = ((1, 1), (1, -1), (-1, -1), (-1, 1))
+MOST_CELLS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -54,12 +56,12 @@ class Lattice:
             radius: of the robot (m). margin: that it keeps (m). cell: side of a cell (m).
 
         Raises:
-            BrainError: cell, radius or margin is none.
+            BrainError: cell, radius or margin is no length, or the map has too many cells of it.
         """
-        if not (0 < cell < math.inf and 0 <= radius < math.inf and 0 <= margin < math.inf):
-            raise BrainError(f"a lattice of cells of {cell!r} m for a radius of {radius!r} m; expected lengths")
-        low, high = plan.bounds
-        columns, rows = (math.ceil(size / cell - 1e-9) for size in (high - low).tolist())
+        if not (0 <= radius < math.inf and 0 <= margin < math.inf):
+            raise BrainError(f"a lattice for a radius of {radius!r} m and a margin of {margin!r} m; expected lengths")
+        low, _ = plan.bounds
+        rows, columns = cells_of(plan, cell)
         made = cls(np.ones((rows, columns), dtype=np.bool_), cell, float(low[0]), float(low[1]), diagonal)
         row, column = np.indices((rows, columns)).reshape(2, -1)
         centres = np.column_stack((made.x + (column + 0.5) * cell, made.y + (row + 0.5) * cell))
@@ -75,6 +77,10 @@ class Lattice:
     def columns(self) -> int:
         """How many there are."""
         return int(self.free.shape[1])
+
+    def grid(self) -> Grid:
+        """To draw it: `robot.sketch("lattice", grid=lattice.grid(), frame="arena")`. Forbidden cells are dark."""
+        return Grid(~self.free, self.cell, self.x, self.y)
 
     def centre(self, cell: Cell) -> Point:
         """Of a cell (m)."""
@@ -112,7 +118,9 @@ class Lattice:
         return Lattice(seen, self.cell, self.x, self.y, self.diagonal)
 
     def neighbours(self, cell: Cell) -> Iterator[tuple[Cell, float]]:
-        """The free cells beside one, each with the way there (m)."""
+        """The free cells beside one, each with the way there (m); beside a forbidden one there is none."""
+        if not self.is_free(cell):
+            return
         row, column = cell
         for down, right in STRAIGHT:
             other = row + down, column + right
@@ -127,3 +135,19 @@ class Lattice:
     def distance(self, cell: Cell, other: Cell) -> float:
         """Straight from centre to centre (m)."""
         return self.cell * math.hypot(cell[0] - other[0], cell[1] - other[1])
+
+
+def cells_of(plan: LineMap, cell: float) -> tuple[int, int]:
+    """How many rows and columns of cells of that side (m) a map has, one of each at least.
+
+    Raises:
+        BrainError: it is no length, or there are too many.
+    """
+    if not 0 < cell < math.inf:
+        raise BrainError(f"cells of {cell!r} m; expected a length above 0")
+    low, high = plan.bounds
+    columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in (high - low).tolist())
+    if rows * columns > MOST_CELLS:
+        counts = f"{rows:,} x {columns:,} of them; expected {MOST_CELLS:,} at most"
+        raise BrainError(f"cells of {cell!r} m: {plan.name} has {counts}")
+    return rows, columns

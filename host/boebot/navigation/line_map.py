@@ -19,6 +19,7 @@ from boebot.arenas.description import ArenaDescription, Start, Wall
 from boebot.errors import ArenaError, BrainError
 
 Floats = NDArray[np.float64]
+MOST_RAYS = 1_000_000  # of a scan
 
 
 class LineMap:
@@ -62,6 +63,8 @@ class LineMap:
         try:
             ends = np.asarray(lines, dtype=np.float64).reshape(-1, 2, 2)
             walls = [Wall(points_m=[(x0, y0), (x1, y1)]) for (x0, y0), (x1, y1) in ends.tolist()]
+            if not walls:
+                raise ValueError("there are none")
             low = ends.reshape(-1, 2).min(axis=0)
             return cls(
                 Arena(ArenaDescription(name=name, start=Start(float(low[0]) - 1.0, float(low[1]) - 1.0), wall=walls))
@@ -85,8 +88,14 @@ class LineMap:
 
     @property
     def bounds(self) -> tuple[Floats, Floats]:
-        """Lower left and upper right corner of the box about all lines (m)."""
+        """Lower left and upper right corner of the box about all lines (m).
+
+        Raises:
+            BrainError: there are no lines.
+        """
         points = self.segments.reshape(-1, 2)
+        if not len(points):
+            raise BrainError(f"the map of {self.name} has no lines")
         return points.min(axis=0), points.max(axis=0)
 
     def scans(self, poses: ArrayLike, bearings: tuple[float, float], count: int, reach: float) -> Floats:
@@ -100,10 +109,17 @@ class LineMap:
 
         Returns:
             Distances (m), shape (n, count); -1 where nothing is within reach.
+
+        Raises:
+            BrainError: poses or bearings are none, or count is not that of 2 rays or more.
         """
-        at = np.asarray(poses, dtype=np.float64).reshape(-1, 3)
+        at = np.asarray(poses, dtype=np.float64)
+        if at.size % 3 or not np.isfinite(at).all():
+            raise BrainError(f"poses of shape {at.shape}; expected finite numbers, shape (n, 3): m, m, rad")
+        at = at.reshape(-1, 3)
+        fan = self._fan(*bearings, count)
         ranges = np.empty((len(at), count))
-        fan, rows = self._fan(*bearings, count), ffi.from_buffer("double[]", ranges)
+        rows = ffi.from_buffer("double[]", ranges)
         for index, (x, y, heading) in enumerate(at.tolist()):
             cosine, sine = math.cos(heading), math.sin(heading)
             lib.scan_look(fan, self._scene, x, y, cosine, sine, reach, 0.0, 0, rows + index * count)
@@ -112,9 +128,11 @@ class LineMap:
     def _fan(self, first: float, last: float, count: int) -> object:
         key = first, last, count
         if key not in self._fans:
-            fan = lib.scan_fan_new(first, last, count)
+            fan = lib.scan_fan_new(first, last, count) if 2 <= count <= MOST_RAYS else ffi.NULL
             if fan == ffi.NULL:
-                raise BrainError(f"{count} rays from {first:g} to {last:g} rad; expected 2 or more, within one turn")
+                raise BrainError(
+                    f"{count} rays from {first:g} to {last:g} rad; expected 2 to {MOST_RAYS:,}, within one turn"
+                )
             self._fans[key] = ffi.gc(fan, lib.scan_fan_destroy)
         return self._fans[key]
 

@@ -14,16 +14,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from boebot.errors import BrainError
-from boebot.navigation.lattice import Lattice
+from boebot.navigation.lattice import Lattice, cells_of
 from boebot.navigation.line_map import LineMap
+from boebot.showing import Grid
 
 if TYPE_CHECKING:
+    from PIL import Image
+
     from boebot.navigation.line_map import Floats
 
 FREE, UNKNOWN, OCCUPIED = 0.0, math.nan, 1.0
 FREE_BELOW, OCCUPIED_ABOVE = 0.196, 0.65  # map_server's own thresholds
 PIXELS = {"free": 254, "unknown": 205, "occupied": 0}
-LARGEST = 100_000_000  # cells
+LARGEST = 50_000_000  # pixels
+MODES = ("trinary", "scale")  # of map_server; what "scale" has between free and occupied is unknown here
 
 
 @dataclass(frozen=True)
@@ -43,16 +47,30 @@ class OccupancyMap:
 
     @classmethod
     def of(cls, plan: LineMap, cell: float = 0.05) -> OccupancyMap:
-        """Of a map of lines: a cell is occupied where a line passes through it or it is solid."""
-        low, high = plan.bounds
-        columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in (high - low).tolist())
+        """Of a map of lines: a cell is occupied where a line passes through it or it is solid. `cell`: its side (m).
+
+        Raises:
+            BrainError: `cell` is no length, or the map has too many cells of it.
+        """
+        low, _ = plan.bounds
+        rows, columns = cells_of(plan, cell)
         row, column = np.indices((rows, columns)).reshape(2, -1)
         centres = np.column_stack((low[0] + (column + 0.5) * cell, low[1] + (row + 0.5) * cell))
         occupied = (plan.distance(centres) <= cell * math.sqrt(0.5)) | plan.is_solid(centres)
         return cls(occupied.reshape(rows, columns).astype(float), cell, float(low[0]), float(low[1]))
 
+    def grid(self) -> Grid:
+        """To draw it: `robot.sketch("map", grid=drawn.grid(), frame="arena")`."""
+        return Grid(self.values, self.cell, self.x, self.y)
+
     def lattice(self, radius: float, margin: float = 0.05, *, diagonal: bool = True) -> Lattice:
-        """Where the centre of a robot of that radius (m) may be, with a margin (m); nowhere that is unknown."""
+        """Where the centre of a robot of that radius (m) may be, with a margin (m); nowhere that is unknown.
+
+        Raises:
+            BrainError: radius or margin is no length.
+        """
+        if not (0 <= radius < math.inf and 0 <= margin < math.inf):
+            raise BrainError(f"a lattice for a radius of {radius!r} m and a margin of {margin!r} m; expected lengths")
         blocked = ~(self.values < FREE_BELOW)
         reach = math.ceil((radius + margin) / self.cell)
         padded = np.pad(blocked, reach)
@@ -84,7 +102,8 @@ class OccupancyMap:
         import yaml
         from PIL import Image
 
-        stem = Path(path).with_suffix("")
+        stem = Path(path)
+        stem = stem.with_suffix("") if stem.suffix in (".yaml", ".pgm") else stem
         pixels = np.full(self.values.shape, PIXELS["unknown"], dtype=np.uint8)
         pixels[self.values < FREE_BELOW] = PIXELS["free"]
         pixels[self.values > OCCUPIED_ABOVE] = PIXELS["occupied"]
@@ -125,23 +144,33 @@ class OccupancyMap:
         if not isinstance(said, dict):
             raise BrainError(f"{file} is no map; expected keys image, resolution and origin")
         cell = _number(file, said, "resolution", 1e-6)
-        origin = said.get("origin")
-        if not isinstance(origin, list) or len(origin) != 3 or not all(isinstance(one, int | float) for one in origin):
+        origin: Any = said.get("origin")
+        is_pose = isinstance(origin, list) and len(origin) == 3 and all(isinstance(one, int | float) for one in origin)
+        if not (is_pose and all(map(math.isfinite, origin))):
             raise BrainError(f"{file}: origin is {origin!r}; expected [x, y, yaw] in m and rad")
         if origin[2]:
             raise BrainError(f"{file}: origin is turned by {origin[2]} rad; expected a yaw of 0")
+        if said.get("mode", "trinary") not in MODES:
+            raise BrainError(f"{file}: mode is {said['mode']!r}; expected {' or '.join(MODES)}")
         try:
             with Image.open(file.parent / str(said.get("image"))) as picture:
                 if picture.width * picture.height > LARGEST:
                     raise BrainError(f"{file}: {said['image']} has more than {LARGEST:,} cells")
-                pixels = np.asarray(picture.convert("L"), dtype=float)[::-1]
-        except OSError as error:
+                light = _light(picture)[::-1]
+        except (OSError, ValueError, Image.DecompressionBombError) as error:
             raise BrainError(f"{file}: image {said.get('image')!r} cannot be read: {error}") from None
-        dark = pixels / 255.0 if said.get("negate") else (255.0 - pixels) / 255.0
+        dark = light if said.get("negate") else 1.0 - light
         above = _number(file, said, "occupied_thresh", 0.0, OCCUPIED_ABOVE)
         below = _number(file, said, "free_thresh", 0.0, FREE_BELOW)
         values = np.where(dark > above, OCCUPIED, np.where(dark < below, FREE, UNKNOWN))
         return cls(values, cell, float(origin[0]), float(origin[1]))
+
+
+def _light(picture: Image.Image) -> Floats:
+    """How bright each pixel is, 0 to 1; pictures with 16 bits as well."""
+    if picture.mode.startswith("I"):
+        return np.asarray(picture, dtype=float) / 65535.0
+    return np.asarray(picture.convert("L"), dtype=float) / 255.0
 
 
 def _number(file: Path, said: dict[str, Any], key: str, least: float, usual: float | None = None) -> float:
