@@ -16,7 +16,7 @@ from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
 from boebot.experiments.exploring import explored, explorer, starts
-from boebot.navigation import Coverage, Explore, LineMap, Scan, TurretScan
+from boebot.navigation import Coverage, Explore, GoTo, LineMap, Localization, Scan, TurretScan
 from boebot.navigation.corridor import is_clear
 from boebot.navigation.scan_error import heard
 from tools.navigation_figures.tasks import errand
@@ -103,7 +103,7 @@ def test_turret_scan_is_what_the_map_lets_expect(on: str, office: LineMap) -> No
 
 def test_robot_without_range_finder_is_one_sentence() -> None:
     brain = Brain([Odometry(), Explore()])
-    with pytest.raises(BrainError, match="turret"):
+    with pytest.raises(BrainError, match="neither a laser nor a turret"):
         boebot.run(brain, robot="arsim", arena="room", seconds=2, record=False)
 
 
@@ -137,12 +137,25 @@ def _legs(way: list[tuple[float, float]]) -> list[tuple[np.ndarray, np.ndarray]]
     return [(np.array(one), np.array(other)) for one, other in itertools.pairwise(way)]
 
 
-@pytest.mark.parametrize("goal", [(1.9, -1.35), (9.0, 0.0)], ids=["in a table", "outside"])
+@pytest.mark.parametrize(
+    "goal",
+    [(1.9, -1.35), (9.0, 0.0), (0.0, 0.5), (-1.0, 0.4), (math.nan, 0.0)],
+    ids=["in a table", "outside", "in a wall", "too near to a wall", "nowhere"],
+)
 def test_no_path_is_said_and_the_robot_stands(goal: tuple[float, float], office: LineMap) -> None:
     start = (-2.5, 0.0, 0.0)
     brain, go = errand(office, start, goal)
     result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=3)
     assert go.no_path and not go.arrived and result.true_distance == pytest.approx(0.0, abs=0.01)
+
+
+def test_what_is_no_map_start_or_goal_is_one_sentence(office: LineMap) -> None:
+    with pytest.raises(BrainError, match="plan is 'office'; expected a LineMap"):
+        Localization(plan="office")  # type: ignore[arg-type]
+    with pytest.raises(BrainError, match=r"start is .*; expected x"):
+        Localization(plan=office, start=(math.nan, 0.0, 0.0))
+    with pytest.raises(BrainError, match="a goal of 'kitchen'; expected x and y"):
+        GoTo(localization=Localization(plan=office)).go("kitchen")  # type: ignore[arg-type]
 
 
 def test_map_of_another_arena_makes_it_lost() -> None:

@@ -70,13 +70,14 @@ def test_scan_error_is_that_of_the_equation(office: LineMap, places: list[Pose])
     assert scan.errors(office, [moved])[0] == pytest.approx(by_hand)
 
 
-def test_scan_of_nothing_fits_nowhere(office: LineMap, places: list[Pose]) -> None:
-    nothing = Scan(np.full(RAYS, -1.0), HALF_TURN, REACH)
-    assert nothing.errors(office, places).tolist() == [math.inf] * len(places)
-    estimator = RandomSearch()
-    estimator.begin(office, places[0], random.Random(1))
-    estimate = estimator.correct(nothing)
-    assert not estimate.found and estimate.pose == places[0]
+@pytest.mark.parametrize("nothing", [-1.0, math.nan, math.inf])
+def test_scan_of_nothing_fits_nowhere(nothing: float, office: LineMap, places: list[Pose]) -> None:
+    empty = Scan(np.full(RAYS, nothing), HALF_TURN, REACH)
+    assert empty.errors(office, places).tolist() == [math.inf] * len(places)
+    for estimator in (RandomSearch(), ParticleFilter()):
+        estimator.begin(office, places[0], random.Random(1))
+        assert not estimator.correct(empty).found
+        assert math.dist(estimator.pose[:2], places[0][:2]) < 0.1
 
 
 def test_range_finder_away_from_the_middle(office: LineMap, places: list[Pose]) -> None:

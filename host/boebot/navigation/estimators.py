@@ -25,7 +25,7 @@ class Estimate:
         pose: in the map: x (m), y (m), heading (rad).
         uncertainty: one standard deviation of each (m, m, rad).
         error: ε of the scan there, by (6.8).
-        found: the scan fits the map there; else the pose is as it was.
+        found: the scan fits the map there; else a `Localization` keeps the pose that it had.
     """
 
     pose: Pose

@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from boebot.errors import BrainError
 from boebot.navigation.corridor import is_clear
 from boebot.navigation.scan_error import Scan
 from boebot.navigation.search import search
@@ -181,6 +182,11 @@ class Placement:
     """γ_min: of an interval of free directions (rad)"""
     least_distance: float = 0.75
     """d_min: between nodes (m)"""
+
+    def __post_init__(self) -> None:
+        lengths = self.distance, self.least_angle, self.least_distance
+        if not all(0 < one < math.inf for one in lengths) or not 0 <= self.margin < math.inf:
+            raise BrainError(f"{self}: expected finite numbers above 0, and a margin of 0 or more")
 
     @classmethod
     def of(cls, radius: float) -> Placement:

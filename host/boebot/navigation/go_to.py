@@ -7,15 +7,18 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from boebot.brain import checks
 from boebot.cognition.odometry import Odometry
+from boebot.errors import BrainError
 from boebot.navigation.follow_path import FollowPath
 from boebot.navigation.lattice import Lattice
 from boebot.navigation.line_map import LineMap
 from boebot.navigation.localization import Localization
 from boebot.navigation.obstacle import is_blocked
 from boebot.navigation.search import search
-from boebot.navigation.tighten import tightened
+from boebot.navigation.tighten import is_clear, tightened
 
 if TYPE_CHECKING:
     from boebot.navigation.frames import Point
@@ -42,13 +45,16 @@ class GoTo(FollowPath):
     cell: float = 0.05
     """m: side of the cells of the grid on which a way is searched for"""
     slack: float = 0.3
-    """m within which a free cell stands for where the robot believes to be, or for the goal"""
+    """m within which a free cell stands for where the robot believes to be, or for a goal nearer to a line than the
+    margin; where the body would touch a line there is no path"""
     near: float = 0.03
     """m before a sonar at which something is in the way: it goes back and asks for a scan, for it is not where it
     believes to be"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not isinstance(self.localization, Localization):
+            raise checks.refused(self, "localization", "a Localization")
         checks.positive(self, "cell", "slack", "near")
         checks.not_negative(self, "margin")
         self._grids: dict[float, Lattice] = {}
@@ -58,13 +64,20 @@ class GoTo(FollowPath):
         self.go(None)
 
     def enter(self, robot: Robot) -> None:
+        self.other(Localization)  # it has to be in the brain as well
         self._planned_after = -1
         self._blocked_at: Point | None = None
         if self.arrived and self.goal is not None and not self._is_there(self.goal):
             self.arrived = False
 
     def go(self, goal: Point | None) -> None:
-        """From now on to there (m, in the map); None: it stands."""
+        """From now on to there (m, in the map); None: it stands.
+
+        Raises:
+            BrainError: it is no place.
+        """
+        if goal is not None and np.shape(goal) != (2,):
+            raise BrainError(f"{self.name}: a goal of {goal!r}; expected x and y in m, or None")
         self.goal = goal
         self.way: list[Point] = []
         self.no_path = False
@@ -116,6 +129,8 @@ class GoTo(FollowPath):
         grid = self._grid(plan, radius)
         here = self.localization.pose[:2]
         start, target = (grid.nearest_free(*place, within=self.slack) for place in (here, goal))
+        if target is not None and not is_clear(plan, grid.centre(target), goal, radius):
+            target = None  # its body would touch something on the way from there, or at the goal itself
         cells = [] if start is None or target is None else search(grid, start, target).path
         self.no_path = not cells
         between = [grid.centre(cell) for cell in cells[1:-1]]

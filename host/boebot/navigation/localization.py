@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from boebot.brain import checks
 from boebot.brain.process import CognitiveProcess, MotorBehavior
 from boebot.brain.variables import StateVariable
@@ -53,6 +55,12 @@ class Localization(MotorBehavior):
     def __post_init__(self) -> None:
         super().__post_init__()
         checks.positive(self, "every", "settle")
+        if not isinstance(self.plan, LineMap):
+            raise checks.refused(self, "plan", 'a LineMap, as LineMap.of("office")')
+        if np.shape(self.start) != (3,) or not np.isfinite(self.start).all():
+            raise checks.refused(self, "start", "x (m), y (m), heading (rad)")
+        if isinstance(self.estimator, type) or not hasattr(self.estimator, "correct"):
+            raise checks.refused(self, "estimator", "an estimator, as RandomSearch()")
 
     def forget(self) -> None:
         self.estimates: list[tuple[float, Estimate]] = []

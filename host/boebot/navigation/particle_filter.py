@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.errors import BrainError
 from boebot.navigation.estimators import Estimate, mean_of
 from boebot.navigation.frames import Pose
 from boebot.navigation.line_map import LineMap
@@ -49,6 +50,10 @@ class ParticleFilter:
     """of the particles at the start (m, m, rad)"""
     jitter: Pose = (0.03, 0.03, 0.03)
     """that is added when they are drawn anew (m, m, rad): particles that are alike find nothing better"""
+
+    def __post_init__(self) -> None:
+        if not (self.particles >= 1 and self.rays >= 1 and self.candidates >= 1 and self.sigma > 0):
+            raise BrainError(f"{self}: expected particles, rays, candidates from 1, and sigma above 0")
 
     def begin(self, plan: LineMap, pose: Pose, source: random.Random) -> None:
         """See `boebot.navigation.estimators.Estimator`."""

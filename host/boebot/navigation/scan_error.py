@@ -29,7 +29,7 @@ class Scan:
     """One sweep of a range finder at rest.
 
     Attributes:
-        distances: from right to left (m); -1 or NaN: nothing within reach.
+        distances: from right to left (m); -1, NaN or infinite: nothing within reach.
         bearings: of the first and the last ray, from the robot's heading (rad).
         reach: of each ray (m).
         place: of the range finder on the robot: x, y (m).
@@ -50,7 +50,7 @@ class Scan:
     @property
     def known(self) -> NDArray[np.bool_]:
         """Which rays have met something, far enough away, shape (rays,)."""
-        known: NDArray[np.bool_] = self.distances >= NEAREST_M  # NaN: not
+        known: NDArray[np.bool_] = (self.distances >= NEAREST_M) & (self.distances < np.inf)  # NaN: not
         return known
 
     def thinned(self, rays: int) -> Scan:

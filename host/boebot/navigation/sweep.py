@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boebot.errors import BrainError
 from boebot.navigation.scan_error import Scan
 
 if TYPE_CHECKING:
@@ -101,4 +102,8 @@ class Sweep:
         Raises:
             BrainError: the robot has neither.
         """
-        return laser_scan(robot, doubtful=self.doubtful) if robot.has("laser") else self.turret(robot)
+        if robot.has("laser"):
+            return laser_scan(robot, doubtful=self.doubtful)
+        if not robot.has("turret"):
+            raise BrainError(f"robot {robot.name!r} has neither a laser nor a turret to sweep with; roller has a laser")
+        return self.turret(robot)
