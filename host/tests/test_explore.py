@@ -119,6 +119,14 @@ def test_rooms_are_explored(arena: str) -> None:
     assert run.is_complete or arena == "exploration-block"
 
 
+def test_nodes_are_drawn_where_the_robot_is() -> None:
+    """In the frame of the start, though the odometer of roller counts from the middle of the arena."""
+    result = boebot.run(Brain([Odometry(), Explore()]), robot="roller", arena="office", seconds=2)
+    (completed,) = [layer.sketches[-1] for layer in result.layers if layer.name == "completed"]
+    assert completed.frame == "start"
+    assert np.frombuffer(completed.points, dtype="<f4") == pytest.approx((0.0, 0.0), abs=0.01)
+
+
 # ---- driving to places -----------------------------------------------------------------------------------------------
 
 

@@ -38,6 +38,7 @@ class Odometry(CognitiveProcess):
 
     Attributes:
         pose: x, y (m) and heading (rad in (-pi, pi]), from where the run began or the odometer's origin.
+        origin: the pose with which it began: `start`, or what the odometer said.
         speed: m/s ahead, over the last step.
         turn_rate: rad/s counter-clockwise, over the last step.
         travelled: m of way so far, both forward and backward.
@@ -58,7 +59,7 @@ class Odometry(CognitiveProcess):
             raise BrainError(f"{self.name}: factors are {self.factors!r}; expected two numbers above 0")
 
     def forget(self) -> None:
-        self.pose = self.start
+        self.pose = self.origin = self.start
         self.speed = self.turn_rate = self.travelled = 0.0
         self.source: Source = self.use or "commands"
         self._reckoning: DeadReckoning | None = None
@@ -73,7 +74,7 @@ class Odometry(CognitiveProcess):
             raise BrainError(f"{self.name}: robot {robot.name!r} has no {self.use}")
         self._time = robot.time
         if self.source == "odometer":
-            self.pose = self._pose_of_odometer(robot)
+            self.pose = self.origin = self._pose_of_odometer(robot)
             return
         self._reckoning = DeadReckoning(robot.dimensions.track_width, *self.start)
         self._directions = WheelDirection(), WheelDirection()

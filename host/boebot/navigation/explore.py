@@ -17,6 +17,7 @@ from boebot.brain import checks
 from boebot.cognition.odometry import Odometry, wrapped
 from boebot.navigation.corridor import is_clear
 from boebot.navigation.exploration_graph import STATUSES, ExplorationGraph, Placement
+from boebot.navigation.frames import inverse, placed
 from boebot.navigation.obstacle import SONARS, is_blocked
 from boebot.navigation.scan_error import Scan
 from boebot.navigation.steering import SHARE_TO_TURN, SteeredBehavior, stand
@@ -349,11 +350,16 @@ class Explore(SteeredBehavior):
 
     def _draw(self, robot: Robot) -> None:
         """The graph as it grows."""
-        graph, frame = self._graph, "start" if self.localization is None else "arena"
+        nodes, places = self._graph.nodes, [node.place for node in self._graph.nodes]
+        if self.localization is None:
+            frame, places = "start", placed(inverse(self.other(Odometry).origin), places)
+        else:
+            frame = "arena"
         for status in STATUSES:
-            robot.sketch(status, points=[node.place for node in graph.nodes if node.status == status], frame=frame)
-        legs = [[graph.nodes[number].place for number in sorted(leg)] for leg in graph.legs]
-        robot.sketch("legs", lines=legs, frame=frame)
+            robot.sketch(status, points=[places[node.number] for node in nodes if node.status == status], frame=frame)
+        robot.sketch(
+            "legs", lines=[[places[number] for number in sorted(leg)] for leg in self._graph.legs], frame=frame
+        )
 
     _states: ClassVar[dict[State, Callable[[Explore, Robot], State]]] = {
         State.INIT: _init,
