@@ -61,3 +61,18 @@ def test_flat_field_is_said_and_nothing_moves() -> None:
     brain = Brain([behavior, Odometry()])
     result = boebot.run(brain, robot="roller", arena="empty", pose=(30.0, 0.0, 0.0), seconds=1)
     assert behavior.lost and result.true_distance == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("is_seen", [True, False])
+def test_what_moves_is_gone_around(is_seen: bool) -> None:
+    """Something comes along the way to the goal, 0.2 m beside the robot's middle."""
+    gaps: list[float] = []
+
+    def moving(robot: boebot.Robot) -> list[Potential]:
+        hill = Potential(2.0 - 0.1 * robot.time, 0.2, 0.4, 0.35, 0.35)
+        gaps.append(math.dist(behavior.pose[:2], (hill.x, hill.y)))
+        return [hill] if is_seen else []
+
+    behavior = FollowField(goal=Potential(2.5, 0, -1, 2.5, 2.5), moving=moving)
+    boebot.run(Brain([behavior, Odometry()]), robot="roller", arena="empty", seconds=30)
+    assert behavior.arrived and (min(gaps) > 0.3) == is_seen

@@ -94,6 +94,8 @@ def _draw(figure: Figure, trials: Sequence[Straight]) -> None:
 def arc_error(believed: float, track_width: float) -> float:
     """Distance of ghost and robot (m) when the ghost is `believed` metres from the start and the robot went
     straight."""
+    if FACTOR == 1:  # no arc: the ghost goes where the robot goes
+        return 0.0
     curvature = (1 - FACTOR) / ((1 + FACTOR) / 2 * track_width)
     arc = 2 / abs(curvature) * math.asin(abs(curvature) * believed / 2)
     bearing = curvature * arc / 2
