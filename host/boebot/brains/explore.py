@@ -1,9 +1,10 @@
 """Explore the office: drive until every place has been seen (chapter 6 of the notes).
 
     boebot run explore --robot roller --arena office --seconds 900
-    boebot run explore --robot shieldbot-turret --arena office --seconds 1800
+    boebot run explore --robot shieldbot-turret --arena office --seconds 5400
 
-What it finds grows as a tree of nodes. It does not use the office's map to find its way, but to correct where it is:
+What it finds grows as a tree of nodes; `explore_state` is "done" when none is left, after some 800 s. The turret robot
+sweeps for four seconds at each of its many nodes, and takes more than an hour; now and then it is lost on the way. It does not use the office's map to find its way, but to correct where it is:
 without localization odometry drifts, and with it the tree.
 """
 

@@ -117,15 +117,17 @@ class Explore(SteeredBehavior):
         self._stood_s = self._seen_s = robot.time
 
     def step(self, robot: Robot) -> None:
-        """Goes from state to state until one takes time; stands where it is lost."""
+        """Goes from state to state until one takes time; stands where it is lost. Shows which state that is."""
         if self.localization is not None and self.localization.lost:
             stand(robot, self._stood_s)
+            robot.show(f"{self.name}_state", "lost")
             return
         while True:
             before, self.state = self.state, self._states[self.state](self, robot)
             if self.state is before:
                 break
             self._stood_s = self._seen_s = robot.time
+        robot.show(f"{self.name}_state", self.state.name.lower())
 
     # ---- nodes -------------------------------------------------------------------------------------------------------
 
@@ -193,6 +195,7 @@ class Explore(SteeredBehavior):
         pair = self._graph.active, target.number
         if len(target.path) > 2 and away <= self.shortcut and pair not in self._not_direct:
             self._not_direct.add(pair)  # once
+            self._faces = False
             return State.CHECK_DIRECT
         return State.NEXT_LEG
 
@@ -221,7 +224,8 @@ class Explore(SteeredBehavior):
 
     def _check_direct(self, robot: Robot) -> State:
         """R12: turn to the target; if nothing is in the way, drive there."""
-        if not self._face(robot, self._target.place):
+        if not self._faces:
+            self._faces = self._face(robot, self._target.place)
             self._stood_s = robot.time
             return State.CHECK_DIRECT
         if (sweep := self._swept(robot)) is None:
