@@ -4,8 +4,10 @@
     boebot run explore --robot shieldbot-turret --arena office --seconds 5400
 
 What it finds grows as a tree of nodes; `explore_state` is "done" when none is left, after some 800 s. The turret robot
-sweeps for four seconds at each of its many nodes, and takes more than an hour; now and then it is lost on the way. It does not use the office's map to find its way, but to correct where it is:
-without localization odometry drifts, and with it the tree.
+sweeps for four seconds at each of its many nodes: it takes more than an hour, and now and then it is lost on the way.
+
+The brain does not use the office's map to find its way, but to correct where it is: without localization odometry
+drifts, and with it the tree.
 """
 
 from boebot.brain import Brain, Utility

@@ -22,7 +22,8 @@ from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, a
 from boebot.experiments.paths import floor
 from boebot.experiments.trials import trial_seeds
 from boebot.navigation import Lattice, LineMap, Scan, TurretScan, laser_scan
-from boebot.navigation.match import Match, Pose, search_pose
+from boebot.navigation.frames import Pose
+from boebot.navigation.match import Match, search_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,7 +15,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.navigation.lattice import Lattice, Point
+from boebot.navigation.frames import Point
+from boebot.navigation.lattice import Lattice
 
 Rectangle = tuple[int, int, int, int]
 """First and one beyond the last row, first and one beyond the last column."""

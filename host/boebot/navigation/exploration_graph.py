@@ -17,6 +17,7 @@ import numpy as np
 
 from boebot.errors import BrainError
 from boebot.navigation.corridor import is_clear
+from boebot.navigation.frames import Point
 from boebot.navigation.scan_error import Scan
 from boebot.navigation.search import search
 
@@ -24,7 +25,6 @@ TRIED = 8  # directions to each side of the middle of an interval
 
 Status = Literal["pending", "completed", "unreachable"]
 STATUSES: tuple[Status, ...] = ("pending", "completed", "unreachable")
-Point = tuple[float, float]
 
 
 @dataclass

@@ -331,10 +331,6 @@ class Explore(SteeredBehavior):
         self.steer(robot, math.atan2(to_y, to_x) - heading, min(1.0, max(0.3, away / (4 * self.reach))))
         return False
 
-    def _ahead(self, place: Point) -> bool:
-        x, y, heading = self.pose
-        return abs(wrapped(math.atan2(place[1] - y, place[0] - x) - heading)) < self.turn_below
-
     def _blocked(self, robot: Robot) -> bool:
         """Something is right before it, by its sonars or whiskers, or it comes no further."""
         x, y = self.pose[:2]

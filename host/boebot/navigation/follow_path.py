@@ -12,7 +12,7 @@ from boebot.cognition.odometry import Odometry
 from boebot.navigation.steering import SteeredBehavior
 
 if TYPE_CHECKING:
-    from boebot.navigation.lattice import Point
+    from boebot.navigation.frames import Point
     from boebot.robot import Robot
 
 

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.errors import BrainError
+from boebot.navigation.frames import Point
 from boebot.showing import Grid
 
 if TYPE_CHECKING:
     from boebot.navigation.line_map import LineMap
 
 Cell = tuple[int, int]
-Point = tuple[float, float]
 
 STRAIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
 DIAGONAL = ((1, 1), (1, -1), (-1, -1), (-1, 1))

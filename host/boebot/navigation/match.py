@@ -12,12 +12,11 @@ import random
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from boebot.navigation.frames import Pose
 from boebot.navigation.scan_error import Scan
 
 if TYPE_CHECKING:
     from boebot.navigation.line_map import LineMap
-
-Pose = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from boebot.errors import BrainError
+from boebot.navigation.frames import Point
 
 if TYPE_CHECKING:
     from boebot.navigation.line_map import LineMap
 
 Floats = NDArray[np.float64]
-Point = tuple[float, float]
 _TURNS = 50  # of Newton's method
 _STEP_M = 0.1  # of it, at most
 

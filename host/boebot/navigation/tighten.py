@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from boebot.navigation.lattice import Point
+    from boebot.navigation.frames import Point
     from boebot.navigation.line_map import LineMap
 
 
