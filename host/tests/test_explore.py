@@ -154,7 +154,9 @@ def test_no_path_is_said_and_the_robot_stands(goal: tuple[float, float], office:
     start = (-2.5, 0.0, 0.0)
     brain, go = errand(office, start, goal)
     result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=3)
-    assert go.no_path and not go.arrived and result.true_distance == pytest.approx(0.0, abs=0.01)
+    assert (
+        go.no_path and not go.arrived and go.state == "no path" and result.true_distance == pytest.approx(0.0, abs=0.01)
+    )
 
 
 def test_what_is_no_map_start_or_goal_is_one_sentence(office: LineMap) -> None:
@@ -173,7 +175,12 @@ def test_map_of_another_arena_makes_it_lost() -> None:
     result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=40)
     assert result.true_pose is not None
     last = np.asarray(result.series.time) >= 36.0
-    assert go.lost and not go.arrived and np.ptp(result.true_pose.x[last]) < 0.005
+    assert (
+        go.lost
+        and not go.arrived
+        and result.shown.texts["go_to_state"][-1] == "lost"
+        and np.ptp(result.true_pose.x[last]) < 0.005
+    )
 
 
 # ---- whole brains ----------------------------------------------------------------------------------------------------

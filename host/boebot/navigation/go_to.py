@@ -99,6 +99,20 @@ class GoTo(FollowPath):
             self._blocked_at = self.other(Odometry).position
         else:
             self._go_on(robot, self.goal)
+        robot.show(f"{self.name}_state", self.state)
+
+    @property
+    def state(self) -> str:
+        """ "lost", "no goal", "arrived", "no path", "goes back" or "on the way"; shown as `go_to_state`."""
+        if self.lost:
+            return "lost"
+        if self.goal is None:
+            return "no goal"
+        if self.arrived:
+            return "arrived"
+        if self.no_path:
+            return "no path"
+        return "on the way" if self._blocked_at is None else "goes back"
 
     def _go_back(self, robot: Robot, begin: Point) -> None:
         robot.drive_speed(-self.turn_speed, -self.turn_speed)
