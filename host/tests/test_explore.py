@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot.brain import Brain
+from boebot.brain import Brain, Utility
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
 from boebot.experiments.exploring import explored, explorer, starts
@@ -192,3 +192,15 @@ def test_rounds_visits_rooms(robot: str) -> None:
     assert result.true_pose is not None
     path = np.column_stack((result.true_pose.x, result.true_pose.y))
     assert [np.hypot(*(path - room).T).min() < 0.15 for room in ((-0.7, 1.2), (1.2, 1.3))] == [True, True]
+
+
+def test_robot_at_rest_does_not_creep_from_scan_to_scan(office: LineMap) -> None:
+    """Some servos creep while they have pulses, also those of speed 0, as that of seed 3 does: motors that are off stay
+    off when behaviors change."""
+    start = (-2.5, 0.0, 0.0)
+    localization = Localization(plan=office, start=start, every=1.0, utility=Utility(b=-1.0, w={"due": 3.0}, tau=0.05))
+    go = GoTo(localization=localization, utility=Utility(b=0.5))
+    brain = Brain([Odometry(), localization, go], [localization.due_variable])
+    result = boebot.run(brain, robot="shieldbot-turret", arena="office", pose=start, seconds=40, seed=3)
+    assert result.true_pose is not None
+    assert len(localization.estimates) >= 5 and np.ptp(result.true_pose.heading) < 0.01

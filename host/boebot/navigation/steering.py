@@ -26,8 +26,9 @@ SHARE_TO_DRIVE, SHARE_TO_TURN = 0.75, 0.4  # of the speed at full motor signal, 
 
 
 def stand(robot: Robot, since_s: float) -> None:
-    """Stands still since a time (s): brakes, and then switches the motors off, for servos at rest may creep."""
-    if robot.time - since_s < BRAKING_S:
+    """Stands still since a time (s): brakes, and then switches the motors off, for servos at rest may creep. Motors
+    that are off stay so."""
+    if robot.command.kind != "stop" and robot.time - since_s < BRAKING_S:
         robot.drive_speed(0.0, 0.0)
     else:
         robot.stop()
