@@ -1,7 +1,8 @@
-"""The live view as a browser meets it: a run in a process of its own, its page over HTTP, its stream over a WebSocket."""
+"""The live view as a browser meets it: a run in a process of its own, its page over HTTP, its stream by WebSocket."""
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import re
@@ -17,6 +18,7 @@ from urllib.parse import urlsplit
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
 from boebot.view.page_data import FORMAT
 
@@ -38,8 +40,11 @@ class Run:
     def stream(self, *, token: str | None = None, origin: str | None = None) -> ClientConnection:
         """Its stream."""
         query = self.url.query if token is None else f"token={token}"
-        origin = f"http://{self.url.netloc}" if origin is None else origin
-        return connect(f"ws://{self.url.netloc}/stream?{query}", origin=origin, max_size=None, compression=None)  # type: ignore[arg-type]
+        address = f"ws://{self.url.netloc}/stream?{query}"
+        stream: ClientConnection = connect(
+            address, origin=Origin(f"http://{self.url.netloc}" if origin is None else origin), max_size=None
+        )
+        return stream
 
     def end(self) -> tuple[int, str, str]:
         """Exit code, standard output and standard error."""
@@ -112,19 +117,29 @@ def test_stream_is_refused_to_other_pages_and_without_token(endless: Run) -> Non
             pass
 
 
+def let_go(stream: ClientConnection) -> bool:
+    """The server closes it."""
+    deadline = time.monotonic() + LIMIT_S
+    try:
+        while time.monotonic() < deadline:
+            stream.recv(timeout=LIMIT_S)
+    except ConnectionClosed:
+        return True
+    return False
+
+
 def test_rubbish_floods_and_old_pages_are_let_go_and_the_run_goes_on(endless: Run) -> None:
     for messages in (["rubbish"], [json.dumps({"type": "hello", "format": 1})], [b"\x00" * 100], ["x" * 100_000]):
         with endless.stream() as stream:
             for message in messages:
                 stream.send(message)
-            with pytest.raises(ConnectionClosed):
-                while True:
-                    stream.recv(timeout=LIMIT_S)
+            assert let_go(stream)
     with endless.stream() as stream:
         page = Page(stream)
-        with pytest.raises(ConnectionClosed):
-            for _ in range(100_000):
+        with contextlib.suppress(ConnectionClosed):
+            for _ in range(10_000):
                 page.say(type="visible", visible=True)
+        assert let_go(stream)
     with endless.stream() as stream:
         page = Page(stream)
         assert page.until("run")["live"]["can"] == ["drag", "hand", "pause", "restart", "speed", "step"]
@@ -146,7 +161,9 @@ def test_two_pages_one_drives(endless: Run) -> None:
 
 def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    run = Run("run", "demo", "--robot", "shieldbot-charging", "--view", "--seconds", "3", "--out", str(folder), "--json")
+    run = Run(
+        "run", "demo", "--robot", "shieldbot-charging", "--view", "--seconds", "3", "--out", str(folder), "--json"
+    )
     with run.stream() as stream:
         page = Page(stream)
         page.until("run")
@@ -170,7 +187,10 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> N
     assert code == 0, error
     assert json.loads(out)["touched"] == 3  # lifted, a parameter, by hand
     again = subprocess.run(
-        [sys.executable, "-m", "boebot", "run", "--again", str(folder), "--json"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "boebot", "run", "--again", str(folder), "--json"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert again.returncode == 0, again.stdout + again.stderr
 

@@ -140,7 +140,9 @@ def teleop(
                 if page is None:
                     result = execute(request, folder=folder)
                 else:
-                    result = watched.run(page, request, functools.partial(execute, folder=folder, onlooker=page), waits=False)
+                    result = watched.run(
+                        page, request, functools.partial(execute, folder=folder, onlooker=page), waits=False
+                    )
         with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
             output.line(file=screen)
         end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, wanted)

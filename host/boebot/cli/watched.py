@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 
-def view(
-    *, view: bool, speed: float | None, port: int | None
-) -> contextlib.AbstractContextManager[LiveView | None]:
+def view(*, view: bool, speed: float | None, port: int | None) -> contextlib.AbstractContextManager[LiveView | None]:
     """The live view that those options want, open; None: none.
 
     Raises:

@@ -14,7 +14,7 @@ import numpy as np
 from boebot.arenas.floor_plan import FloorPlan, Moving
 from boebot.devices.whisker import Whisker
 from boebot.link.messages import DevicesTelemetry
-from boebot.record.blocks import Block, joined
+from boebot.record.blocks import Block, Group, joined
 from boebot.record.brain_record import STEPS, SWITCHES, read_brain
 from boebot.record.record import Record
 from boebot.record.result import RunResult
@@ -73,7 +73,7 @@ class Chunks:
         self._first = 1
         return rows
 
-    def _stretch(self, record: Record, news: dict[str, Block]) -> tuple[page_data.Stretch, Series]:
+    def _stretch(self, record: Record, news: Group) -> tuple[page_data.Stretch, Series]:
         result = self._result
         series = result.series_of(record, self._directions)
         new = np.arange(self._first, len(series))
@@ -106,7 +106,9 @@ class Chunks:
             touches=_where(seen, events, "touch", series),
             events=sorted(events),
             load=self._load(len(kept)),
-            pins=page_data.pins(record_of({"pins": news["pins"]}), result.robot, self._offset_s) if "pins" in news else {},
+            pins=page_data.pins(record_of({"pins": news["pins"]}), result.robot, self._offset_s)
+            if "pins" in news
+            else {},
         )
         return stretch, series
 
@@ -157,7 +159,11 @@ class Chunks:
             begin=self._offset_s,
             known="truth" in self._waiting,
             has_estimate=stretch.estimate is not None,
-            table={"robot": result.robot.name, "arena": result.world.name if result.world else None, "seed": result.seed},
+            table={
+                "robot": result.robot.name,
+                "arena": result.world.name if result.world else None,
+                "seed": result.seed,
+            },
             names=result.brain_names,
             cognitive=self._cognitive(),
         )
@@ -178,11 +184,11 @@ def _part(record: Record, series: Series, kept: Any) -> Record:
     return part
 
 
-def _brain_of(news: dict[str, Block]) -> Record:
+def _brain_of(news: Group) -> Record:
     return record_of({name: news[name] for name in (STEPS, SWITCHES) if name in news})
 
 
-def _rows(news: dict[str, Block], stream: str) -> list[tuple[float, bytes]]:
+def _rows(news: Group, stream: str) -> list[tuple[float, bytes]]:
     return news[stream].rows() if stream in news else []
 
 

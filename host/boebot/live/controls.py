@@ -186,5 +186,3 @@ def usual_speed(speed: float | None) -> float | None:
     if not 0.01 <= speed <= 10_000:
         raise BoebotError(f"a run cannot go {speed:g} times as fast as real time; expected 0.01 to 10000, or max")
     return float(speed)
-
-

@@ -153,7 +153,9 @@ class LiveView:
         can = _possible(robots)
         self._pace = Pace(self._speed if "speed" in can else None)
         self._robots = list(robots)
-        self._chunks = [Chunks(each, result, n) for n, (each, result) in enumerate(zip(robots, results, strict=True), 1)]
+        self._chunks = [
+            Chunks(each, result, n) for n, (each, result) in enumerate(zip(robots, results, strict=True), 1)
+        ]
         world = results[0].world
         plan = FloorPlan() if world is None else floor_plan(world, 0.0, 0.0)
         with self._lock:
@@ -300,7 +302,8 @@ class LiveView:
         """With who drives each robot, as that page sees it."""
         state = message["state"]
         robots = [
-            robot | {"driver": None if robot["driver"] is None else "you" if robot["driver"] == page.number else "another"}
+            robot
+            | {"driver": None if robot["driver"] is None else "you" if robot["driver"] == page.number else "another"}
             for robot in state["robots"]
         ]
         return message | {"state": state | {"robots": robots, "driver": robots[0]["driver"]}}
@@ -352,7 +355,9 @@ class LiveView:
     def close(self) -> None:
         """No pages any more."""
         deadline = time.monotonic() + BYE_S
-        while self._pages and time.monotonic() < deadline and any(page.outbox.is_waiting for page in self._pages.values()):
+        while (
+            self._pages and time.monotonic() < deadline and any(page.outbox.is_waiting for page in self._pages.values())
+        ):
             time.sleep(0.01)  # the end is on its way
         self.server.close()
 

@@ -104,20 +104,7 @@ class Visible(_Message, frozen=True):
 
 
 Asked = (
-    Hello
-    | Pause
-    | Resume
-    | Step
-    | Speed
-    | Restart
-    | Place
-    | Shape
-    | Parameter
-    | Hand
-    | Release
-    | Stop
-    | Arm
-    | Visible
+    Hello | Pause | Resume | Step | Speed | Restart | Place | Shape | Parameter | Hand | Release | Stop | Arm | Visible
 )
 _DECODER: msgspec.json.Decoder[Asked] = msgspec.json.Decoder(Asked)
 

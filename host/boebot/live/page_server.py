@@ -68,9 +68,7 @@ class PageServer:
         url: of the page, with its token.
     """
 
-    def __init__(
-        self, page: Callable[[str], str], listener: Listener, *, host: str = LOOPBACK, port: int = 0
-    ) -> None:
+    def __init__(self, page: Callable[[str], str], listener: Listener, *, host: str = LOOPBACK, port: int = 0) -> None:
         """`page`: gives the HTML, by where its stream is, as in ws://127.0.0.1:8080. `port`: 0: any free one.
 
         Raises:

@@ -53,7 +53,7 @@ def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result
         waits: at a run's end as long as a page is open, which may ask for another one.
     """
     while True:
-        with contextlib.redirect_stdout(Heard(sys.stdout, view)):  # type: ignore[type-var]
+        with contextlib.redirect_stdout(Heard(sys.stdout, view)):
             result = run(request)
         restart = view.restart
         if not isinstance(result.error, RestartedError):

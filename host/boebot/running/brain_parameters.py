@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from boebot.errors import BrainError
 
@@ -55,7 +55,8 @@ def _find(brain: LoadedBrain, name: str) -> tuple[Process, str]:
 
 def check_parameter(process: Process, field: str, value: float) -> None:
     """Raises BrainError where the process would refuse that value when it is made."""
-    dataclasses.replace(process, **{field: value})
+    changed: dict[str, Any] = {field: value}
+    dataclasses.replace(process, **changed)
 
 
 def bounds(brain: LoadedBrain, name: str) -> tuple[float, float]:

@@ -248,7 +248,7 @@ def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None], han
         driver.begin()
         started = wall.perf_counter()
         with StepWatch(driver.step_limit, take_over, keep_due) as watch:
-            for time_s in driver.steps():  # noqa: B007 (keep_due needs it)
+            for time_s in driver.steps():
                 keep_due()
                 if task.brain.is_over:
                     break

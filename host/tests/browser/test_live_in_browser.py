@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
 from browser.looks import WIDTHS, controls, faint_texts, overflow, reached_by_tab, wait_for
 from command import heed_signals
 
 if TYPE_CHECKING:
-    from browser.looks import OpenPage
     from playwright.sync_api import Browser, Page
+
+    from browser.looks import OpenPage
 
 pytest.importorskip("playwright", reason="drives a browser with playwright, which is not installed")
 pytest.importorskip("boebot.live", reason="looks at the live view, which is not here")
@@ -48,7 +50,12 @@ class Watched:
         command = [sys.executable, "-m", "boebot", "run", *arguments, "--view", "--out", str(out)]
         environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
         process = subprocess.Popen(
-            command, text=True, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment, preexec_fn=heed_signals
+            command,
+            text=True,
+            stderr=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            env=environment,
+            preexec_fn=heed_signals,
         )
         self.running.append(process)
         assert process.stderr is not None
