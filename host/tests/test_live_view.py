@@ -260,3 +260,16 @@ def test_taken_port_is_one_sentence(endless: Run) -> None:
     done = subprocess.run([sys.executable, "-m", "boebot", *arguments], capture_output=True, text=True, check=False)
     assert done.returncode != 0 and "Traceback" not in done.stderr
     assert "cannot be served at 127.0.0.1" in done.stderr
+
+
+def test_served_robot_is_shown_and_driven_only_by_who_has_its_port() -> None:
+    run = Run("serve", "--on", "native", "--tcp", "0", "--view")
+    with run.stream() as stream:
+        page = Page(stream)
+        assert page.until("run")["live"]["can"] == []
+        first = page.until("chunk")["state"]["time"]
+        page.say(type="hand", robot=0, left=1, right=1)
+        assert "is driven by the program that has its port" in page.until("refused")["sentence"]
+        assert page.state(lambda state: state["time"] > first + 0.2)
+        run.process.send_signal(signal.SIGINT)
+    assert run.end()[0] == 0

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from boebot.boards import BoardRequest, Visit, board_kinds, check_board, find_server
-from boebot.cli import options, output, streams
+from boebot.cli import options, output, streams, watched
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 
@@ -27,6 +27,8 @@ def serve(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
+    view: options.View = False,
+    view_port: options.ViewPort = None,
     json: options.Json = False,
 ) -> None:
     """Offer the emulated robot to other programs, until Ctrl-C."""
@@ -60,5 +62,12 @@ def serve(
         except OSError:  # what started this has read where the robot is, and listens no more
             streams.discard()
 
-    with contextlib.suppress(KeyboardInterrupt):
-        find_server()(on, request, tcp=tcp, announce=announce, visit=visit, running=lambda: True)
+    with contextlib.suppress(KeyboardInterrupt), watched.served_view(request, on, view=view, port=view_port) as page:
+
+        def heard(event: Visit) -> None:
+            visit(event)
+            if page is not None:
+                page.visit(event)
+
+        look = None if page is None else page.look
+        find_server()(on, request, tcp=tcp, announce=announce, visit=heard, running=lambda: True, look=look)

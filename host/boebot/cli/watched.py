@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, TypeVar
 
 from boebot.cli import output
@@ -11,7 +11,9 @@ from boebot.errors import BoebotError
 from boebot.running.tasks import Request
 
 if TYPE_CHECKING:
+    from boebot.boards import BoardRequest
     from boebot.live.live_view import LiveView
+    from boebot.live.served_view import ServedView
 
 Result = TypeVar("Result")
 
@@ -30,6 +32,29 @@ def view(*, view: bool, speed: float | None, port: int | None) -> contextlib.Abs
     from boebot.live.session import opened
 
     return opened(_tell, port=port or 0, speed=1.0 if speed is None else usual_speed(speed))
+
+
+@contextlib.contextmanager
+def served_view(request: BoardRequest, kind: str, *, view: bool, port: int | None) -> Iterator[ServedView | None]:
+    """The same of a robot that is served on that kind of board.
+
+    Raises:
+        BoebotError: the port is taken, or is given without --view.
+    """
+    if not view:
+        if port is not None:
+            raise BoebotError("--view-port is of a live view; expected --view with it")
+        yield None
+        return
+    from boebot.live.served_view import ServedView
+    from boebot.live.session import show
+
+    page = ServedView(request, kind, port=port or 0)
+    try:
+        show(page.url, _tell)
+        yield page
+    finally:
+        page.close()
 
 
 def run(page: LiveView, request: Request, run_all: Callable[[Request], Result], *, waits: bool = True) -> Result:

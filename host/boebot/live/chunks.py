@@ -6,6 +6,7 @@ It holds few ticks: the page is for the eye, the record has all of them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -49,7 +50,7 @@ class Chunks:
         self._place: tuple[float, float, float] | None = None  # by odometry, at that last tick
         self._start: tuple[float, float, float] | None = None  # where the run began
         self._offset_s = 0.0  # the transport's clock at the run's time 0
-        self._cycles: tuple[float, float] = 0.0, 0.0  # executed, and all
+        self._counters: Mapping[str, float] = {}  # of the board, when it was last looked at
 
     def make(self) -> dict[str, Any] | None:
         """The rows of a chunk; None: nothing has happened."""
@@ -123,15 +124,10 @@ class Chunks:
         return pose
 
     def _load(self, ticks: int) -> Floats | None:
-        """The share of its cycles that an emulated board worked since the last chunk."""
-        counters = self._hands.driver.session.counters()
-        if "executed_cycles" not in counters or "load" not in counters or not counters["load"]:
-            return None
-        executed, before = counters["executed_cycles"], self._cycles
-        all_of_them = executed / counters["load"]
-        self._cycles = executed, all_of_them
-        passed = all_of_them - before[1]
-        return np.full(ticks, (executed - before[0]) / passed if passed > 0 else counters["load"])
+        """At each of so many ticks."""
+        before, self._counters = self._counters, self._hands.driver.session.counters()
+        share = load(before, self._counters)
+        return None if share is None else np.full(ticks, share)
 
     def moving(self, plan: FloorPlan) -> list[Moving]:
         """The moving shapes of that plan where they are now."""
@@ -167,6 +163,17 @@ class Chunks:
             names=result.brain_names,
             cognitive=self._cognitive(),
         )
+
+
+def load(before: Mapping[str, float], now: Mapping[str, float]) -> float | None:
+    """The share of its cycles that an emulated board has worked between two looks at its counters; None: not known."""
+    if not now.get("load"):
+        return None
+    passed_s = now["time_s"] - before.get("time_s", 0.0)
+    if passed_s <= 0:
+        return None
+    worked_s = [one["load"] * one["time_s"] if one else 0.0 for one in (before, now)]
+    return (worked_s[1] - worked_s[0]) / passed_s
 
 
 def _part(record: Record, series: Series, kept: Any) -> Record:

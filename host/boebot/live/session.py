@@ -26,18 +26,19 @@ def opened(say: Callable[[str], None], *, port: int = 0, speed: float | None = 1
     Raises:
         BoebotError: the port is taken.
     """
-
-    def show(url: str) -> None:
-        say(url)
-        if has_display():
-            with contextlib.suppress(webbrowser.Error):
-                webbrowser.open(url)
-
-    view = LiveView(show, port=port, speed=speed)
+    view = LiveView(lambda url: show(url, say), port=port, speed=speed)
     try:
         yield view
     finally:
         view.close()
+
+
+def show(url: str, say: Callable[[str], None]) -> None:
+    """Tells the address, and opens the page where there is a display."""
+    say(url)
+    if has_display():
+        with contextlib.suppress(webbrowser.Error):
+            webbrowser.open(url)
 
 
 def has_display() -> bool:

@@ -1,0 +1,185 @@
+"""The pages that look at something: each gets what has happened so far, and then what happens, as fast as it reads."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from typing import Any, Protocol
+
+from boebot.errors import BoebotError
+from boebot.live import messages
+from boebot.live.outbox import Message, merged
+from boebot.live.page_server import LOOPBACK, Page, PageServer
+from boebot.view import page_data, web_page
+
+PAST = 1_200  # chunks that are kept for pages that come later
+BYE_S = 0.5  # for the last messages
+
+
+class Stage(Protocol):
+    """What pages look at, told of them in the server's thread."""
+
+    def came(self, page: int) -> None:
+        """A page is there; its number."""
+
+    def went(self, page: int) -> None:
+        """It is gone."""
+
+    def asked(self, page: int, what: messages.Asked) -> None:
+        """It wants something.
+
+        Raises:
+            BoebotError: that cannot be done; the page is told.
+        """
+
+
+class Audience:
+    """All pages, from one run to the next (a `page_server.Listener`).
+
+    Attributes:
+        url: the address of the page.
+        changed: notified when a page comes, goes or asks for something.
+    """
+
+    def __init__(self, stage: Stage, *, host: str = LOOPBACK, port: int = 0) -> None:
+        """Raises BoebotError where the port is taken."""
+        self._stage = stage
+        self._lock = threading.Lock()  # of all that follows: two threads use it
+        self.changed = threading.Condition(self._lock)
+        self._pages: dict[int, Page] = {}
+        self._run: Message | None = None  # the present run's first message, without rows
+        self._end: Message | None = None
+        self._past: deque[Message] = deque()
+        self._layers: list[dict[str, Message]] = []  # of each robot the newest sketches
+        self._server = PageServer(web_page.live, self, host=host, port=port)
+        self.url = self._server.url
+
+    @property
+    def is_there(self) -> bool:
+        """A page is open."""
+        return bool(self._pages)
+
+    # ---- in the server's thread ------------------------------------------------------------------------------------
+
+    def came(self, page: Page) -> None:
+        """See `page_server.Listener`. It gets nothing before it has said hello."""
+
+    def heard(self, page: Page, data: str) -> str | None:
+        """See `page_server.Listener`."""
+        try:
+            what = messages.decode(data)
+        except BoebotError as error:
+            return str(error)
+        if isinstance(what, messages.Hello):
+            if what.format != page_data.FORMAT:
+                return f"this page is of another version (format {what.format}, not {page_data.FORMAT}); load it again"
+            with self.changed:
+                self._pages[page.number] = page
+                self._begin_page(page)
+                self.changed.notify_all()
+            self._stage.came(page.number)
+            return None
+        if page.number not in self._pages:
+            return "expected hello first"
+        try:
+            self._stage.asked(page.number, what)
+        except BoebotError as error:
+            self._send(page, {"type": "refused", "sentence": str(error)})
+        with self.changed:
+            self.changed.notify_all()
+        return None
+
+    def went(self, page: Page) -> None:
+        """See `page_server.Listener`."""
+        self._stage.went(page.number)
+        with self.changed:
+            self._pages.pop(page.number, None)
+            self.changed.notify_all()
+
+    # ---- in the thread of what is looked at ------------------------------------------------------------------------
+
+    def pages(self) -> list[int]:
+        """Their numbers."""
+        with self._lock:
+            return list(self._pages)
+
+    def forget(self, robots: int) -> None:
+        """Another run begins, of so many robots."""
+        with self._lock:
+            self._run = self._end = None
+            self._past.clear()
+            self._layers = [{} for _ in range(robots)]
+
+    @property
+    def knows_run(self) -> bool:
+        """What `begin` tells is told."""
+        return self._run is not None
+
+    def begin(self, run: Message) -> None:
+        """What pages know of a run from its start; they get it with the first chunk."""
+        self._run = run
+
+    def add(self, chunk: Message) -> None:
+        """What has happened since the last one."""
+        with self._lock:
+            for known, rows in zip(self._layers, chunk["runs"], strict=True):
+                known.update((layer["name"], layer) for layer in rows["layers"])
+            self._past.append(chunk | {"runs": [rows | {"layers": []} for rows in chunk["runs"]]})
+            if len(self._past) > PAST:
+                pairs = zip(*[iter(self._past)] * 2, strict=False)
+                self._past = deque([merged(one, other) for one, other in pairs])
+            is_first = len(self._past) == 1
+            for page in self._pages.values():
+                if is_first:
+                    self._begin_page(page)
+                else:
+                    self._send(page, _as_seen_by(page, chunk))
+
+    def tell(self, message: Message) -> None:
+        """A message for all pages, which none that comes later needs."""
+        with self._lock:
+            for page in self._pages.values():
+                self._send(page, _as_seen_by(page, message))
+
+    def end(self, message: Message) -> None:
+        """The run has ended; pages that come later are told, too."""
+        with self._lock:
+            self._end = message
+            for page in self._pages.values():
+                self._send(page, message)
+
+    def close(self) -> None:
+        """Nothing is shown any more; what pages wait for still gets to them."""
+        deadline = time.monotonic() + BYE_S
+        while time.monotonic() < deadline and any(page.outbox.is_waiting for page in list(self._pages.values())):
+            time.sleep(0.01)
+        self._server.close()
+
+    def _begin_page(self, page: Page) -> None:
+        """The run with its first chunk, those since, and its end."""
+        if self._run is None or not self._past:
+            return
+        past = [_as_seen_by(page, chunk) for chunk in self._past]
+        newest = zip(past[-1]["runs"], self._layers, strict=True)
+        past[-1] = past[-1] | {"runs": [rows | {"layers": list(layers.values())} for rows, layers in newest]}
+        first, *others = past
+        runs = [known | {"rows": rows} for known, rows in zip(self._run["runs"], first["runs"], strict=True)]
+        begin = self._run | {"runs": runs, "moving": first["moving"]}
+        end = [] if self._end is None else [self._end]
+        page.outbox.begin(begin, [*others, {"type": "state", "state": past[-1]["state"]}, *end])
+        self._server.wake(page)
+
+    def _send(self, page: Page, message: Message) -> None:
+        page.outbox.put(message)
+        self._server.wake(page)
+
+
+def _as_seen_by(page: Page, message: Message) -> Message:
+    """With who drives each robot by hand, who is a page's number so far, in that page's words."""
+    state: dict[str, Any] | None = message.get("state")
+    if state is None:
+        return message
+    words = {None: None, page.number: "you"}
+    robots = [robot | {"driver": words.get(robot["driver"], "another")} for robot in state["robots"]]
+    return message | {"state": state | {"robots": robots, "driver": robots[0]["driver"]}}
