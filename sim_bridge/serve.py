@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
-from boebot.boards import BoardRequest, TruthNow, Visit
+from boebot.boards import BoardRequest, BoardSession, Visit
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.served_ports.port import Port
@@ -31,7 +31,7 @@ AHEAD_CYCLES = CLOCK_HZ // 100  # bytes for this time are put on the line at mos
 BITS_PER_BYTE = 10
 LOOK_S = 0.05  # between two looks at where the robot is
 
-Look = Callable[[TruthNow, Mapping[str, float]], None]
+Look = Callable[[BoardSession, bytes], None]
 
 
 class LineToBoard:
@@ -73,6 +73,7 @@ def carry(
     line = LineToBoard(session)
     baud = None
     brisk_until = look_at = 0.0
+    said = bytearray()  # by the board, since somebody looked last
     while running():
         for event in port.look():
             if event.what == "came":
@@ -87,9 +88,12 @@ def carry(
             brisk_until = time.monotonic() + BRISK_FOR_S
         if data := session.robot.receive():
             port.write(data)
+            if look is not None:
+                said += data
         if look is not None and time.monotonic() >= look_at:
             look_at = time.monotonic() + LOOK_S
-            look(session.truth_now(), session.counters())
+            look(session, bytes(said))
+            said.clear()
         port.wait(BRISK_S if time.monotonic() < brisk_until else IDLE_S)
 
 

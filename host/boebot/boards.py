@@ -267,12 +267,12 @@ class Server(Protocol):
         announce: Callable[[str], None],
         visit: Callable[[Visit], None],
         running: Callable[[], bool],
-        look: Callable[[TruthNow, Mapping[str, float]], None] | None = None,
+        look: Callable[[BoardSession, bytes], None] | None = None,
     ) -> None:
         """Serves an emulated board of that kind at real-time pace until `running()` is false: on a new pty,
         or on TCP port `tcp` of loopback (0: any free one). Calls `announce(url)` once clients may open that
-        URL, `visit` when one comes, goes or is refused, and `look` about 20 times a second with what is true now and
-        the session's counters; it returns at once, since the robot waits meanwhile."""
+        URL, `visit` when one comes, goes or is refused, and `look` about 20 times a second with the session and what
+        the board has sent since; it returns at once, since the robot waits meanwhile."""
 
 
 class LiveSession:

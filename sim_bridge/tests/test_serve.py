@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import pytest
 import serial
 
-from boebot.boards import BoardRequest, TruthNow, Visit, open_port
+from boebot.boards import BoardRequest, BoardSession, TruthNow, Visit, open_port
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
@@ -148,12 +148,21 @@ def test_what_cannot_be_served_is_told() -> None:
 def test_somebody_looks_where_the_robot_is() -> None:
     """With a client or without, twenty times a second and in order of time."""
     seen: list[tuple[TruthNow, float]] = []
-    with served(0, look=lambda truth, counters: seen.append((truth, counters["time_s"]))) as url:
+    said = bytearray()
+
+    def look(session: BoardSession, data: bytes) -> None:
+        truth = session.truth_now()
+        assert truth is not None
+        seen.append((truth, session.counters()["time_s"]))
+        said.extend(data)
+
+    with served(0, look=look) as url:
         time.sleep(0.5)
         client = open_port(url, 500_000)
-        client.read(0.5)
+        heard = client.read(0.5)
         client.close()
         time.sleep(0.5)
+    assert heard in bytes(said)
     times = [time_s for _, time_s in seen]
     assert times == sorted(times)
     assert 0.8 * 20 <= (len(times) - 1) / (times[-1] - times[0]) <= 20.5

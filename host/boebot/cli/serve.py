@@ -43,7 +43,7 @@ def serve(
     description = load_robot(robot)
     check_board(on, description)
     request = BoardRequest(
-        robot=description, arena=arena, seed=seed, realtime=True, record=False, without=options.names(without)
+        robot=description, arena=arena, seed=seed, realtime=True, record=view, without=options.names(without)
     )
 
     def announce(url: str) -> None:

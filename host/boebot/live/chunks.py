@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from boebot.arenas.floor_plan import FloorPlan, Moving
+from boebot.boards import BoardSession, VehicleSession
 from boebot.devices.whisker import Whisker
 from boebot.link.messages import DevicesTelemetry
 from boebot.record.blocks import Block, Group, joined
@@ -33,17 +34,51 @@ TICKS_AT_MOST = 12  # in a chunk
 COGNITIVE_AT_MOST = 4
 
 
+class Source(Protocol):
+    """Where the rows of a robot come from."""
+
+    @property
+    def session(self) -> BoardSession | VehicleSession:
+        """The robot as it was opened."""
+
+    @property
+    def clock_offset_s(self) -> float:
+        """The transport's clock at the run's time 0, once there are rows."""
+
+    def news(self) -> Group:
+        """The rows of a record that came since this was last asked."""
+
+
+class OfRun:
+    """A robot of a run, whose rows go into its record (a `Source`)."""
+
+    def __init__(self, hands: Hands) -> None:
+        self._driver, self._task = hands.driver, hands.task
+        self.session = hands.driver.session
+
+    @property
+    def clock_offset_s(self) -> float:
+        """See `Source`."""
+        return self._driver.result(None, 0.0).clock_offset
+
+    def news(self) -> Group:
+        """See `Source`."""
+        gather_rows(self._driver, self._task)
+        return self._task.record.news()
+
+
 class Chunks:
-    """Of one robot of a run.
+    """Of one robot.
 
     Attributes:
         content: what the page knows of the robot from the start; None before the first chunk.
     """
 
-    def __init__(self, hands: Hands, result: RunResult, number: int) -> None:
-        """`result`: what is known as the run begins. `number`: of the robot, from 1."""
+    def __init__(self, source: Source, result: RunResult, number: int, *, title: str = "") -> None:
+        """`result`: what is known as the run begins. `number`: of the robot, from 1. `title`: "": by the result."""
         self.content: dict[str, Any] | None = None
-        self._hands, self._result, self._number = hands, result, number
+        self._source, self._result, self._number = source, result, number
+        self._title = title or f"{result.brain} on {result.robot.name} ({result.board})"
         self._waiting: dict[str, Block] = {}  # of ticks and the truth, from the last chunk's last tick on
         self._first = 0  # index of the first new tick in them
         self._directions = Directions()
@@ -54,9 +89,7 @@ class Chunks:
 
     def make(self) -> dict[str, Any] | None:
         """The rows of a chunk; None: nothing has happened."""
-        task = self._hands.task
-        gather_rows(self._hands.driver, task)
-        news = task.record.news()
+        news = self._source.news()
         for name in (*OF_TICKS, "truth"):
             if name in news:
                 self._waiting[name] = joined(self._waiting.get(name), news[name])
@@ -64,7 +97,7 @@ class Chunks:
         if record.ticks <= self._first:
             return None
         if self.content is None:
-            self._offset_s = self._hands.driver.result(None, 0.0).clock_offset
+            self._offset_s = self._source.clock_offset_s
         stretch, series = self._stretch(record, news)
         if self.content is None:
             self.content = self._content(series, stretch)
@@ -125,13 +158,13 @@ class Chunks:
 
     def _load(self, ticks: int) -> Floats | None:
         """At each of so many ticks."""
-        before, self._counters = self._counters, self._hands.driver.session.counters()
+        before, self._counters = self._counters, self._source.session.counters()
         share = load(before, self._counters)
         return None if share is None else np.full(ticks, share)
 
     def moving(self, plan: FloorPlan) -> list[Moving]:
         """The moving shapes of that plan where they are now."""
-        now = self._hands.driver.session.truth_now()
+        now = self._source.session.truth_now()
         if now is None or "truth" not in self._waiting:
             return []
         time = self._waiting["truth"].times[-1:]
@@ -150,7 +183,7 @@ class Chunks:
             result.robot,
             series,
             number=self._number,
-            title=f"{result.brain} on {result.robot.name} ({result.board})",
+            title=self._title,
             brain=result.brain,
             begin=self._offset_s,
             known="truth" in self._waiting,

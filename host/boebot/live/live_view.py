@@ -17,7 +17,7 @@ from boebot.boards import imperfections
 from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.audience import Audience
-from boebot.live.chunks import Chunks
+from boebot.live.chunks import Chunks, OfRun
 from boebot.live.controls import Controls
 from boebot.live.outbox import LETTERS, Message
 from boebot.live.pace import Pace
@@ -98,7 +98,7 @@ class LiveView:
         self._pace = Pace(self._speed if "speed" in can else None)
         self._robots = list(robots)
         self._chunks = [
-            Chunks(each, result, n) for n, (each, result) in enumerate(zip(robots, results, strict=True), 1)
+            Chunks(OfRun(each), result, n) for n, (each, result) in enumerate(zip(robots, results, strict=True), 1)
         ]
         world = results[0].world
         self._plan = FloorPlan() if world is None else floor_plan(world, 0.0, 0.0)

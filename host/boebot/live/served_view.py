@@ -1,29 +1,79 @@
-"""The live view of a robot that is served to other programs: it has no brain here, so the page shows where it truly is,
-what moves in its arena, and how much its board works. It lets nobody interfere: who drives it is the other program."""
+"""The live view of a robot that is served to other programs. It has no brain here; the page shows where it truly is
+and, while a program has its port, what its board senses and does: the view reads along what the board sends. It lets
+nobody interfere: the robot is driven by the other program."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from boebot.arenas import load_arena
 from boebot.arenas.floor_plan import floor_plan
-from boebot.boards import BoardRequest, TruthNow, Visit
-from boebot.devices.readings import Readings
+from boebot.boards import BoardRequest, BoardSession, Visit
 from boebot.errors import BoebotError
-from boebot.link.messages import Status
+from boebot.link.frame import NO_SESSION, Decoder
+from boebot.link.messages import DEVICE_MESSAGES, Hello, Telemetry
 from boebot.live import messages
 from boebot.live.audience import Audience
-from boebot.live.chunks import load
+from boebot.live.chunks import Chunks
 from boebot.live.page_server import LOOPBACK
-from boebot.record.readings_series import ReadingsSeries
+from boebot.record.blocks import Group
 from boebot.record.record import Record
-from boebot.record.series import Pose
-from boebot.record.shown import Shown
+from boebot.record.result import RunResult
+from boebot.timing.realisable import TICK_S
 from boebot.view import page_data, scene
+
+_SILENT_S = 0.2  # after so long a time without telemetry nobody listens to the board
+_NOTHING = bytes(Telemetry.LENGTH)  # telemetry of a board that says nothing
+
+
+class ReadAlong:
+    """The rows of a served robot: what its board sends, and the truth (a `boebot.live.chunks.Source`)."""
+
+    clock_offset_s = 0.0
+
+    def __init__(self, session: BoardSession) -> None:
+        self.session = session
+        self._decoder = Decoder(NO_SESSION)
+        self._data = b""
+        self._heard_s = -_SILENT_S
+        self._last_s = -1.0  # of the newest row
+
+    def hear(self, data: bytes) -> None:
+        """What the board has sent."""
+        self._data += data
+
+    def news(self) -> Group:
+        """See `Source`. Nothing but the truth is known while no program has the port."""
+        record, now_s = Record(), self.session.counters()["time_s"]
+        telemetry = [payload for number, payload in self._messages(record, now_s) if number == Telemetry.ID]
+        if telemetry:
+            self._heard_s = now_s
+        elif now_s - self._heard_s > _SILENT_S:
+            telemetry = [_NOTHING]
+        for index, payload in enumerate(telemetry, 1 - len(telemetry)):
+            time_s = now_s + index * TICK_S
+            if time_s > self._last_s:
+                record.append_telemetry(time_s, payload, time_s, 0.0)
+                record.append_command(time_s, "stop", 0.0, 0.0)
+                self._last_s = time_s
+        record.put(self.session.drain())
+        return record.news()
+
+    def _messages(self, record: Record, now_s: float) -> list[tuple[int, bytes]]:
+        """Number and payload of each that has come whole. The handshake tells the session, by which the others are
+        known."""
+        data, self._data = self._data, b""
+        found = []
+        kinds = {kind.ID: kind for kind in DEVICE_MESSAGES}
+        while data:
+            piece, delimiter, data = data.partition(b"\0")
+            for number, _, payload in self._decoder.feed(piece + delimiter):
+                if number == Hello.ID:
+                    self._decoder.seed = Hello.unpack(payload).session or NO_SESSION
+                elif number in kinds:
+                    record.append(kinds[number].NAME, now_s, payload)
+                found.append((number, payload))
+        return found
 
 
 class ServedView:
@@ -41,8 +91,8 @@ class ServedView:
         """
         self._request, self._kind = request, kind
         self._plan = floor_plan(load_arena(request.arena), 0.0, 0.0)
-        self._before: tuple[TruthNow, Mapping[str, float]] | None = None
-        self._start: tuple[float, float, float] | None = None
+        self._source: ReadAlong | None = None
+        self._chunks: Chunks | None = None
         self._printed = ""
         self._audience = Audience(self, host=host, port=port)
         self._audience.forget(1)
@@ -63,42 +113,26 @@ class ServedView:
         """A program came, went or was refused."""
         self._printed += f"{visit.client} {visit.what}{visit.why and f': {visit.why}'}\n"
 
-    def look(self, now: TruthNow, counters: Mapping[str, float]) -> None:
+    def look(self, session: BoardSession, data: bytes) -> None:
         """See `boebot.boards.Server`."""
-        before = self._before
-        self._before = now, counters
-        if before is None:
-            self._start = now.pose
-            self._audience.begin(self._content(self._series(counters["time_s"])))
+        if self._source is None or self._chunks is None:
+            self._source = ReadAlong(session)
+            title = f"{self._request.robot.name} ({self._kind}), served"
+            self._chunks = Chunks(self._source, self._result(session), 1, title=title)
+        self._source.hear(data)
+        rows = self._chunks.make()
+        if rows is None:
             return
-        time_s = counters["time_s"]
-        if time_s <= before[1]["time_s"]:
-            return
-        share = load(before[1], counters)
-        is_new = now.contacts > before[0].contacts
-        stretch = page_data.Stretch(
-            series=self._series(time_s),
-            path=Pose(*(np.array([value]) for value in now.pose)),
-            estimate=None,
-            contact=np.array([is_new]),
-            start=self._start or now.pose,
-            shown=Shown(np.empty(0), {}, {}),
-            true_contacts=np.array([now.pose[:2]]) if is_new else np.empty((0, 2)),
-            events=[(time_s, "contact", "true contact")] if is_new else [],
-            load=None if share is None else np.array([share]),
-        )
-        moving = [
-            replace(one, time=np.array([time_s]), x=np.array([px]), y=np.array([py]), heading=np.array([turned]))
-            for one, (px, py, turned) in zip(self._plan.moving, now.shapes, strict=True)
-        ]
+        if not self._audience.knows_run:
+            self._audience.begin(self._first_message(self._chunks, session))
         printed, self._printed = self._printed, ""
         self._audience.add(
             {
                 "type": "chunk",
                 "number": 1,
-                "runs": [page_data.rows_data(stretch)],
-                "moving": page_data.moving_data(moving),
-                "state": self._state(time_s),
+                "runs": [rows],
+                "moving": page_data.moving_data(self._chunks.moving(self._plan)),
+                "state": _state(session.counters()["time_s"]),
                 "printed": printed,
             }
         )
@@ -107,50 +141,48 @@ class ServedView:
         """No pages any more."""
         self._audience.close()
 
-    def _series(self, time_s: float) -> ReadingsSeries:
-        """A tick without readings: what the board senses it tells only who has its port."""
-        record = Record()
-        record.append_readings(time_s, Readings(0, int(Status.MOTORS_ENABLED), (), ()), 0.0, 0.0)
-        return ReadingsSeries(record, self._request.robot, 0.01, {})
-
-    def _content(self, series: ReadingsSeries) -> dict[str, Any]:
-        robot, arena = self._request.robot, self._plan.name
-        low, high = scene.plan_bounds(self._plan, [(0.0, 0.0)] if self._start is None else [self._start[:2]])
-        about = page_data.robot_data(
-            robot,
-            series,
-            number=1,
-            title=f"{robot.name} ({self._kind}), served",
+    def _result(self, session: BoardSession) -> RunResult:
+        """What is known of it as of a run."""
+        request = self._request
+        return RunResult(
             brain="another program",
-            begin=0.0,
-            known=True,
-            has_estimate=False,
-            table={"robot": robot.name, "arena": arena, "seed": self._request.seed},
+            robot=request.robot,
+            board=self._kind,
+            description=session.description,
+            arena=request.arena,
+            seed=request.seed,
+            period=TICK_S,
+            tick=TICK_S,
+            error=None,
+            record=Record(),
+            world=session.arena,
+            clock_offset=0.0,
+            steps=0,
+            late_steps=0,
+            resets=0,
+            lost_frames=0,
+            bad_frames=0,
+            run_time=0.0,
+            wall_time=0.0,
+            without=request.without,
         )
+
+    def _first_message(self, chunks: Chunks, session: BoardSession) -> dict[str, Any]:
+        now = session.truth_now()
+        low, high = scene.plan_bounds(self._plan, [] if now is None else [now.pose[:2]])
+        none = {"can": [], "seed": self._request.seed, "seconds": None, "imperfections": []}
         return {
             "type": "run",
             "number": 1,
             "format": page_data.FORMAT,
             "plan": page_data.plan_data(self._plan),
             "bounds": [*low.tolist(), *high.tolist()],
-            "runs": [about],
-            "live": {
-                "can": [],
-                "seed": self._request.seed,
-                "seconds": None,
-                "imperfections": [],
-                "robots": [{"parameters": []}],
-            },
+            "runs": [chunks.content],
+            "live": none | {"robots": [{"parameters": []}]},
         }
 
-    def _state(self, time_s: float) -> dict[str, Any]:
-        robot = {"parameters": {}, "latched": False, "driver": None, "pose": None, "link": None}
-        return {
-            "paused": False,
-            "speed": 1.0,
-            "rate": 1.0,
-            "time": time_s,
-            "touched": 0,
-            "driver": None,
-            "robots": [robot],
-        }
+
+def _state(time_s: float) -> dict[str, Any]:
+    robot = {"parameters": {}, "latched": False, "driver": None, "pose": None, "link": None}
+    run = {"paused": False, "speed": 1.0, "rate": 1.0, "time": time_s, "touched": 0, "driver": None}
+    return run | {"robots": [robot]}
