@@ -1,4 +1,4 @@
-"""What a person needs of a page, who may have no mouse, or may not see it: measured in the browser."""
+"""What a person needs of a page who looks at it, or uses it without a mouse or without eyes: measured in the browser."""
 
 from __future__ import annotations
 
