@@ -62,70 +62,34 @@ function setControls(on) {
 }
 
 // ---- another run ----
+const RESTART = `<form><h2>Begin the run anew</h2>
+  <div class="seed"><label for="seed">seed</label><input type="number" id="seed" min="0" step="1">
+    <button type="button" id="anotherSeed">another</button></div>
+  <div id="choices"><h3>Imperfections of the simulated robot</h3><div class="choices"></div></div>
+  <div class="buttons"><button type="button" id="cancel">Cancel</button><button class="main">Restart</button></div></form>`;
 function askRestart() {
-  const seed = element("input", { type: "number", id: "seed", min: 0, step: 1, value: live.seed ?? 0 });
-  const boxes = (live.imperfections || []).map(one =>
-    element("input", { type: "checkbox", name: one.name, checked: !one.off }),
-  );
-  const rows = (live.imperfections || []).map((one, k) =>
-    element(
-      "label",
-      { className: "choice", title: one.text || "" },
-      boxes[k],
-      element("span", {}, element("b", { textContent: one.name }), " " + (one.text || "")),
-    ),
-  );
-  const dialog = element("dialog", { id: "restartDialog", ariaLabel: "Restart" });
-  const go = () => {
-    send({
-      type: "restart",
-      seed: Math.max(0, Math.round(Number(seed.value) || 0)),
-      without: boxes.filter(box => !box.checked).map(box => box.name),
-    });
+  const dialog = element("dialog", { id: "restartDialog", ariaLabel: "Restart", innerHTML: RESTART });
+  document.body.append(dialog);
+  const imperfections = live.imperfections || [];
+  const boxes = imperfections.map(one => element("input", { type: "checkbox", name: one.name, checked: !one.off }));
+  dialog.querySelector(".choices").append(...imperfections.map((one, k) => choice(one, boxes[k])));
+  hide("choices", !boxes.length);
+  $("seed").value = live.seed ?? 0;
+  $("anotherSeed").onclick = () => ($("seed").value = Math.floor(Math.random() * 1e6));
+  $("cancel").onclick = () => dialog.close();
+  dialog.onclose = () => dialog.remove();
+  dialog.querySelector("form").onsubmit = event => {
+    event.preventDefault();
+    const seed = Math.max(0, Math.round(Number($("seed").value) || 0));
+    send({ type: "restart", seed, without: boxes.filter(box => !box.checked).map(box => box.name) });
     dialog.close();
   };
-  const buttons = element(
-    "div",
-    { className: "buttons" },
-    element("button", { textContent: "Cancel", type: "button", onclick: () => dialog.close() }),
-    element("button", { textContent: "Restart", className: "main" }),
-  );
-  const seeds = element(
-    "div",
-    { className: "seed" },
-    element("label", { textContent: "seed ", htmlFor: "seed" }),
-    seed,
-    element("button", {
-      textContent: "another",
-      type: "button",
-      onclick: () => {
-        seed.value = Math.floor(Math.random() * 1e6);
-      },
-    }),
-  );
-  const form = element(
-    "form",
-    {
-      onsubmit: event => {
-        event.preventDefault();
-        go();
-      },
-    },
-    element("h2", { textContent: "Begin the run anew" }),
-    seeds,
-    ...(rows.length
-      ? [
-          element("h3", { textContent: "Imperfections of the simulated robot" }),
-          element("div", { className: "choices" }, ...rows),
-        ]
-      : []),
-    buttons,
-  );
-  dialog.append(form);
-  dialog.onclose = () => dialog.remove();
-  document.body.append(dialog);
   dialog.showModal();
-  seed.focus();
+  $("seed").focus();
+}
+function choice(imperfection, box) {
+  const text = element("span", {}, element("b", { textContent: imperfection.name }), " " + (imperfection.text || ""));
+  return element("label", { className: "choice" }, box, text);
 }
 
 // ---- what is told of the run ----
