@@ -42,6 +42,7 @@ const byId = {}, lamps = [...page.matchAll(/class="lamp" data-bit="(\d+)" data-d
 Object.assign(globalThis, {
   document: { getElementById: id => (byId[id] ??= element()), createElement: element, querySelectorAll: () => lamps, documentElement: {} },
   getComputedStyle: () => ({ getPropertyValue: name => palette[name] }), matchMedia: () => ({ addEventListener() {} }),
+  ResizeObserver: class { observe() {} },
   location: { hash: "" }, addEventListener() {}, requestAnimationFrame() {}, devicePixelRatio: 1,
 });
 vm.runInThisContext(script);

@@ -80,6 +80,7 @@ function resize() {
   else centre(x, y);
   viewChanged();
   tracksChanged();
+  draw(); // at once: the canvases are empty now
 }
 
 // ---- wheel, fingers, mouse and keys on the arena ----

@@ -6,9 +6,8 @@ function start() {
   listenToTracks();
   listenToPointer();
   listenToTime();
-  addEventListener("resize", () => {
-    if (run) resize();
-  });
+  const sizes = new ResizeObserver(() => run && resize()); // of the window, or a lane more
+  for (const id of ["stage", "cursor"]) sizes.observe($(id));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     readColours();
     if (run) {
@@ -29,6 +28,5 @@ function show(content) {
   run = runs[Math.min(runs.length, Math.max(1, chosen)) - 1];
   now = at ? Math.min(run.duration, Number(at[1])) : 0;
   chooseRobot(runs.indexOf(run));
-  draw();
 }
 start();

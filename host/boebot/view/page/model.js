@@ -105,6 +105,7 @@ class Run {
     this.events = [];
     this.pins = [];
     this.placed = null; // where it has been put while time stands still
+    this.kinds = 0; // of events
     this.names = 0; // how many numbers, texts, layers and pins have come: a new one asks for new panels
     if (rows) this.append(rows);
   }
@@ -123,9 +124,13 @@ class Run {
     this.flags.append(bytes(rows.flags));
     appendEach(this.path, rows.path);
     if (this.estimate && rows.estimate) appendEach(this.estimate, rows.estimate);
-    if (rows.pulses) appendEach((this.pulses ??= [new Column(), new Column()]), rows.pulses);
-    if (rows.load) (this.load ??= new Column()).append(floats(rows.load));
-    for (const column of [...(this.pulses || []), ...(this.load ? [this.load] : [])]) column.fill(this.time.length);
+    if (rows.pulses) this.pulses ??= [new Column(), new Column()];
+    this.pulses?.forEach((column, k) => this.appendKnown(column, rows.pulses?.[k]));
+    if (rows.load && !this.load) {
+      this.load = new Column();
+      this.names++; // it has a lane
+    }
+    if (this.load) this.appendKnown(this.load, rows.load);
     rows.readings.forEach((one, k) => {
       this.readings[k].values.append(floats(one.values));
       this.readings[k].ages.append(floats(one.ages));
@@ -138,6 +143,12 @@ class Run {
     this.touches.push(...rows.touches);
     this.appendEvents(rows.events);
     (rows.pins || []).forEach(pin => this.appendPin(pin));
+  }
+  // What is not known in every chunk, when all else is there already.
+  appendKnown(column, text) {
+    const values = text ? floats(text) : [];
+    column.fill(this.time.length - values.length);
+    column.append(values);
   }
   appendShown(shown) {
     const before = this.shownTime.length,
@@ -175,6 +186,9 @@ class Run {
   }
   appendEvents(events) {
     for (const [time, kind, text] of events) this.events.push({ time, kind, text });
+    const kinds = new Set(this.events.map(event => event.kind)).size;
+    if (kinds !== this.kinds) this.names++; // the legend has them
+    this.kinds = kinds;
     this.events.sort((a, b) => a.time - b.time);
   }
   appendPin(pin) {

@@ -95,7 +95,7 @@ const LEAP = 5; // s
 function replayKey(e) {
   const step = e.shiftKey ? LEAP : STEP;
   if (e.key === " ") {
-    if (e.target.tagName === "BUTTON") return false; // it takes it for itself
+    if (pageIsLive || e.target.tagName === "BUTTON") return false; // a button takes it for itself
     setPlaying(!playing);
   } else if (e.key === "ArrowLeft") seek(now - step);
   else if (e.key === "ArrowRight") seek(now + step);
