@@ -13,6 +13,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
 DEAD_BAND = 0.05  # motor signal below which a servo does not turn
 HOLD_S = 0.06
 
@@ -35,6 +40,14 @@ class WheelDirection:
             self._reversed_s = 0.0
         return self.sign
 
+    def update_all(self, signals: Floats, steps_s: Floats) -> NDArray[np.int64]:
+        """Many updates one after the other: the signs, shape (n,)."""
+        if not ((signals * self.sign < 0) & (np.abs(signals) >= DEAD_BAND)).any():  # most often
+            self._reversed_s = 0.0 if len(signals) else self._reversed_s
+            return np.full(len(signals), self.sign, dtype=np.int64)
+        updates = zip(signals.tolist(), steps_s.tolist(), strict=True)
+        return np.array([self.update(signal, step_s) for signal, step_s in updates], dtype=np.int64)
+
 
 class Odometry:
     """The pose estimate; heading counter-clockwise, in (-pi, pi]."""
@@ -54,3 +67,13 @@ class Odometry:
         self.y += travelled * math.sin(middle)
         heading = self.heading + turned
         self.heading = math.atan2(math.sin(heading), math.cos(heading))
+
+
+def dead_reckoning(left_m: Floats, right_m: Floats, track_width_m: float) -> tuple[Floats, Floats, Floats]:
+    """The same for many updates one after the other, from a pose of zeros: x (m), y (m), heading (rad) after each."""
+    turned = (right_m - left_m) / track_width_m
+    heading = np.cumsum(turned)
+    middle = heading - turned / 2
+    travelled = (left_m + right_m) / 2
+    x, y = np.cumsum(travelled * np.cos(middle)), np.cumsum(travelled * np.sin(middle))
+    return x, y, np.arctan2(np.sin(heading), np.cos(heading))

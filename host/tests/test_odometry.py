@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from boebot.odometry import DEAD_BAND, HOLD_S, Odometry, WheelDirection
+from boebot.odometry import DEAD_BAND, HOLD_S, Odometry, WheelDirection, dead_reckoning
 
 TRACK_M = 0.105
 
@@ -55,3 +55,24 @@ def test_stop_and_dead_band_keep_the_sign() -> None:
     for _ in range(3):  # reversals that are undone in time
         assert {wheel.update(-0.5, 0.01) for _ in range(4)} == {1}
         assert wheel.update(0.5, 0.01) == 1
+
+
+def test_many_updates_at_once_are_those_one_by_one() -> None:
+    chance = np.random.default_rng(1)
+    left, right = chance.normal(0.0, 0.002, (2, 500))
+    estimate = Odometry(TRACK_M)
+    one_by_one = []
+    for left_m, right_m in zip(left, right, strict=True):
+        estimate.update(float(left_m), float(right_m))
+        one_by_one.append((estimate.x, estimate.y, estimate.heading))
+    assert np.column_stack(dead_reckoning(left, right, TRACK_M)) == pytest.approx(np.array(one_by_one), abs=1e-9)
+
+
+@pytest.mark.parametrize("low", [-1.0, -0.04, 0.0])
+def test_signs_of_many_ticks_are_those_one_by_one(low: float) -> None:
+    signals = np.repeat(np.random.default_rng(2).uniform(low, 1.0, 60), 8)
+    steps = np.full(len(signals), 0.01)
+    one, other = WheelDirection(), WheelDirection()
+    signs = [one.update(float(signal), 0.01) for signal in signals]
+    parts = [other.update_all(signals[at : at + 100], steps[at : at + 100]) for at in range(0, len(signals), 100)]
+    assert np.concatenate(parts).tolist() == signs

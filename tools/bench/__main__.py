@@ -29,6 +29,7 @@ MODULES = (
     "clock",
     "speed",
     "record",
+    "live",
     "demo_brain",
     "world",
     "navigation",

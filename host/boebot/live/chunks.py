@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan, Moving
 from boebot.boards import BoardSession, VehicleSession
@@ -209,19 +210,16 @@ def load(before: Mapping[str, float], now: Mapping[str, float]) -> float | None:
     return (worked_s[1] - worked_s[0]) / passed_s
 
 
-def _part(record: Record, series: Series, kept: Any) -> Record:
-    """The record of a few of its ticks, with what was in force and newest at each."""
-    part = Record()
-    stream = record.tick_stream
-    rows, commands = record.rows(stream), series.commands
-    held = series.held(DevicesTelemetry) if record.count(DevicesTelemetry.NAME) else None
-    for index in kept.tolist():
-        time_s, data = rows[index]
-        part.append(stream, time_s, data)
-        part.append_command(time_s, *commands[index])
-        if held is not None and held.newest[index] >= 0:
-            part.append(DevicesTelemetry.NAME, time_s, held.messages[held.newest[index]].pack())
-    return part
+def _part(record: Record, series: Series, kept: NDArray[np.intp]) -> Record:
+    """The record of a few of its ticks, with what was newest at each."""
+    (ticks,) = record.blocks(record.tick_stream)  # made of one group
+    part = {record.tick_stream: ticks.chosen(kept)}
+    if record.count(DevicesTelemetry.NAME):
+        held = series.held(DevicesTelemetry)
+        newest = [(index, held.messages[held.newest[index]]) for index in kept.tolist() if held.newest[index] >= 0]
+        if newest:
+            part[DevicesTelemetry.NAME] = Block.of([(float(series.time[at]), one.pack()) for at, one in newest])
+    return record_of(part)
 
 
 def _brain_of(news: Group) -> Record:

@@ -30,7 +30,7 @@ from boebot.view import page_data, scene
 EACH_S = 0.05  # of the wall clock, from chunk to chunk
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
-SHARE = 30  # of the time of a run that hurries a chunk takes this part at most
+SHARE = 60  # of the time of a run that hurries a chunk takes this part at most
 RATE_S = 1.0  # over which the speed of a run is measured
 
 

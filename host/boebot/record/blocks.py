@@ -52,6 +52,14 @@ class Block:
         ends = np.concatenate(([0], np.cumsum(self.sizes, dtype=np.int64)))
         return Block(self.times[begin:end], self.data[ends[begin] : ends[end]], self.sizes[begin:end])
 
+    def chosen(self, which: NDArray[np.intp]) -> Block:
+        """Its rows of these indices."""
+        if len(self.sizes) == 1:
+            table = np.frombuffer(self.data, np.uint8).reshape(len(self), int(self.sizes[0]))
+            return Block(self.times[which], table[which].tobytes(), self.sizes)
+        rows = self.rows()
+        return Block.of([rows[index] for index in which.tolist()])
+
     def rows(self) -> list[Row]:
         """Each row by itself."""
         ends = np.cumsum(np.broadcast_to(self.sizes, len(self.times)), dtype=np.int64).tolist()

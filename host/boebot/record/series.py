@@ -74,8 +74,8 @@ class Series(Run, ABC):
     status: NDArray[np.uint16]
 
     def __init__(self, record: Record, robot: RobotDescription, tick_s: float, layout: Layout | None) -> None:
-        self.time: Floats = np.array(record.times, dtype=np.float64)
-        self._steps = record.steps
+        self.time: Floats = record.times_of(record.tick_stream)
+        self._record = record
         self._robot = robot
         self._tick_s = tick_s
         self._layout = layout
@@ -155,7 +155,7 @@ class Series(Run, ABC):
         """The command in force at each tick, as the brain gave it."""
         commands: list[tuple[str, float, float]] = []
         current = ("stop", 0.0, 0.0)
-        for index, kind, left, right in self._steps:
+        for index, kind, left, right in self._record.steps:
             commands += [current] * (index - len(commands))
             current = (kind, left, right)
         return commands + [current] * (len(self) - len(commands))

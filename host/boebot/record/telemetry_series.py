@@ -14,7 +14,7 @@ from boebot.devices.device import Column, Held, Readout
 from boebot.devices.encoder import WheelEncoder
 from boebot.devices.servo import ContinuousServo
 from boebot.link.messages import Telemetry
-from boebot.odometry import Odometry, WheelDirection
+from boebot.odometry import WheelDirection, dead_reckoning
 from boebot.record.record import Record
 from boebot.record.series import Bools, Floats, Pose, Series
 
@@ -29,6 +29,7 @@ TELEMETRY_DTYPE = np.dtype(
         for name, code in zip(Telemetry._fields, re.findall("[bBhHiI]", Telemetry.STRUCT.format), strict=True)
     ]
 )
+_ROW = np.dtype([*TELEMETRY_DTYPE.descr, ("host", "<f8"), ("bound", "<f8")])  # of the record: with its stamp
 
 
 class Directions:
@@ -48,8 +49,7 @@ class TelemetrySeries(Series):
         """`directions`: of the wheels before, where these ticks are not a run's first; they go on with it."""
         super().__init__(record, robot, tick_s, None)
         self._directions = directions or Directions()
-        self._record = record
-        self.raw: NDArray[np.void] = np.frombuffer(b"".join(record.telemetry), dtype=TELEMETRY_DTYPE)
+        self.raw: NDArray[np.void] = record.table("telemetry", _ROW)
         self.status = self.raw["status"]
 
     @cached_property
@@ -100,14 +100,7 @@ class TelemetrySeries(Series):
 
     def odometry(self) -> Pose:
         """See `Series`: by the encoders; without them it stays there."""
-        left, right = self.wheel_travel
-        estimate = Odometry(self._robot.body.track_width_m)
-        poses = np.empty((3, len(self)))
-        for index in range(len(self)):
-            if left[index] or right[index]:
-                estimate.update(float(left[index]), float(right[index]))
-            poses[0, index], poses[1, index], poses[2, index] = estimate.x, estimate.y, estimate.heading
-        return Pose(*poses)
+        return Pose(*dead_reckoning(*self.wheel_travel, self._robot.body.track_width_m))
 
     @cached_property
     def overruns(self) -> int:
@@ -139,12 +132,8 @@ class TelemetrySeries(Series):
         edges = np.diff(counts, prepend=counts[0]).astype(np.int32).astype(np.int64)
         edges[self._restarted] = 0  # counts began afresh
         if encoder.LINES == 1:
-            direction = getattr(self._directions, name)
             steps = np.diff(self.time, prepend=self.time[0])
-            edges *= np.array(
-                [direction.update(float(s), float(t)) for s, t in zip(signal, steps, strict=True)],
-                dtype=np.int64,
-            )
+            edges *= getattr(self._directions, name).update_all(signal, steps)
         return np.asarray(edges * encoder.metres_per_edge(self._robot.body.wheel_radius_m), dtype=np.float64)
 
 

@@ -1,0 +1,94 @@
+"""What the live view costs a run: beside one without, with a client that only reads, and with Chromium.
+
+Chromium draws the page at 1280 × 800 and needs no display; playwright starts it (`pip install -e '.[browser]'`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+from boebot.live.live_view import LiveView
+from boebot.running.runner import execute
+from boebot.running.tasks import Request
+from boebot.view.page_data import FORMAT
+from tools.bench.figures import figure
+
+SECONDS = 400.0
+SECONDS_IN_REAL_TIME = 10.0
+
+
+def read(url: str) -> None:
+    """Reads the stream of that page until it ends, and does nothing with it."""
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+    from websockets.typing import Origin
+
+    address, _, query = url.partition("/?")
+    stream = f"{address.replace('http', 'ws', 1)}/stream?{query}"
+    with contextlib.suppress(ConnectionClosed), connect(stream, origin=Origin(address), max_size=None) as connection:
+        connection.send(json.dumps({"type": "hello", "format": FORMAT}))
+        print("here", flush=True)
+        while True:
+            connection.recv(decode=False)
+
+
+def draw(url: str) -> None:
+    """Shows the page until somebody says on standard input that it is enough."""
+    import shutil
+
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        browser.new_page(viewport={"width": 1280, "height": 800}).goto(url)
+        print("here", flush=True)
+        sys.stdin.readline()
+        browser.close()
+
+
+@contextlib.contextmanager
+def looking(how: Callable[[str], None], url: str) -> Iterator[None]:
+    """A process that looks at the page."""
+    command = [sys.executable, "-c", f"from tools.bench.live import {how.__name__}; {how.__name__}({url!r})"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        if process.stdout.readline().strip() != "here":
+            raise RuntimeError(f"nobody can {how.__name__} the page of the live view here")
+        yield
+        process.communicate("enough\n", timeout=30)
+
+
+def faster(how: Callable[[str], None] | None, seconds: float, speed: float | None) -> float:
+    """How many times as fast as real time a run is; `how`: somebody looks at it; `speed`: of its live view."""
+    request = Request.single("wander", arena="room", on="native", seconds=seconds, period=0.01)
+    if how is None:
+        result = execute(request)
+    else:
+        with contextlib.ExitStack() as stack:
+            view = LiveView(lambda url: None, speed=speed)
+            stack.enter_context(looking(how, view.url))
+            stack.callback(view.close)
+            result = execute(request, onlooker=view)
+    if result.error is not None:
+        raise result.error
+    return result.real_time_factor
+
+
+@figure("live view: unpaced native run with a client that reads, against one without", "×", at_least=0.95, rounds=5,
+        of="median")  # fmt: skip
+def with_a_reader() -> float:
+    return faster(read, SECONDS, None) / faster(None, SECONDS, None)
+
+
+@figure("live view: unpaced native run with Chromium, against one without", "×", at_least=0.75, rounds=5, of="median")
+def with_chromium() -> float:
+    return faster(draw, SECONDS, None) / faster(None, SECONDS, None)
+
+
+@figure("live view: run at real time with Chromium, times real time", "×", at_least=0.99)
+def in_real_time() -> float:
+    return faster(draw, SECONDS_IN_REAL_TIME, 1.0)
