@@ -186,13 +186,9 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> N
     code, out, error = run.end()
     assert code == 0, error
     assert json.loads(out)["touched"] == 3  # lifted, a parameter, by hand
-    again = subprocess.run(
-        [sys.executable, "-m", "boebot", "run", "--again", str(folder), "--json"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert again.returncode == 0, again.stdout + again.stderr
+    for command in (["run", "--again", str(folder)], ["replay", str(folder), "--brain", "demo"]):
+        again = subprocess.run([sys.executable, "-m", "boebot", *command], capture_output=True, text=True, check=False)
+        assert again.returncode == 0, again.stdout + again.stderr
 
 
 def test_page_begins_a_run_afresh_also_after_its_end() -> None:

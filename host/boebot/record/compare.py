@@ -7,6 +7,7 @@ before (experiment E68); `replayed` goes further and asks a brain anew what it w
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from boebot.link.messages import Telemetry
 from boebot.record.blocks import Row
 from boebot.record.result import RunResult
 from boebot.robot import Command, Equipment, Observation, Robot
+from boebot.running.brain_parameters import set_parameter
+from boebot.running.interventions import Arm, Deed, Hand, Parameter, Release, Stop, interventions
 
 NOT_SEEN = frozenset(("setpoint_sequence",))
 """Fields of telemetry that say what the host itself sent, and that no device shows to a brain."""
@@ -125,7 +128,7 @@ def _in_words(one: Row | None, other: Row | None) -> str:
 
 def replayed(result: RunResult, brain: object) -> list[Command]:
     """What a fresh brain commands, step by step, on what was sensed in a run: without board, link and world. A brain
-    that is over before the run was gives fewer commands.
+    that is over before the run was gives fewer commands. What a person did to robot and brain is done again.
 
     Raises:
         BrainError: the brain cannot be loaded, or fails.
@@ -134,21 +137,44 @@ def replayed(result: RunResult, brain: object) -> list[Command]:
     description = result.robot
     fastest = () if result.layout is None else (description.body.wheel_speed_maximum_m_s,)
     robot = Robot(description.name, result.period, result.seed, *fastest)
+    deeds = interventions(result.record)
+    held: Hand | None = None
     commands = []
     try:
         for observation in _observations(result):
             if loaded.is_over:
                 break
             robot.observation = observation
+            while deeds and deeds[0][0] <= observation.time:
+                held = _done_again(deeds.pop(0)[1], robot, loaded, held)
             try:
                 loaded.step(robot)
             except Exception as error:
                 raise BrainError(brains.explain(error, loaded.path)) from error
             robot.slow_command = None
+            if held is not None:
+                robot.drive(held.left, held.right)
             commands.append(robot.command)
     finally:
         loaded.end()
     return commands
+
+
+def _done_again(deed: Deed, robot: Robot, brain: brains.LoadedBrain, held: Hand | None) -> Hand | None:
+    """Does to robot and brain what a person did. Returns by which signals the robot is driven by hand then."""
+    match deed:
+        case Hand():
+            return deed
+        case Release():
+            return None
+        case Stop():
+            robot.emergency_stop()
+        case Arm():
+            robot.arm()
+        case Parameter(name, value):
+            with contextlib.suppress(BrainError):  # of another brain
+                set_parameter(brain, name, value)
+    return held
 
 
 def _observations(result: RunResult) -> Iterator[Observation]:
