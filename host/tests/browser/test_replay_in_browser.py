@@ -85,6 +85,17 @@ def test_page_fits_and_can_be_read(size: tuple[int, int], run: tuple[RunResult, 
         assert panel["x"] > arena["x"] + arena["width"]
 
 
+def test_names_in_their_colours_can_be_read(together: tuple[TogetherResult, str], open_page: OpenPage) -> None:
+    """Of every behavior and robot, though their colours are chosen for lines."""
+    page = open_page(together[1] + "#robot=2")
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        for index in range(4):
+            page.evaluate("k => { run.mind.motor.values.fill(k); seek(1); }", index)
+            page.wait_for_timeout(50)
+            assert faint_texts(page) == []
+
+
 def test_dark_page_is_dark(run: tuple[RunResult, str], open_page: OpenPage) -> None:
     """And is drawn anew when the system changes."""
     page = open_page(run[1], scheme="light")

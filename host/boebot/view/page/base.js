@@ -44,33 +44,10 @@ const asPose = p =>
   minus(p[0].toFixed(2)) + ", " + minus(p[1].toFixed(2)) + " m, " + minus(((p[2] * 180) / Math.PI).toFixed(0)) + "°";
 
 // ---- the palette of style.py, light or dark, from the CSS variables ----
-const COLOURS = [
-  "paper",
-  "floor",
-  "ink",
-  "faint",
-  "grid",
-  "rule",
-  "accent",
-  "alert",
-  "edge",
-  "solid",
-  "dull",
-  "low",
-  "paint-dark",
-  "paint-bright",
-  "rough",
-  "smooth",
-  "charger",
-  "lamp",
-  "moving",
-  "start",
-  "end",
-  "estimate",
-  "touch",
-  "contact",
-  "body",
-];
+const COLOURS = (
+  "paper floor ink faint grid rule accent alert edge solid dull low paint-dark paint-bright rough " +
+  "smooth charger lamp moving start end estimate touch contact body"
+).split(" ");
 const colours = {};
 let readableCache = {};
 function readColours() {
@@ -84,12 +61,18 @@ function luminance(rgb) {
   const [r, g, b] = rgb.map(v => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }
-// A colour of robots, behaviors or layers, which are chosen for paper: on a dark floor with as much white as it needs.
-function readable(colour) {
+// Colours of robots, behaviors and layers are chosen for lines on paper. On a dark floor they are made lighter, in texts on
+// paper darker, until they are told from it.
+const LEAST_CONTRAST = 4.6;
+const isDark = () => luminance(channels(colours.floor)) < 0.2;
+function contrasting(colour) {
   if (readableCache[colour]) return readableCache[colour];
   const floor = luminance(channels(colours.floor));
+  const towards = isDark() ? 255 : 0;
+  const contrast = value => (Math.max(value, floor) + 0.05) / (Math.min(value, floor) + 0.05);
   let rgb = channels(colour);
-  if (floor < 0.2)
-    while ((luminance(rgb) + 0.05) / (floor + 0.05) < 4.5) rgb = rgb.map(v => Math.min(255, v + 0.08 * (255 - v) + 1));
+  while (contrast(luminance(rgb)) < LEAST_CONTRAST) rgb = rgb.map(v => v + 0.08 * (towards - v));
   return (readableCache[colour] = "#" + rgb.map(v => Math.round(v).toString(16).padStart(2, "0")).join(""));
 }
+const readable = colour => (isDark() ? contrasting(colour) : colour); // of lines and areas
+const inText = contrasting;

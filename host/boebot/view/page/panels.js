@@ -37,7 +37,7 @@ function makeShown() {
   cells.shown = rows.map(([, cell]) => cell);
   const layers = run.layers.map(layer => {
     const it = element("div", { textContent: "▬ " + layer.name });
-    it.style.color = readable(layer.colour);
+    it.style.color = inText(layer.colour);
     return it;
   });
   $("shownRows").replaceChildren(...rows.map(([it]) => it), ...layers);
@@ -88,7 +88,7 @@ function makeRobots() {
       }),
     ),
   );
-  $("robot").style.borderColor = $("robot").style.color = readable(run.colour);
+  $("robot").style.borderColor = $("robot").style.color = inText(run.colour);
 }
 
 // ---- the legend: only what there is ----
@@ -184,7 +184,7 @@ function tellMind() {
   const step = indexIn(mind.time.values, now + 1e-4),
     behavior = mind.behaviors[mind.motor.values[step]]; // times are rounded to float32
   say("behavior", behavior.name);
-  $("behavior").style.color = readable(behavior.colour);
+  $("behavior").style.color = inText(behavior.colour);
   if (!mind.switches.length) return;
   const [since, , reason] =
     mind.switches[
