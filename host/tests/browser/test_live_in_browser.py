@@ -241,6 +241,21 @@ def test_robot_is_dragged_or_moved_by_keys(page: Page) -> None:
     assert page.evaluate("placeOf(run)") == pytest.approx(after)
 
 
+def test_finger_drags_the_robot_on_a_phone(url: str, open_page: OpenPage) -> None:
+    """Upwards, which elsewhere on the arena scrolls the page."""
+    page = open_page(url, 390, 844)
+    wait_for(page, "state !== null && arrivals.length > 2")
+    touched = page.evaluate("state.touched")
+    x, y = page.evaluate(AT_ROBOT)
+    touch = page.context.new_cdp_session(page)
+    touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+    for step in range(1, 8):
+        touch.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x, "y": y - 4 * step}]})
+    assert page.evaluate("hooks.dragging()") and page.evaluate("scrollY") == 0
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    wait_for(page, f"state.touched > {touched} || !$('notice').hidden")
+
+
 def test_moving_shape_is_dragged(page: Page) -> None:
     page.click("#pause")
     wait_for(page, "state.paused && now === run.duration")

@@ -128,6 +128,9 @@ hooks.drawOver = c => {
   c.stroke();
   c.restore();
 };
+// A finger that holds something does not scroll the page.
+const keepFinger = event => hooks.dragging() && event.preventDefault();
+$("stage").addEventListener("touchstart", keepFinger, { passive: false });
 $("stage").addEventListener("pointermove", dragTo);
 $("stage").addEventListener("pointerup", () => {
   if (hooks.dragging()) put();

@@ -112,6 +112,7 @@ function makeDrive() {
     it.oncontextmenu = event => event.preventDefault(); // of a long press
     return it;
   });
+  const halt = element("button", { className: "alert halt", textContent: "Stop", onclick: stopRobot });
   const power = element("input", {
     type: "range",
     id: "power",
@@ -122,7 +123,7 @@ function makeDrive() {
   });
   $("drive").replaceChildren(
     element("h2", { textContent: "Drive by hand" }),
-    element("div", { className: "pad" }, ...arrows),
+    element("div", { className: "pad" }, ...arrows, halt),
     element("label", { className: "power" }, "speed ", power),
     element("p", { id: "driver" }),
     element(

@@ -122,6 +122,8 @@ function endedText() {
   return ended === "complete" ? "The run is over." : "The run has ended: " + ended + (/[.!]$/.test(ended) ? "" : ".");
 }
 
+const TRACKS_MS = 120; // the lanes need not be drawn as often as the arena
+
 // ---- the newest moment, about a chunk behind what has come: so poses in between are known and the robot moves evenly ----
 let ticking = false;
 let tickedAt = 0;
@@ -139,7 +141,7 @@ function tick(stamp) {
   tickedAt = stamp;
   if (!run || !run.time.length) return;
   if (newest) now = nextMoment(passed);
-  if (stamp - tracksAt > 250 && (now !== before || !newest)) {
+  if (stamp - tracksAt > TRACKS_MS && (now !== before || !newest)) {
     tracksAt = stamp;
     tracksDirty ||= run.duration !== drawnDuration;
     tellTime();
