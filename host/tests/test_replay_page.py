@@ -14,7 +14,7 @@ import pytest
 import boebot
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
 from boebot.record.result import RunResult
-from boebot.view import replay, scene, style
+from boebot.view import replay, scene, style, web_page
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 pytestmark = pytest.mark.skipif(NODE is None, reason="runs the page's script with node, which is not installed")
@@ -111,6 +111,19 @@ def test_page_hides_what_the_robot_has_not(shown: list[dict[str, Any]], tmp_path
     assert "pingRow" in moment["hidden"] and "estimateRow" not in moment["hidden"]
     assert [row[0] for row in moment["readings"]] == ["infrared left", "infrared right", "compass"]
     assert moment["texts"]["clock"] == "0.50 / 1.00 s"
+
+
+def test_truth_is_marked_and_absent_where_nobody_knows_it(
+    result: RunResult, shown: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    assert shown[0]["texts"]["poseName"] == "true pose" and "truth" not in shown[0]["hidden"]
+    content = replay.content([result])
+    content["runs"][0]["known"] = False  # as of a real robot
+    (tmp_path / "page.html").write_text(web_page.replay(content))
+    assert NODE is not None
+    command = [NODE, str(STAND_INS), str(tmp_path / "page.html"), "1.0"]
+    moment = json.loads(subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout)
+    assert moment["texts"]["poseName"] == "odometry" and "truth" in moment["hidden"]
 
 
 @pytest.mark.parametrize("outline", [[], [[-0.08, -0.05], [0.06, -0.05], [0.06, 0.05], [-0.08, 0.05]]])

@@ -11,7 +11,7 @@ function makePanels() {
   document.title = run.title + " · boebot " + (pageIsLive ? "live" : "replay");
   say("title", run.title + (run.known && run.table.arena ? " in " + run.table.arena : ""));
   say("poseName", run.known ? "true pose" : "odometry");
-  $("poseName").title = run.known ? "the simulator's truth; no brain sees it" : "";
+  hide("truth", !run.known);
   hide("estimateRow", !run.estimate);
   hide("errorRow", !run.estimate);
   document.querySelectorAll(".lamp").forEach(lamp => {
