@@ -16,6 +16,7 @@ const arrivals = []; // [wall clock, newest time], both in s, of late
 function connect() {
   const address = new URL("stream" + location.search, location.href);
   address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+  document.body.classList.toggle("waiting", !run); // there is nothing to show yet
   tellConnection("connecting …");
   socket = new WebSocket(address);
   socket.onopen = () => {
@@ -67,6 +68,7 @@ const receive = {
     hide("printed", true);
     say("event", "");
     begin(content);
+    document.body.classList.remove("waiting");
     run = runs[Math.min(chosen, runs.length - 1)];
     now = run.duration;
     makeControls();
