@@ -138,7 +138,7 @@ clean:
 lock:
 	@rm -rf build/lock-venv && $$(tools/find_python.sh) -m venv build/lock-venv
 	@build/lock-venv/bin/pip install --quiet \
-		$$(build/lock-venv/bin/python tools/requirements.py build run firmware foxglove test bench check)
+		$$(build/lock-venv/bin/python tools/requirements.py build run firmware foxglove test browser bench check)
 	@{ sed -n 1p requirements.lock; build/lock-venv/bin/pip freeze --all --exclude pip --exclude wheel; } >build/requirements.lock
 	@mv build/requirements.lock requirements.lock
 
@@ -196,7 +196,7 @@ $(VENV)/.done-run: $(VENV)/.done-firmware $(DECLARED)
 	@$(call INSTALL,run)
 $(VENV)/.done-test: $(DECLARED) | $(VENV)/.done-boebot
 	@echo "Installing Python packages for tests"
-	@$(call INSTALL,foxglove test)
+	@$(call INSTALL,foxglove test browser)
 $(VENV)/.done-bench: $(DECLARED) | $(VENV)/.done-test
 	@echo "Installing what the bench compares with"
 	@$(call INSTALL,bench)

@@ -15,6 +15,8 @@ need() {
 
 has() { command -v "$1"; }
 
+has_browser() { has chromium || has chromium-browser || has google-chrome; }
+
 # cargo 1.82 has `cargo info`, which brings simavr's sources.
 has_cargo() {
   for cargo in ${CARGO:-} cargo; do
@@ -43,6 +45,7 @@ for purpose in "$@"; do
     test)
       need doctest-dev sh -c 'echo "#include <doctest/doctest.h>" | c++ -x c++ -E -'
       need avrdude has avrdude
+      need chromium has_browser
       need "clang libclang-rt-dev" can_fuzz
       need build-essential has c++
       ;;
