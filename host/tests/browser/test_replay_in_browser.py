@@ -67,15 +67,15 @@ def lane(page: Page, name: str, time: float) -> tuple[float, float]:
     return x, y
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("size", WIDTHS)
-def test_page_fits_and_can_be_read(size: tuple[int, int], run: tuple[RunResult, str], open_page: OpenPage) -> None:
-    page = open_page(run[1], *size)
+def test_page_fits_and_can_be_read(
+    size: tuple[int, int], scheme: str, run: tuple[RunResult, str], open_page: OpenPage
+) -> None:
+    page = open_page(run[1], *size, scheme)
     wide, high = overflow(page)
     assert wide == 0 and (high == 0 or size[0] < 760), "only a phone scrolls"
-    for scheme in ("light", "dark"):
-        page.emulate_media(color_scheme=scheme)
-        page.wait_for_timeout(150)  # until it is drawn anew
-        assert faint_texts(page) == [], scheme
+    assert faint_texts(page) == []
     assert all(colours_of(page, canvas) > 3 for canvas in ("floor", "stage", "tracks")), "something is drawn"
     arena, panel = page.locator("#arena").bounding_box(), page.locator("#sensors").bounding_box()
     assert arena is not None and panel is not None
@@ -83,17 +83,6 @@ def test_page_fits_and_can_be_read(size: tuple[int, int], run: tuple[RunResult, 
         assert panel["y"] > arena["y"] + arena["height"] and panel["width"] > 0.9 * arena["width"]
     else:
         assert panel["x"] > arena["x"] + arena["width"]
-
-
-def test_names_in_their_colours_can_be_read(together: tuple[TogetherResult, str], open_page: OpenPage) -> None:
-    """Of every behavior and robot, though their colours are chosen for lines."""
-    page = open_page(together[1] + "#robot=2")
-    for scheme in ("light", "dark"):
-        page.emulate_media(color_scheme=scheme)
-        for index in range(4):
-            page.evaluate("k => { run.mind.motor.values.fill(k); seek(1); }", index)
-            page.wait_for_timeout(50)
-            assert faint_texts(page) == []
 
 
 def test_dark_page_is_dark(run: tuple[RunResult, str], open_page: OpenPage) -> None:
