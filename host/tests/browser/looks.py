@@ -39,7 +39,7 @@ _FOCUS = """() => { const it = document.activeElement, style = getComputedStyle(
   return [it.dataset.control ?? null, style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2]; }"""
 
 
-def wait_for(page: Page, expression: str, seconds: float = 10.0) -> None:
+def wait_for(page: Page, expression: str, seconds: float = 30.0) -> None:
     """Until it is true on the page. (Playwright's own way evaluates texts on the page, which its policy forbids.)"""
     end = time.monotonic() + seconds
     while not page.evaluate(expression):

@@ -259,15 +259,20 @@ def test_finger_drags_the_robot_on_a_phone(url: str, open_page: OpenPage) -> Non
 def test_moving_shape_is_dragged(page: Page) -> None:
     page.click("#pause")
     wait_for(page, "state.paused && now === run.duration")
+    page.evaluate("send({ type: 'place', robot: 0, pose: [-1.5, -1.0, 0] })")  # out of the way
+    wait_for(page, "Math.hypot(placeOf(run)[0] + 1.5, placeOf(run)[1] + 1.0) < 0.02")
     touched = page.evaluate("state.touched")
     x, y = page.evaluate(AT_SHAPE)
+    to_x, to_y = page.evaluate("[X(0.3) / ratio, Y(0.65) / ratio]")
+    box = page.locator("#stage").bounding_box()
+    assert box is not None
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move(x + 12, y + 3, steps=3)
+    page.mouse.move(box["x"] + to_x, box["y"] + to_y, steps=3)
     page.mouse.up()
     wait_for(page, f"state.touched === {touched + 1}")
     page.click("#pause")
-    wait_for(page, "!state.paused")
+    wait_for(page, "!state.paused && Math.hypot(moving[0].at(now + run.begin)[0] - 0.3) < 0.15")
 
 
 def test_parameters_are_sliders(page: Page) -> None:

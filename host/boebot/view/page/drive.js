@@ -46,7 +46,7 @@ function sayHand() {
   const signals = wanted();
   if (signals) {
     driving = true;
-    setNewest(true);
+    if (!newest) setNewest(true);
     send({ type: "hand", robot: runs.indexOf(run), left: signals[0], right: signals[1] });
   } else if (driving) {
     driving = false;

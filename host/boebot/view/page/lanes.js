@@ -159,7 +159,7 @@ function drawFlags(c, box, bit, at, tall, colour) {
     }
   }
 }
-// A value that the brain shows, between its least and its greatest; it holds until the next one.
+// The least and the greatest.
 function extent(values) {
   let least = Infinity,
     most = -Infinity;
@@ -170,6 +170,7 @@ function extent(values) {
     }
   return [least, most];
 }
+// A value that the brain shows, between its least and its greatest; it holds until the next one.
 function drawShown(c, box, values) {
   const times = run.shownTime.values,
     [least, most] = extent(values);

@@ -126,7 +126,7 @@ function endedText() {
 
 const TRACKS_MS = 120; // the lanes need not be drawn as often as the arena
 
-// ---- the newest moment, about a chunk behind what has come: so poses in between are known and the robot moves evenly ----
+// ---- the newest moment, about a chunk behind what has come: so poses in between are known, and robots move evenly ----
 let ticking = false;
 let tickedAt = 0;
 let tracksAt = 0;
