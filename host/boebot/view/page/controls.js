@@ -34,7 +34,10 @@ function makeControls() {
   $("clock").after(
     make("newest", "Live", "Show the newest moment (End)", () => setNewest(true), { ariaPressed: "true" }),
   );
-  if (can.has("drag")) $("tools").append(make("move", "move", "Move a robot or a shape (M); or drag it, and turn it by the wheel", pickUp));
+  if (can.has("drag"))
+    $("tools").append(
+      make("move", "move", "Move a robot or a shape (M); or drag it, and turn it by the wheel", pickUp),
+    );
   if (can.has("speed")) makeSpeeds();
   makeDrive();
 }
