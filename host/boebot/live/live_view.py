@@ -127,7 +127,7 @@ class LiveView:
             if not self._pace.holds(time_s):
                 return
             if self._pace.paused:
-                self._tell_state(time_s)
+                self._show_standing(time_s)
 
     def refuse(self, number: int, error: BoebotError) -> None:
         """See `Onlooker`."""
@@ -225,13 +225,14 @@ class LiveView:
         (wall_0, time_0), (wall_1, time_1) = self._rates[0], self._rates[-1]
         return round((time_1 - time_0) / max(wall_1 - wall_0, 1e-6), 3)
 
-    def _tell_state(self, time_s: float) -> None:
-        """While time stands still, when it has changed."""
-        if time.perf_counter() < self._due_s or not self._audience.knows_run:
+    def _show_standing(self, time_s: float) -> None:
+        """While time stands still: what has happened up to then, and the state whenever it has changed."""
+        if time.perf_counter() < self._due_s:
             return
         self._due_s = time.perf_counter() + EACH_S
+        self._make_chunk(time_s)  # none, if there was one since
         state = self._state(time_s)
-        if state != self._told:
+        if state != self._told and self._audience.knows_run:
             self._told = state
             self._audience.tell({"type": "state", "state": state})
 

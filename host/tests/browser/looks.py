@@ -1,4 +1,4 @@
-"""What a person needs of a page who looks at it, or uses it without a mouse or without eyes: measured in the browser."""
+"""What a person needs of a page who looks at it, or uses it without mouse or eyes: measured in the browser."""
 
 from __future__ import annotations
 
