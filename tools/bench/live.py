@@ -9,11 +9,14 @@ import contextlib
 import json
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 from boebot.live.live_view import LiveView
 from boebot.running.runner import execute
-from boebot.running.tasks import Request
+from boebot.running.tasks import Member, Request
+from boebot.running.together import execute_together
 from boebot.view.page_data import FORMAT
 from tools.bench.figures import figure
 
@@ -50,16 +53,39 @@ def draw(url: str) -> None:
         browser.close()
 
 
+def count_redraws(url: str) -> None:
+    """Shows the page, and prints how often it drew its arena in a second."""
+    import shutil
+
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.goto(url)
+        print("here", flush=True)
+        while page.evaluate("run === null || arrivals.length < 10"):
+            page.wait_for_timeout(100)
+        print(page.evaluate(_COUNT), flush=True)
+        browser.close()
+
+
+_COUNT = """() => new Promise(done => { const draw = drawStage; let count = 0; const begun = performance.now();
+  drawStage = () => { count++; draw(); };
+  setTimeout(() => { drawStage = draw; done(1000 * count / (performance.now() - begun)); }, 5000); })"""
+
+
 @contextlib.contextmanager
-def looking(how: Callable[[str], None], url: str) -> Iterator[None]:
-    """A process that looks at the page."""
+def looking(how: Callable[[str], None], url: str) -> Iterator[list[str]]:
+    """A process that looks at the page; at the end the list has what it has printed."""
     command = [sys.executable, "-c", f"from tools.bench.live import {how.__name__}; {how.__name__}({url!r})"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         if process.stdout.readline().strip() != "here":
             raise RuntimeError(f"nobody can {how.__name__} the page of the live view here")
-        yield
-        process.communicate("enough\n", timeout=30)
+        printed: list[str] = []
+        yield printed
+        printed += process.communicate("enough\n", timeout=30)[0].split()
 
 
 def faster(how: Callable[[str], None] | None, seconds: float, speed: float | None) -> float:
@@ -92,3 +118,25 @@ def with_chromium() -> float:
 @figure("live view: run at real time with Chromium, times real time", "×", at_least=0.99)
 def in_real_time() -> float:
     return faster(draw, SECONDS_IN_REAL_TIME, 1.0)
+
+
+@figure("live view: redraws of the page at 1280 × 800, three robots, one with a laser of 682 rays", "1/s", at_least=30)
+def redraws() -> float:
+    with tempfile.TemporaryDirectory() as folder:
+        laser, brain = Path(folder) / "laser.toml", Path(folder) / "circle.py"
+        laser.write_text("extends = 'roller'\nname = 'laser'\n[device.laser]\nrays = 682\nstep_rad = 0.006135923\n")
+        brain.write_text("def step(robot):\n    robot.drive(0.3, 0.4)\n")
+        members = [
+            Member(brain=str(brain), robot=str(laser), pose=(-0.8, 0.0, 0.0)),
+            Member(brain="wander", pose=(0.0, 0.8, 0.0)),
+            Member(brain="demo", robot="shieldbot-charging", pose=(0.7, -1.1, 2.0)),
+        ]
+        request = Request(members=members, arena="room", seconds=SECONDS_IN_REAL_TIME)
+        view = LiveView(lambda url: None)
+        with contextlib.ExitStack() as stack:
+            printed = stack.enter_context(looking(count_redraws, view.url))
+            stack.callback(view.close)
+            result = execute_together(request, onlooker=view)
+    if result.error is not None:
+        raise result.error
+    return float(printed[0])

@@ -6,12 +6,19 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
     OpenPage = Callable[..., Page]
 
-WIDTHS = ((390, 844), (768, 1024), (1280, 800), (1920, 1080))
+WIDTHS = (
+    (390, 844),
+    pytest.param((768, 1024), marks=pytest.mark.soak),
+    (1280, 800),
+    pytest.param((1920, 1080), marks=pytest.mark.soak),
+)
 CONTRAST = 4.5  # of text, WCAG AA
 
 _FAINT_TEXTS = """least => {

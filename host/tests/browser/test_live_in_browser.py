@@ -28,7 +28,6 @@ pytest.importorskip("playwright", reason="drives a browser with playwright, whic
 pytest.importorskip("boebot.live", reason="looks at the live view, which is not here")
 pytestmark = pytest.mark.unsanitized
 
-LASER = "extends = 'roller'\nname = 'laser'\n[device.laser]\nrays = 682\nstep_rad = 0.006135923\n"
 AT_ROBOT = """() => { const [x, y] = placeOf(run), box = $('stage').getBoundingClientRect();
   return [box.x + X(x) / ratio, box.y + Y(y) / ratio]; }"""
 AT_SHAPE = """() => { const [x, y] = moving[0].at(now + run.begin), box = $('stage').getBoundingClientRect();
@@ -99,6 +98,7 @@ def page(url: str, open_page: OpenPage) -> Iterator[Page]:
     opened.wait_for_timeout(150)
 
 
+@pytest.mark.soak
 def test_page_shows_the_newest_moment(page: Page) -> None:
     """Evenly, and never an earlier one after a later one."""
     times = page.evaluate(
@@ -344,33 +344,6 @@ def test_lost_connection_is_one_sentence(watched: Watched, browser: Browser) -> 
     assert page.inner_text("#connection").startswith("Connection lost")
     assert page.is_disabled("#pause") and not page.is_disabled("#newest")
     page.close()
-
-
-@pytest.mark.wall_clock
-def test_page_redraws_thirty_times_a_second(watched: Watched, open_page: OpenPage, tmp_path: Path) -> None:
-    """With three robots, one with a laser of 682 rays, at 1280 x 800."""
-    laser, brain = tmp_path / "laser.toml", tmp_path / "circle.py"
-    laser.write_text(LASER)
-    brain.write_text("def step(robot):\n    robot.drive(0.3, 0.4)\n")
-    robots = [
-        argument
-        for robot, pose in (
-            (str(laser), "-0.8,0,0deg"),
-            ("shieldbot", "0,0.8,0deg"),
-            ("shieldbot-charging", "0.7,-1.1,115deg"),
-        )
-        for argument in ("--robot", robot, "--pose", pose)
-    ]
-    page = open_page(watched.start(str(brain), "wander", "demo", *robots, "--arena", "room", "--seconds", "900"))
-    wait_for(page, "arrivals.length > 10")
-    assert page.evaluate("run.swept[0].angles.length") > 100
-    count = page.evaluate(
-        """() => new Promise(done => { const draw = drawStage; let count = 0; const begun = performance.now();
-          drawStage = () => { count++; draw(); };
-          setTimeout(() => { drawStage = draw; done(1000 * count / (performance.now() - begun)); }, 4000); })"""
-    )
-    watched.running[-1].kill()
-    assert count >= 30
 
 
 def test_interventions_are_counted(watched: Watched, url: str, page: Page) -> None:
