@@ -156,6 +156,7 @@ function nextMoment(passed) {
     head = run.duration;
   if (ended !== null || !arrivals.length || (state && state.paused))
     return Math.min(head, now + Math.max(0.02, (head - now) * 8 * passed)); // up to the very last
+  if (state && state.speed === null && live.can.includes("speed")) return head; // a run that hurries is not slowed by drawing
   const since = performance.now() / 1000 - arrivals.at(-1)[0],
     goal = head + rate * Math.min(since, 0.2) - 1.6 * chunk;
   if (Math.abs(goal - now) > 6 * chunk + 0.3 * rate) return Math.max(0, Math.min(head, goal)); // far off: at once
