@@ -222,13 +222,16 @@ def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> Non
         "def step(robot):\n    print('hello', robot.time)\n    robot.show('x', robot.time)\n"
         "    robot.sketch('line', lines=[[(0, 0), (0.5, robot.time)]])\n    robot.drive(0.3, 0.3)\n"
     )
-    run = Run("run", str(brain), "wander", "--view", "--seconds", "2", "--json")
+    short = tmp_path / "short.py"
+    short.write_text("def main(robot):\n    robot.wait(0.5)\n")
+    run = Run("run", str(brain), str(short), "--view", "--seconds", "2", "--json")
     with run.stream() as stream:
         page = Page(stream)
         assert len(page.until("run")["runs"]) == 2
         chunk = page.until("chunk", where=lambda chunk: chunk["printed"] and chunk["runs"][0]["layers"])
         assert chunk["printed"].startswith("hello")
         assert [one["name"] for one in chunk["runs"][0]["shown"]["numbers"]] == ["x"]
+        assert page.until("chunk", where=lambda chunk: chunk["state"]["time"] > 1.0)["runs"][1]["time"] == ""
         page.until("end")
     code, out, error = run.end()
     assert code == 0, error

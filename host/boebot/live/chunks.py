@@ -22,7 +22,7 @@ from boebot.record.brain_record import STEPS, SWITCHES, read_brain
 from boebot.record.record import Record
 from boebot.record.result import RunResult
 from boebot.record.series import Floats, Pose, Series
-from boebot.record.shown import read_layers, read_shown
+from boebot.record.shown import Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions
 from boebot.record.truth import track_of
 from boebot.record.windows import OF_TICKS, cut, record_of
@@ -81,6 +81,7 @@ class Chunks:
         self._source, self._result, self._number = source, result, number
         self._title = title or f"{result.brain} on {result.robot.name} ({result.board})"
         self._waiting: dict[str, Block] = {}  # of ticks and the truth, from the last chunk's last tick on
+        self._others: dict[str, Block] = {}  # of other streams, since the last chunk
         self._first = 0  # index of the first new tick in them
         self._directions = Directions()
         self._place: tuple[float, float, float] | None = None  # by odometry, at that last tick
@@ -90,16 +91,17 @@ class Chunks:
 
     def make(self) -> dict[str, Any] | None:
         """The rows of a chunk; None: nothing has happened."""
-        news = self._source.news()
-        for name in (*OF_TICKS, "truth"):
-            if name in news:
-                self._waiting[name] = joined(self._waiting.get(name), news[name])
+        for name, block in self._source.news().items():
+            kept = self._waiting if name in (*OF_TICKS, "truth") else self._others
+            kept[name] = joined(kept.get(name), block)
         record = record_of(self._waiting)
-        if record.ticks <= self._first:
+        is_simulated = self._result.world is not None
+        if record.ticks <= self._first or (is_simulated and "truth" not in self._waiting):
             return None
         if self.content is None:
             self._offset_s = self._source.clock_offset_s
-        stretch, series = self._stretch(record, news)
+        stretch, series = self._stretch(record, self._others)
+        self._others = {}
         if self.content is None:
             self.content = self._content(series, stretch)
         rows = page_data.rows_data(stretch, cognitive=self._cognitive())
@@ -107,6 +109,16 @@ class Chunks:
         _, self._waiting = cut(self._waiting, end_s, end_s, self._offset_s)
         self._first = 1
         return rows
+
+    def nothing(self) -> dict[str, Any]:
+        """The rows of a robot that has ended, beside others that go on."""
+        series = self._result.series_of(Record())
+        nowhere = Pose(*np.zeros((3, 0)))
+        shown = Shown(np.empty(0), {}, {})
+        estimate = nowhere if self._result.has_odometry and self._result.world is not None else None
+        start = self._start or (0.0, 0.0, 0.0)
+        stretch = page_data.Stretch(series, nowhere, estimate, np.zeros(0, np.bool_), start, shown)
+        return page_data.rows_data(stretch)
 
     def _stretch(self, record: Record, news: Group) -> tuple[page_data.Stretch, Series]:
         result = self._result
@@ -187,7 +199,7 @@ class Chunks:
             title=self._title,
             brain=result.brain,
             begin=self._offset_s,
-            known="truth" in self._waiting,
+            known=self._result.world is not None,
             has_estimate=stretch.estimate is not None,
             table={
                 "robot": result.robot.name,

@@ -150,8 +150,8 @@ class LiveView:
 
     def _make_chunk(self, time_s: float) -> None:
         rows = [chunks.make() for chunks in self._chunks]
-        if any(one is None for one in rows):
-            return  # a robot that has not begun yet, or has ended
+        if not any(rows) or any(chunks.content is None for chunks in self._chunks):
+            return  # nothing is new, or a robot has not begun
         self._rates.append((time.perf_counter(), time_s))
         if not self._audience.knows_run:
             self._audience.begin(self._first_message())
@@ -161,7 +161,7 @@ class LiveView:
             {
                 "type": "chunk",
                 "number": self._number,
-                "runs": rows,
+                "runs": [one or chunks.nothing() for one, chunks in zip(rows, self._chunks, strict=True)],
                 "moving": page_data.moving_data(self._chunks[0].moving(self._plan)),
                 "state": self._state(time_s),
                 "printed": printed,

@@ -256,7 +256,7 @@ class _Run:
             self._record()
             self._report()
             if self._onlooker is not None and self._is_recorded:
-                self._onlooker.look(min(robot.time_s for robot in self._robots))
+                self._onlooker.look(max(robot.time_s for robot in self._robots))
 
     def _turn(self, robot: _Robot, watch: StepWatch) -> None:
         try:
