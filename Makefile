@@ -50,7 +50,8 @@ help:
 run:
 	@$(SIDE_BY_SIDE) ready-run
 	@$(VENV)/bin/boebot run demo --on avr --robot shieldbot-charging --arena station --seconds 60 --out build/run
-	@echo "Look at build/run/run.png, and open build/run/replay.html in a browser to watch the run."
+	@echo "Look at build/run/run.png, and open build/run/replay.html in a browser to play the run."
+	@echo "Watch one while it drives:  $(VENV)/bin/boebot run demo --robot shieldbot-charging --arena station --view"
 
 test:
 	@$(SIDE_BY_SIDE) ready-test
@@ -89,7 +90,7 @@ fuzz:
 	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis -o faulthandler_timeout=1800
 
 pictures:
-	@$(SIDE_BY_SIDE) ready-run
+	@$(SIDE_BY_SIDE) ready-test
 	@mkdir -p build/pictures
 	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures/demo
 	@cp build/pictures/demo/run.png docs/images/demo.png
@@ -102,6 +103,7 @@ pictures:
 	@$(VENV)/bin/boebot robot shieldbot --out docs/images/robot-shieldbot.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
+	@$(PYTHON_VENV) -m tools.live_pictures
 	@$(PYTHON_VENV) -m tools.experiment_pages
 	@$(MAKE) --no-print-directory timing
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from functools import cache
@@ -11,9 +12,11 @@ import pytest
 from PIL import Image
 
 import copied_process
+from tools import live_pictures
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("protocol/*.md")])
+NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "BROWSER": ""}  # a live view opens no browser
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"`(boebot [^`]+)`")
 
@@ -59,7 +62,10 @@ SHELL_LINES = [
 
 @pytest.mark.parametrize(("page", "line"), SHELL_LINES, ids=names(SHELL_LINES))
 def test_command_of_a_block_runs(page: Path, line: str, workspace: Path) -> None:
-    done = copied_process.command(shlex.split(line, comments=True)[1:], workspace)
+    words = shlex.split(line, comments=True)[1:]
+    if "--view" in words and "--speed" not in words:
+        words += ["--speed", "max"]  # nobody watches
+    done = copied_process.command(words, workspace, NO_DISPLAY)
     assert done.returncode == 0, f"{page.name}: {line}\n{done.stderr}"
 
 
@@ -93,6 +99,16 @@ def test_picture_is_of_this_kit(name: str, workspace: Path, tmp_path: Path) -> N
     assert copied_process.command(command, workspace).returncode == 0
     shown, now = (Image.open(file).info for file in (ROOT / "docs" / "images" / f"{name}.png", tmp_path / "run.png"))
     assert (shown["Title"], shown["Description"]) == (now["Title"], now["Description"])
+
+
+def test_film_is_of_this_kit() -> None:
+    """The run of the README's film, with what was done to it, goes as it went; `make pictures` renews it."""
+    file = ROOT / "docs" / "images" / "live.gif"
+    with Image.open(file) as film:
+        said, pictures = film.info["comment"].decode(), getattr(film, "n_frames", 1)
+    assert live_pictures.repeated(said) == json.loads(said)["figures"]
+    assert json.loads(said)["figures"]["touched"] == 1, "its robot is dragged once"
+    assert pictures > 60 and file.stat().st_size < 2_000_000
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

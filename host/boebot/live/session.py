@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import html
 import sys
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -14,14 +14,15 @@ from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
 from boebot.record.result import RunResult, TogetherResult
 from boebot.running.tasks import Request
+from boebot.view.display import has_display, kernel_shell
 
 Result = TypeVar("Result", RunResult, TogetherResult)
 
 
 @contextlib.contextmanager
 def opened(say: Callable[[str], None], *, port: int = 0, speed: float | None = 1.0) -> Iterator[LiveView]:
-    """A live view, which is shown in the browser, where there is a display, as the first run begins. `say`: is then
-    told its address.
+    """A live view. As the first run begins it is opened in the browser, where there is a display, and `say` is told its
+    address; a notebook shows a link instead, for its kernel may run elsewhere.
 
     Raises:
         BoebotError: the port is taken.
@@ -34,16 +35,17 @@ def opened(say: Callable[[str], None], *, port: int = 0, speed: float | None = 1
 
 
 def show(url: str, say: Callable[[str], None]) -> None:
-    """Tells the address, and opens the page where there is a display."""
+    """Tells the address, and opens the page where there is a display. A notebook shows a link, for its kernel may run
+    elsewhere."""
+    notebook = kernel_shell()
+    if notebook is not None:
+        link = f'<a href="{html.escape(url)}" target="_blank" rel="noopener">watch it drive</a>'
+        notebook.display_pub.publish({"text/html": link, "text/plain": f"watch it: {url}"})
+        return
     say(url)
     if has_display():
         with contextlib.suppress(webbrowser.Error):
             webbrowser.open(url)
-
-
-def has_display() -> bool:
-    """Somebody could see a browser."""
-    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result], *, waits: bool) -> Result:

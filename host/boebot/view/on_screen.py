@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import base64
 import html
-import os
-import sys
 import tempfile
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
 from boebot.view import picture, replay, together_picture
+from boebot.view.display import has_display, kernel_shell
 
 if TYPE_CHECKING:
     from boebot.record.result import RunResult, TogetherResult
@@ -61,19 +60,6 @@ def play(results: Sequence[RunResult]) -> Path | None:
     if has_display():
         webbrowser.open(path.as_uri())
     return path
-
-
-def kernel_shell() -> Any:
-    """IPython's shell, where it is that of a kernel of Jupyter: a notebook shows what it publishes. Else None, as in a
-    terminal."""
-    ipython = sys.modules.get("IPython")
-    shell = None if ipython is None else ipython.get_ipython()
-    return None if getattr(shell, "kernel", None) is None else shell
-
-
-def has_display() -> bool:
-    """A browser can show something; on Linux and the like the environment says so."""
-    return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")))
 
 
 def html_image(sheet: Sheet) -> str:

@@ -79,7 +79,8 @@ function within(solid, x, y) {
 function listenToPointer() {
   $("cursor").addEventListener("pointermove", hoverTracks);
   $("stage").addEventListener("pointermove", event => {
-    if (fingers.size < 2 && !hooks.dragging()) hoverArena(event);
+    if (hooks.dragging()) tip(event, ""); // it would say where the thing still is
+    else if (fingers.size < 2) hoverArena(event);
   });
   for (const id of ["cursor", "stage"])
     $(id).addEventListener("pointerleave", event => {

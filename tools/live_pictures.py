@@ -1,0 +1,261 @@
+"""Films the live view for the documentation: a run of the demonstration brain, in real time, in Chromium.
+
+    python -m tools.live_pictures
+
+Writes docs/images/live.gif, in which the pointer drags the robot once, and docs/images/live-*.png. It needs Chromium
+and playwright (the extra `browser`). The film's comment says what was done to the run and what came of it, so that a
+simulated run with the same interventions shows whether the film is still one of this kit (docs/tests/test_docs.py).
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import io
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PIL import Image
+
+from boebot.record.reading import read_run
+from boebot.record.record import Record
+from boebot.record.result import RunResult
+from boebot.running.interventions import STREAM, Repeated
+from boebot.running.runner import execute
+from boebot.running.tasks import Request
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+    Film = list[tuple[float, Image.Image]]
+
+PROJECT = Path(__file__).resolve().parents[1]
+IMAGES = PROJECT / "docs" / "images"
+FOLDER = PROJECT / "build" / "pictures"
+ROBOT, ARENA, SEED = "shieldbot-charging", "station", 1
+FILMED_S = 15.0  # length of the run that is filmed
+WIDTH, HEIGHT = 900, 800  # pixels
+EACH_S = 0.1  # from picture to picture
+BEGIN_S = 2.0  # of the film, by the run's time
+MOVE_S = 4.0  # when the pointer begins to move
+AFTER_S = 3.5  # for which the film goes on once the robot is elsewhere
+GOAL = (0.6, -0.1)  # m, where it puts it
+COLOURS = 256
+LONGEST_S = 60.0  # of waiting
+SEVERAL = re.compile(r"^```python\n(# two\.py:.*?)^```$", re.MULTILINE | re.DOTALL)
+"""The README's brain of several behaviors."""
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")  # where no browser is to open by itself
+FIGURES = ("true_distance_m", "true_contacts", "touched", "behavior_switches", "wander_share", "odometry_error_m")
+
+_POINTER = """() => {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  const arrow = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  arrow.setAttribute("d", "M1 1 L1 19 L6 14.5 L9.5 22 L12.5 20.6 L9.2 13.4 L15.5 13 Z");
+  for (const [name, value] of [["fill", "#10141b"], ["stroke", "#fff"], ["stroke-width", "1.4"]])
+    arrow.setAttribute(name, value);
+  svg.append(arrow);
+  Object.assign(svg.style, { position: "fixed", left: 0, top: 0, width: "18px", height: "25px", zIndex: 9,
+    pointerEvents: "none" });
+  document.body.append(svg);
+  const move = event => { svg.style.transform = `translate(${event.clientX - 1}px, ${event.clientY - 1}px)`; };
+  addEventListener("pointermove", move, true);
+}"""
+"""Chromium without a window draws no pointer."""
+_AT = """([x, y]) => { const box = $("stage").getBoundingClientRect();
+  return [box.x + X(x) / ratio, box.y + Y(y) / ratio]; }"""
+"""Where a place of the arena (m) is on the page (pixels)."""
+
+
+# ---- whether the film is one of this kit ----
+
+
+def comment(result: RunResult) -> str:
+    """What was done to the run that is filmed, and what came of it."""
+    deeds = [(time_s, data.decode()) for time_s, data in result.record.rows(STREAM)]
+    return json.dumps({"interventions": deeds, "figures": figures(result)})
+
+
+def figures(result: RunResult) -> dict[str, Any]:
+    """Those that do not depend on the wall clock."""
+    table = result.table()
+    return {name: table[name] for name in FIGURES}
+
+
+def repeated(said: str) -> dict[str, Any]:
+    """The figures of the run now, with the interventions that a comment names."""
+    done = Record()
+    for time_s, deed in json.loads(said)["interventions"]:
+        done.append(STREAM, time_s, deed.encode())
+    request = Request.single("demo", robot=ROBOT, arena=ARENA, seed=SEED, seconds=FILMED_S)
+    return figures(execute(request, onlooker=Repeated([done])))
+
+
+# ---- filming ----
+
+
+@contextlib.contextmanager
+def watched(name: str, *arguments: str) -> Iterator[str]:
+    """A run of the command with a live view, into a folder of that name; gives the page's address. It ends with the
+    block."""
+    environment = {key: value for key, value in os.environ.items() if key not in DISPLAYS}
+    command = [sys.executable, "-m", "boebot", "run", *arguments, "--view", "--out", str(FOLDER / name)]
+    process = subprocess.Popen(command, text=True, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)
+    assert process.stderr is not None
+    try:
+        for said in process.stderr:
+            if found := re.search(r"http://\S+", said):
+                yield found[0]
+                break
+        else:
+            raise SystemExit("live_pictures.py: the run has not said where its page is")
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+
+
+def opened(browser: Browser, url: str, width: int, height: int, **options: Any) -> Page:
+    """The page of a run that has begun, in a window of that size (pixels)."""
+    page = browser.new_context(viewport={"width": width, "height": height}, **options).new_page()
+    page.goto(url)
+    until(page, "run !== null && run.duration > 0.1")
+    return page
+
+
+def until(page: Page, expression: str) -> None:
+    """Waits until it is true on the page."""
+    end = time.monotonic() + LONGEST_S
+    while not page.evaluate(expression):
+        if time.monotonic() > end:
+            raise SystemExit(f"live_pictures.py: {expression} is not so on the page after {LONGEST_S:g} s")
+        page.wait_for_timeout(20)
+
+
+def at_robot(page: Page) -> tuple[float, float]:
+    """Where the robot is on the page (pixels)."""
+    x, y = page.evaluate(_AT, page.evaluate("placeOf(run).slice(0, 2)"))
+    return x, y
+
+
+def glide(page: Page, begin: tuple[float, float], end: Callable[[], tuple[float, float]], seconds: float) -> None:
+    """The pointer goes there as a hand would, slowly at first and at last."""
+    begun = time.monotonic()
+    while (part := min(1.0, (time.monotonic() - begun) / seconds)) < 1.0:
+        eased = part * part * (3 - 2 * part)
+        page.mouse.move(*(a + eased * (b - a) for a, b in zip(begin, end(), strict=True)))
+        page.wait_for_timeout(30)
+    page.mouse.move(*end())
+
+
+def film(page: Page) -> Film:
+    """A stretch of a run, in which the robot is dragged once: pictures with their times by the wall clock (s)."""
+    page.evaluate(_POINTER)
+    page.click("#shorter")
+    begin = (0.72 * WIDTH, 0.38 * HEIGHT)  # where it is in the way of nothing
+    page.mouse.move(*begin)
+    taken: list[tuple[float, str]] = []
+    camera = page.context.new_cdp_session(page)
+
+    def keep(frame: dict[str, Any]) -> None:
+        taken.append((frame["metadata"]["timestamp"], frame["data"]))
+        camera.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
+
+    camera.on("Page.screencastFrame", keep)
+    until(page, f"now >= {BEGIN_S}")
+    camera.send("Page.startScreencast", {"format": "png"})
+    until(page, f"now >= {MOVE_S}")
+    glide(page, begin, lambda: at_robot(page), 0.8)
+    page.mouse.down()
+    goal = tuple(page.evaluate(_AT, GOAL))
+    glide(page, at_robot(page), lambda: goal, 1.2)
+    page.wait_for_timeout(150)
+    page.mouse.up()
+    end_s = page.evaluate("now") + AFTER_S
+    page.wait_for_timeout(500)
+    glide(page, goal, lambda: begin, 0.9)
+    until(page, f"now >= {end_s}")
+    camera.send("Page.stopScreencast")
+    return [(stamp, Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")) for stamp, data in taken]
+
+
+def write_film(taken: Film, path: Path, said: str) -> None:
+    """As an animated picture, at even intervals, that begins anew at its end."""
+    first, last = taken[0][0], taken[-1][0]
+    chosen = [
+        max((one for one in taken if one[0] <= first + number * EACH_S), key=lambda one: one[0])[1]
+        for number in range(int((last - first) / EACH_S) + 1)
+    ]
+    palette = palette_of([chosen[0], chosen[len(chosen) // 2], chosen[-1]])
+    frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in chosen]
+    frames[0].save(
+        path, save_all=True, append_images=frames[1:], duration=int(1000 * EACH_S), loop=0, comment=said, optimize=True
+    )
+
+
+def palette_of(pictures: list[Image.Image]) -> Image.Image:
+    """The most frequent colours of all of them, as they are: the page has few, and edges of letters between them."""
+    counts: Counter[tuple[int, int, int]] = Counter()
+    for one in pictures:
+        for count, colour in one.getcolors(WIDTH * HEIGHT) or []:
+            counts[colour] += count  # type: ignore[index]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for colour, _ in counts.most_common(COLOURS) for part in colour])
+    return palette
+
+
+def stills(browser: Browser) -> None:
+    """A page in an arena with all there is; the cards for driving by hand and for a brain's parameters."""
+    with watched("showcase", "demo", "--robot", ROBOT, "--arena", "showcase", "--seconds", "3600") as url:
+        page = opened(browser, url, 1280, 900)
+        until(page, "now >= 14")
+        page.screenshot(path=IMAGES / "live-page.png")
+        page.close()
+    several = FOLDER / "two.py"
+    found = SEVERAL.search((PROJECT / "README.md").read_text(encoding="utf-8"))
+    assert found is not None
+    several.write_text(found[1], encoding="utf-8")
+    with watched("several", str(several), "--seconds", "3600") as url:
+        page = opened(browser, url, 1280, 2400)
+        page.locator("#parameters").screenshot(path=IMAGES / "live-parameters.png")
+        page.keyboard.down("w")
+        until(page, "$('driver').textContent === 'You drive.'")
+        page.locator("#drive").screenshot(path=IMAGES / "live-hand.png")
+        page.keyboard.up("w")
+        page.close()
+
+
+def main() -> None:
+    """Writes all of them."""
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        raise SystemExit("live_pictures.py: there is no Chromium; expected Debian's package chromium")
+    from playwright.sync_api import sync_playwright
+
+    with (
+        sync_playwright() as playwright,
+        contextlib.closing(playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])) as browser,
+    ):
+        run = ("demo", "--robot", ROBOT, "--arena", ARENA, "--seed", str(SEED), "--seconds", f"{FILMED_S:g}")
+        with watched("live", *run) as url:
+            page = opened(browser, url, WIDTH, HEIGHT)
+            taken = film(page)
+            until(page, "ended !== null")
+            page.close()
+        said = comment(read_run(FOLDER / "live"))
+        if repeated(said) != json.loads(said)["figures"]:
+            raise SystemExit("live_pictures.py: the run with the same interventions is another one")
+        write_film(taken, IMAGES / "live.gif", said)
+        stills(browser)
+
+
+if __name__ == "__main__":
+    main()
