@@ -250,7 +250,9 @@ def main() -> None:
             taken = film(page)
             until(page, "ended !== null")
             page.close()
-        said = comment(read_run(FOLDER / "live"))
+        result = read_run(FOLDER / "live")
+        assert isinstance(result, RunResult)
+        said = comment(result)
         if repeated(said) != json.loads(said)["figures"]:
             raise SystemExit("live_pictures.py: the run with the same interventions is another one")
         write_film(taken, IMAGES / "live.gif", said)

@@ -14,8 +14,8 @@ from boebot.errors import BrainError
 
 FIRST_BRAIN = '''"""{name}: backs away from what its whiskers touch and turns away from what infra-red sees.
 
-Run it:    boebot run {file} --out {stem}
-Watch it:  open {stem}/replay.html in a browser
+Watch it:  boebot run {file} --view
+Keep it:   boebot run {file} --out {stem}
 """
 
 from boebot import Robot
@@ -41,8 +41,8 @@ def step(robot: Robot) -> None:
 
 FROM_TOP = '''"""{name}: drives a square, then goes on until a whisker touches something.
 
-Run it:    boebot run {file} --out {stem}
-Watch it:  open {stem}/replay.html in a browser
+Watch it:  boebot run {file} --view
+Keep it:   boebot run {file} --out {stem}
 """
 
 from boebot import MainRobot
@@ -71,8 +71,8 @@ SEVERAL_BEHAVIORS = '''"""{name}: wanders, turns away from near things, and back
 Of the motor behaviors, the one of the highest utility drives. A utility follows tanh(b + sum of w * state variable +
 gamma) with a lag of tau seconds; gamma is what `kick` sets, and decays.
 
-Run it:    boebot run {file} --out {stem}
-Watch it:  open {stem}/replay.html in a browser
+Watch it:  boebot run {file} --view
+Keep it:   boebot run {file} --out {stem}
 """
 
 from dataclasses import dataclass
@@ -140,4 +140,4 @@ def new(
         raise BrainError(f"{path} exists already; it was left as it is") from None
     except OSError as error:
         raise BrainError(f"{path} cannot be written: {error.strerror}") from None
-    output.line(f"wrote {path}; now: boebot run {path} --out {stem}")
+    output.line(f"wrote {path}; now: boebot run {path} --view")
