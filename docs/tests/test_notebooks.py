@@ -1,5 +1,5 @@
 """The notebooks of docs/notebooks: kept without outputs, and run by a real kernel of Jupyter. `make test` runs them in
-one kernel, the sweep with few runs; `make soak` runs each as it stands."""
+one kernel, the sweep with few runs, what is watched for a second; `make soak` runs each as it stands."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FOLDER = ROOT / "docs" / "notebooks"
 PATHS = sorted(FOLDER.glob("*.ipynb"))
 NAMES = [path.stem for path in PATHS]
 LONGEST_S = 150
-RUNS, FEW_RUNS = "RUNS = 1000 ", "RUNS = 60 "
+SHORTER = {"RUNS = 1000 ": "RUNS = 60 ", "seconds=30, seed=1, view=True": "seconds=1, seed=1, view=True"}
 
 HASH = """
 import hashlib
@@ -85,6 +85,12 @@ def kernel_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+def shorter(source: str) -> str:
+    for long, short in SHORTER.items():
+        source = source.replace(long, short)
+    return source
+
+
 def run(notebook: NotebookNode, folder: Path) -> None:
     """Runs it in a kernel of its own; what a cell raises is raised here."""
     client = NotebookClient(
@@ -101,7 +107,7 @@ def outputs(kernel_folder: Path) -> dict[str, list[Any]]:
         if cells:
             cells[f"before {name}"] = new_code_cell("%reset -f")
         for cell in code_of(read(name)):
-            cells[f"{name}/{cell.id}"] = new_code_cell(cell.source.replace(RUNS, FEW_RUNS))
+            cells[f"{name}/{cell.id}"] = new_code_cell(shorter(cell.source))
         if name == "first-drive":
             cells[f"{name}/hash"] = new_code_cell(HASH)
     cells["several"] = new_code_cell(SEVERAL)
@@ -160,7 +166,15 @@ def test_tables_are_shown(outputs: dict[str, list[Any]]) -> None:
 
 def test_sweep_says_how_long_it_took(outputs: dict[str, list[Any]]) -> None:
     assert re.fullmatch(r"60 runs, \d\.\d km, in \d+\.\d s\n", outputs["thousand-runs/runs"][0].text)
-    assert RUNS in next(cell.source for cell in read("thousand-runs").cells if cell.id == "parameters")
+    assert "RUNS = 1000 " in next(cell.source for cell in read("thousand-runs").cells if cell.id == "parameters")
+
+
+def test_live_view_is_a_link(outputs: dict[str, list[Any]]) -> None:
+    link, said = outputs["first-drive/watch"]
+    address = r"http://127\.0\.0\.1:\d+/\?token=[\w-]+"
+    assert re.fullmatch(rf'<a href="{address}" target="_blank" rel="noopener">[\w ]+</a>', link.data["text/html"])
+    assert re.fullmatch(f"watch it: {address}", link.data["text/plain"])
+    assert said.text == "touched 0 times by hand\n"
 
 
 def test_nothing_warns(outputs: dict[str, list[Any]]) -> None:
