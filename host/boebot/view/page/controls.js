@@ -68,7 +68,7 @@ function setControls(on) {
 const RESTART = `<form><h2>Begin the run anew</h2>
   <div class="seed"><label for="seed">seed</label><input type="number" id="seed" min="0" step="1">
     <button type="button" id="anotherSeed">another</button></div>
-  <div id="choices"><h3>Imperfections of the simulated robot</h3><div class="choices"></div></div>
+  <div id="choices"><h3>Imperfections of the simulated robot, and what is so without each</h3><div class="choices"></div></div>
   <div class="buttons"><button type="button" id="cancel">Cancel</button><button class="main">Restart</button></div></form>`;
 function askRestart() {
   const dialog = element("dialog", { id: "restartDialog", ariaLabel: "Restart", innerHTML: RESTART });
