@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import os
 import re
 import signal
 import subprocess
@@ -21,8 +22,10 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from boebot.view.page_data import FORMAT
+from command import heed_signals
 
-LIMIT_S = 20.0
+LIMIT_S = 30.0
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")  # without them no page opens by itself
 
 
 class Run:
@@ -30,7 +33,15 @@ class Run:
 
     def __init__(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "boebot", *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        environment = {name: value for name, value in os.environ.items() if name not in DISPLAYS}
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+            preexec_fn=heed_signals,
+        )
         assert self.process.stderr is not None
         line = self.process.stderr.readline()
         found = re.search(r"http://\S+", line)

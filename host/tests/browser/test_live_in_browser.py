@@ -34,6 +34,8 @@ AT_SHAPE = """() => { const [x, y] = moving[0].at(now + run.begin), box = $('sta
   return [box.x + X(x) / ratio, box.y + Y(y) / ratio]; }"""
 SIGNALS = "[run.left.last, run.right.last]"
 
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")  # without them no page opens by itself
+
 Watch = Callable[..., str]
 
 
@@ -48,7 +50,7 @@ class Watched:
         """Returns the page's address."""
         out = self.folder / f"run-{len(self.running)}"
         command = [sys.executable, "-m", "boebot", "run", *arguments, "--view", "--out", str(out)]
-        environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        environment = {name: value for name, value in os.environ.items() if name not in DISPLAYS}
         process = subprocess.Popen(
             command,
             text=True,
