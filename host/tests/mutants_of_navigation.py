@@ -137,7 +137,8 @@ NOTHING: list[Any] = []
 
 def looking_ahead(self: Explore) -> None:
     """In one direction only."""
-    self._headings, self._has_looked = [], True
+    self._headings = []
+    self._looked_about.add(self._graph.active)
 
 
 def correcting_nothing(self: RandomSearch, scan: Scan) -> Estimate:

@@ -57,3 +57,21 @@ def test_paths_lead_from_the_active_node_along_neighbours(deeds: list[tuple[int,
             assert (node.path[0], node.path[-1]) == (graph.active, node.number)
             assert len(set(node.path)) == len(node.path)
             assert set(zip(node.path, node.path[1:], strict=False)) <= legs
+
+
+def test_back_at_another_node_paths_begin_there() -> None:
+    """R14b, and R14d: from there it is the shortest way over completed nodes that counts."""
+    graph = ExplorationGraph((0.0, 0.0), 0.75, beside=1.1)
+    for place in ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0)):
+        graph.place(place)
+        graph.reached(graph.active + 1)
+    last = graph.place((-1.0, 1.0))
+    assert last is not None and last.path == [3, 4]
+    graph.came_back(0)
+    assert (graph.active, last.path) == (0, [0, 3, 4]), "from 0 to 3 it is 1 m, though none was driven there"
+    graph.blocked(4)
+    graph.came_back(3)
+    assert (graph.active, last.status, graph.way(1)) == (3, "unreachable", [3, 0, 1])
+    assert [node.number for node in graph.nearest_completed((0.9, 0.8))] == [2, 1, 3, 0]
+    graph.retry(last, 1)
+    assert (graph.target(), last.path) == (last, [3, 0, 1, 4])

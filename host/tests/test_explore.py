@@ -18,6 +18,7 @@ from boebot.errors import BrainError
 from boebot.experiments.exploring import explored, explorer, starts
 from boebot.navigation import Coverage, Explore, GoTo, LineMap, Localization, Scan, TurretScan
 from boebot.navigation.corridor import is_clear
+from boebot.navigation.explore import State
 from boebot.navigation.scan_error import heard
 from tools.navigation_figures.tasks import errand
 
@@ -117,6 +118,21 @@ def test_rooms_are_explored(arena: str) -> None:
     run = explored(arena, seen, start, 1, explorer())
     assert run.share >= 0.995 and not run.trial.has_collided
     assert run.is_complete or arena == "exploration-block"
+
+
+def test_way_back_that_is_blocked_is_not_the_end() -> None:
+    """Fig. 6.3: it passes the end of a wall, comes to the low block, and on its way back feels the wall."""
+    start = starts("exploration-block", 3, 24)[4]
+    run = explored("exploration-block", LineMap.of("exploration"), start, 3004, explorer())
+    assert run.explore.state is not State.FAILED and run.share >= 0.995
+
+
+def test_node_that_sweeps_show_to_be_in_a_wall_is_left() -> None:
+    """From a place in its line a wall without thickness is not seen; a node in it is tried once, and from nowhere where
+    the wall is seen. It tried for 150 s, and a way of 20 m."""
+    start = starts("exploration", 10, 12)[11]
+    run = explored("exploration", LineMap.of("exploration"), start, 10011, explorer())
+    assert run.is_complete and run.count("unreachable") == 1 and run.trial.way <= 45
 
 
 def test_nodes_are_drawn_where_the_robot_is() -> None:

@@ -104,6 +104,15 @@ class ExplorationGraph:
         self._activate(number)
         self.nodes[number].status = "unreachable"
 
+    def came_back(self, number: int) -> None:
+        """R14b: the robot is at a completed node again, though perhaps not at the one where it was last."""
+        if number == self.active or frozenset((self.active, number)) in self.legs:
+            self._activate(number)
+            return
+        self.active = number
+        for node in self.pending:
+            self._find_path(node)
+
     def neighbours(self, number: int) -> Iterator[tuple[int, float]]:
         """As of what `search` searches: completed nodes to which a straight way may lead, each with its length (m)."""
         for node in self.nodes:
@@ -122,27 +131,24 @@ class ExplorationGraph:
             if any({one, two} == {number, other} for one, two in itertools.pairwise(node.path)):
                 self._find_path(node)
 
-    def retry(self, node: Node, last: int) -> bool:
-        """R14d: an unreachable node is pending again, to be reached from the completed node `last`.
+    def way(self, number: int) -> list[int]:
+        """From the active node to a completed one, over completed ones; empty: there is none."""
+        return search(self, self.active, number, "dijkstra").path
 
-        Returns:
-            Whether a way leads there.
-        """
-        way = search(self, self.active, last, "dijkstra").path
-        if way:
-            node.status, node.path = "pending", [*way, node.number]
-            self.legs.add(frozenset((last, node.number)))
-        return bool(way)
+    def retry(self, node: Node, last: int) -> None:
+        """R14d: an unreachable node is pending again, to be reached from the completed node `last`."""
+        node.status, node.path = "pending", [*self.way(last), node.number]
+        self.legs.add(frozenset((last, node.number)))
 
     def set_out(self, node: Node) -> bool:
         """R14e: back to a completed node; whether a way leads there."""
-        node.path = search(self, self.active, node.number, "dijkstra").path
+        node.path = self.way(node.number)
         return bool(node.path)
 
-    def nearest_completed(self, node: Node) -> list[Node]:
-        """The completed nodes, the nearest to that one first."""
+    def nearest_completed(self, place: Point) -> list[Node]:
+        """The completed nodes, the nearest to a place (m) first."""
         completed = [one for one in self.nodes if one.status == "completed"]
-        return sorted(completed, key=lambda one: self.distance(one.number, node.number))
+        return sorted(completed, key=lambda one: math.dist(one.place, place))
 
     def _find_path(self, node: Node) -> None:
         node.status = "completed"  # so that its last leg counts as well

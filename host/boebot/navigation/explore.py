@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar
 from boebot.brain import checks
 from boebot.cognition.odometry import Odometry, wrapped
 from boebot.navigation.corridor import is_clear
-from boebot.navigation.exploration_graph import STATUSES, ExplorationGraph, Placement
+from boebot.navigation.exploration_graph import STATUSES, ExplorationGraph, Node, Placement
 from boebot.navigation.frames import inverse, placed
 from boebot.navigation.obstacle import SONARS, is_blocked
 from boebot.navigation.scan_error import Scan
@@ -135,12 +135,13 @@ class Explore(SteeredBehavior):
         x, y = self.pose[:2]
         self._placement = self.placement or Placement.of(robot.dimensions.radius)
         self.graph = ExplorationGraph((x, y), self._placement.least_distance, 1.1 * self._placement.distance)
-        self._tried: set[tuple[int, int]] = set()  # R14d: unreachable node, completed node
+        self._sweeps: dict[int, list[tuple[Pose, Scan]]] = {}  # by the node at which they were taken
+        self._tried: set[tuple[int, int]] = set()  # node, completed node from which it was tried to come straight to it
+        self._looked_about: set[int] = set()  # R15: nodes at which it has looked in four directions
         self._retried = -1
         self._looked_closely: set[int] = set()  # R14e: completed nodes
         self._close: set[int] = set()  # nodes that were placed then; one try is enough for them
         self._share = 1.0  # of the distances at which nodes are placed
-        self._not_direct: set[tuple[int, int]] = set()  # active node, target
         self._blocked_at: Point | None = None
         self._seen_at, self._seen_s = (x, y), robot.time  # where it was last when it made progress
         self._look_around()
@@ -150,7 +151,7 @@ class Explore(SteeredBehavior):
         """R15: a range finder that sees half a turn only has to look in four directions."""
         heading = self.pose[2]
         self._headings = [heading + k * QUARTER for k in (1, 2, 3)]
-        self._has_looked = True
+        self._looked_about.add(self._graph.active)
 
     def _scan(self, robot: Robot) -> State:
         self._sweep = self._swept(robot)
@@ -164,6 +165,7 @@ class Explore(SteeredBehavior):
     def _place(self, robot: Robot) -> State:
         assert self._sweep is not None
         x, y, heading = self.pose
+        self._sweeps.setdefault(self._graph.active, []).append((self.pose, self._sweep))
         placement = self._placement.closer(self._share)
         way = placement.distance
         for bearing in placement.bearings(self._sweep, half_width(robot)):
@@ -185,40 +187,55 @@ class Explore(SteeredBehavior):
 
     def _select(self, robot: Robot) -> State:
         target = self._graph.target()
-        if target is None and not self._has_looked:
+        if target is None and self._graph.active not in self._looked_about:
             self._look_around()
             return State.TURN_SCAN
         if target is None:
             return State.RETRY_SELECT if self.second_pass else State.DONE
-        self._target, self._has_looked, self._attempts = target, False, 0
+        self._target = target
         away = math.dist(self.pose[:2], target.place)
-        pair = self._graph.active, target.number
-        if len(target.path) > 2 and away <= self.shortcut and pair not in self._not_direct:
-            self._not_direct.add(pair)  # once
+        pair = target.number, self._graph.active
+        if len(target.path) > 2 and away <= self.shortcut and pair not in self._tried:
+            self._tried.add(pair)
             self._faces = False
             return State.CHECK_DIRECT
         return State.NEXT_LEG
 
     def _retry_select(self, robot: Robot) -> State:
-        """R14d, R14e: what could not be reached is tried from other nodes, then looked for in smaller steps."""
+        """R14d, R14e: what could not be reached is tried from other nodes, where the way is shortest first, then looked
+        for in smaller steps."""
         graph = self._graph
         unreachable = [n for n in graph.nodes if n.status == "unreachable" and n.number not in self._close]
+        ways = [
+            (way, node, last)
+            for node in unreachable
+            for last in graph.nearest_completed(node.place)[:RETRIED_FROM]
+            if (node.number, last.number) not in self._tried and not self._is_obstructed(last, node.place, robot)
+            if (way := graph.way(last.number))
+        ]
+        if ways:
+            _, node, last = min(ways, key=lambda one: graph.length([*one[0], one[1].number]))
+            self._tried.add((node.number, last.number))
+            graph.retry(node, last.number)
+            self._retried = node.number
+            return State.SELECT
         for node in unreachable:
-            for last in graph.nearest_completed(node)[:RETRIED_FROM]:
-                pair = node.number, last.number
-                if pair not in self._tried:
-                    self._tried.add(pair)
-                    if graph.retry(node, last.number):
-                        self._retried = node.number
-                        return State.SELECT
-        for node in unreachable:
-            nearest = graph.nearest_completed(node)[0]
-            if nearest.number not in self._looked_closely:
+            nearest = graph.nearest_completed(node.place)[0]
+            is_new = nearest.number not in self._looked_closely
+            if is_new and not self._is_obstructed(nearest, node.place, robot):
                 self._looked_closely.add(nearest.number)
                 if graph.set_out(nearest):
-                    self._target, self._share, self._attempts = nearest, CLOSER, 0
+                    self._target, self._share = nearest, CLOSER
                     return State.NEXT_LEG
         return State.DONE
+
+    def _is_obstructed(self, last: Node, place: Point, robot: Robot) -> bool:
+        """A sweep at a completed node showed something in the corridor from there to a place."""
+        for (x, y, heading), sweep in self._sweeps.get(last.number, []):
+            bearing, length = math.atan2(place[1] - y, place[0] - x) - heading, math.dist((x, y), place)
+            if not is_clear(sweep, bearing, length + half_width(robot), half_width(robot)):
+                return True
+        return False
 
     # ---- ways --------------------------------------------------------------------------------------------------------
 
@@ -240,7 +257,7 @@ class Explore(SteeredBehavior):
             return State.ARRIVED
         if not self._blocked(robot):
             return State.DRIVE_DIRECT
-        self._base = self._graph.active
+        self._bases = [self._graph.active]
         return State.BACKTRACK
 
     def _next_leg(self, robot: Robot) -> State:
@@ -275,8 +292,9 @@ class Explore(SteeredBehavior):
 
     def _block(self, robot: Robot) -> State:
         """R11 for a target; R14c for a node on the way there."""
-        self._base = self._graph.active
+        self._bases = [self._graph.active]
         if self._next is self._target and self._target.status == "pending":
+            self._tried.add((self._target.number, self._graph.active))
             self._graph.blocked(self._target.number)
         elif self.second_pass:
             self._graph.bad_leg(self._graph.active, self._next.number)
@@ -284,20 +302,27 @@ class Explore(SteeredBehavior):
         return State.BACKTRACK
 
     def _backtrack(self, robot: Robot) -> State:
-        """Backward, until it can turn; then to the node where it was last."""
+        """Backward, until it can turn; then to the node where it was last, or, R14b, to another that is near."""
         if self._blocked_at is not None:
             robot.drive_speed(-self.turn_speed, -self.turn_speed)
             if math.dist(self.pose[:2], self._blocked_at) >= BACKWARD or robot.time - self._stood_s > BACKWARD_S:
                 self._blocked_at, self._seen_s = None, robot.time
             return State.BACKTRACK
-        place = self._graph.nodes[self._base].place
+        place = self._graph.nodes[self._bases[-1]].place
         if math.dist(self.pose[:2], place) <= 2 * BACKWARD or self._drive(robot, place):
-            self._graph.reached(self._base)
+            self._graph.came_back(self._bases[-1])
             return State.SELECT
-        if self._blocked(robot):
+        if self._blocked(robot):  # R14b
             self._stood_s = robot.time
-            self._attempts += 1
-        return State.BACKTRACK if self._attempts < ATTEMPTS else State.FAILED
+            self._bases.append(self._next_base())
+        return State.BACKTRACK if len(self._bases) <= ATTEMPTS else State.FAILED
+
+    def _next_base(self) -> int:
+        """Of the nodes that it went back to least often, the nearest."""
+        if not self.second_pass:
+            return self._bases[-1]
+        near = self._graph.nearest_completed(self.pose[:2])
+        return min(near, key=lambda node: self._bases.count(node.number)).number
 
     def _end(self, robot: Robot) -> State:
         stand(robot, self._stood_s)
