@@ -137,8 +137,7 @@ NOTHING: list[Any] = []
 
 def looking_ahead(self: Explore) -> None:
     """In one direction only."""
-    self._headings = []
-    self._looked_about.add(self._graph.active)
+    self._headings, self._looked_about = [], set(range(1000))
 
 
 def correcting_nothing(self: RandomSearch, scan: Scan) -> Estimate:
