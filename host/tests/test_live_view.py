@@ -8,6 +8,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -101,6 +102,7 @@ def endless() -> Iterator[Run]:
     run.process.send_signal(signal.SIGTERM)
     code, _, error = run.end()
     assert code == 143, error
+    assert "Traceback" not in error
 
 
 def get(run: Run, path: str, **headers: str) -> tuple[int, str, Any]:
@@ -120,6 +122,15 @@ def test_page_is_for_who_has_its_address(endless: Run) -> None:
     assert get(endless, f"/other?{endless.url.query}")[0] == 404
     status, body, _ = get(endless, f"/?{endless.url.query}", Host="example.org")  # as a rebound name would say
     assert status == 403 and body.count("\n") == 1
+    for rubbish in (
+        "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
+        f"GET http://[ HTTP/1.1\r\nHost: {endless.url.netloc}\r\n\r\n",
+    ):
+        with socket.create_connection((endless.url.hostname or "", endless.url.port or 0), timeout=LIMIT_S) as sent:
+            sent.sendall(rubbish.encode())
+            assert sent.recv(1000).startswith(b"HTTP/1.1 400 ")
+    with socket.create_connection((endless.url.hostname or "", endless.url.port or 0)) as sent:
+        sent.sendall(b"\x00\xff\r\n\r\n")  # the fixture looks at what the run has said of it: nothing
 
 
 def test_stream_is_refused_to_other_pages_and_without_token(endless: Run) -> None:
@@ -225,6 +236,17 @@ def test_ctrl_c_ends_a_run_that_stands_still() -> None:
         run.process.send_signal(signal.SIGINT)
         assert page.until("end")
     assert run.end()[0] == 130
+
+
+def test_ctrl_c_at_the_end_of_a_run_leaves_what_came_of_it() -> None:
+    run = Run("run", "wander", "--view", "--seconds", "0.5", "--speed", "max", "--json")
+    with run.stream() as stream:
+        page = Page(stream)
+        page.until("end")
+        run.process.send_signal(signal.SIGTERM)
+        code, out, error = run.end()
+    assert code == 0, error
+    assert json.loads(out)["ended"] == "complete"
 
 
 def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> None:

@@ -72,6 +72,8 @@ class Audience:
         except BoebotError as error:
             return str(error)
         if isinstance(what, messages.Hello):
+            if page.number in self._pages:
+                return "expected hello once"
             if what.format != page_data.FORMAT:
                 return f"this page is of another version (format {what.format}, not {page_data.FORMAT}); load it again"
             with self.changed:
@@ -92,10 +94,10 @@ class Audience:
 
     def went(self, page: Page) -> None:
         """See `page_server.Listener`."""
-        self._stage.went(page.number)
         with self.changed:
             self._pages.pop(page.number, None)
             self.changed.notify_all()
+        self._stage.went(page.number)
 
     # ---- in the thread of what is looked at ------------------------------------------------------------------------
 

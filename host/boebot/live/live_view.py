@@ -60,6 +60,7 @@ class LiveView:
         self._speed = speed
         self._pace = Pace(speed)
         self._controls: Controls | None = None
+        self._changing = threading.Lock()  # held while they become another run's, and while a page comes, goes or asks
         self._has_ended = False
         self._number = 0
         self._robots: list[Hands] = []
@@ -77,18 +78,21 @@ class LiveView:
 
     def came(self, page: int) -> None:
         """See `Stage`."""
-        if self._controls is not None:
-            self._controls.came(page)
+        with self._changing:
+            if self._controls is not None:
+                self._controls.came(page)
 
     def went(self, page: int) -> None:
         """See `Stage`."""
-        if self._controls is not None:
-            self._controls.went(page)
+        with self._changing:
+            if self._controls is not None:
+                self._controls.went(page)
 
     def asked(self, page: int, what: messages.Asked) -> None:
         """See `Stage`. Once the run has ended, only another one can be asked for."""
-        if self._controls is not None and (not self._has_ended or isinstance(what, messages.Restart)):
-            self._controls.heard(page, what)
+        with self._changing:
+            if self._controls is not None and (not self._has_ended or isinstance(what, messages.Restart)):
+                self._controls.heard(page, what)
 
     # ---- the run: in its thread ------------------------------------------------------------------------------------
 
@@ -104,9 +108,11 @@ class LiveView:
         self._plan = FloorPlan() if world is None else floor_plan(world, 0.0, 0.0)
         self._audience.forget(len(robots))
         controls = Controls(len(robots), len(self._plan.moving), can, self._pace)
-        for page in self._audience.pages():
-            controls.came(page)
-        self._controls, self._has_ended = controls, False
+        with self._changing:
+            for page in self._audience.pages():
+                controls.came(page)
+            controls.restart = self.restart  # asked for since the last run has ended
+            self._controls, self._has_ended = controls, False
         self._number += 1
         self._rates.clear()
         self._due_s = 0.0
@@ -248,17 +254,24 @@ class LiveView:
         """What the run is to begin afresh with, if a page has asked for that."""
         return None if self._controls is None else self._controls.restart
 
+    def take_restart(self) -> messages.Restart | None:
+        """The same; what pages ask for from now on is another one."""
+        with self._changing:
+            taken = self.restart
+            if self._controls is not None:
+                self._controls.restart = None
+        return taken
+
     def announce_end(self, tables: list[Message], ended: str, *, again: bool) -> None:
         """Tells all pages. `again`: another run can be asked for."""
         self._has_ended = True
         self._audience.end({"type": "end", "ended": ended, "tables": tables, "again": again})
 
-    def wait_for_restart(self) -> messages.Restart | None:
-        """Waits while a page is open, until one asks for another run; None: there is no page any more."""
+    def wait_for_restart(self) -> None:
+        """Waits while a page is open, until one asks for another run."""
         with self._audience.changed:
             while self._audience.is_there and self.restart is None:
                 self._audience.changed.wait(0.2)  # and not for ever: Ctrl-C is to be heard
-        return self.restart
 
     def close(self) -> None:
         """No pages any more."""
@@ -273,8 +286,9 @@ class Heard:
 
     def write(self, text: str) -> int:
         """Both get it."""
+        count = self._own.write(text)
         self._view.print(text)
-        return self._own.write(text)
+        return count
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._own, name)

@@ -4,6 +4,7 @@ what must not be lost is kept, such as events, and that is bounded."""
 from __future__ import annotations
 
 import asyncio
+import json
 import threading
 from typing import Any
 
@@ -56,7 +57,14 @@ class Outbox:
         with self._lock:
             waiting = [*self._first, *filter(None, (self._chunk, self._state))]
             self._first, self._chunk, self._state = [], None, None
-        return [msgspec.json.encode(message).decode() for message in waiting]
+        return [_text(message) for message in waiting]
+
+
+def _text(message: Message) -> str:
+    try:
+        return msgspec.json.encode(message).decode()
+    except UnicodeEncodeError:  # half a character, as a brain may print it
+        return json.dumps(json.loads(json.dumps(message), parse_constant=lambda name: None))
 
 
 def merged(old: Message, new: Message) -> Message:

@@ -59,9 +59,10 @@ class Pace:
         if speed is None:
             return False
         now = time.perf_counter()
-        if self._anchor is None:
-            self._anchor = now, time_s
-        due = self._anchor[0] + (time_s - self._anchor[1]) / speed
+        anchor = self._anchor  # once: another thread may take it away
+        if anchor is None:
+            self._anchor = anchor = now, time_s
+        due = anchor[0] + (time_s - anchor[1]) / speed
         if now - due > LAG_S:
             self._anchor = now, time_s
         if due <= now:

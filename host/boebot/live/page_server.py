@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import hmac
 import http
+import logging
 import secrets
 import threading
 import time
@@ -19,7 +20,7 @@ from typing import Protocol
 from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio.server import ServerConnection, serve
-from websockets.datastructures import Headers
+from websockets.datastructures import Headers, MultipleValuesError
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
@@ -33,6 +34,9 @@ MESSAGES_AT_ONCE = 400
 PAGES = 16  # at most
 SILENT_S = 20.0  # a page that answers no ping for so long is gone
 START_S = 5.0
+_LOGGER = logging.getLogger("boebot.live")  # who sends rubbish must not fill the run's terminal
+_LOGGER.addHandler(logging.NullHandler())
+_LOGGER.propagate = False
 _POLICY = "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"  # beside what the page itself says
 
 
@@ -134,6 +138,7 @@ class PageServer:
             ping_timeout=SILENT_S / 2,
             close_timeout=0.5,
             server_header=None,
+            logger=_LOGGER,
         ) as server:
             self._port = next(iter(server.sockets)).getsockname()[1]
             self._started.set()
@@ -141,9 +146,12 @@ class PageServer:
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """The page, or a refusal; None: the stream, which goes on as a WebSocket."""
-        address = urlsplit(request.path)
-        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        given = parse_qs(address.query).get("token", [""])[0]
+        try:
+            address = urlsplit(request.path)
+            host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+            given = parse_qs(address.query).get("token", [""])[0]
+        except (ValueError, MultipleValuesError):
+            return _refusal(http.HTTPStatus.BAD_REQUEST, "that is no request of a browser")
         if host not in self._hosts():
             return _refusal(http.HTTPStatus.FORBIDDEN, f"this is {self._name(self._host)}:{self._port}, not {host!r}")
         if not hmac.compare_digest(given.encode(), self._token.encode()):

@@ -58,26 +58,30 @@ def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result
     while True:
         with contextlib.redirect_stdout(Heard(sys.stdout, view)):
             result = run(request)
-        restart = view.restart
         if not isinstance(result.error, RestartedError):
-            restart = _ended(view, result, waits=waits and not isinstance(result.error, KeyboardInterrupt))
+            may_go_on = waits and not isinstance(result.error, KeyboardInterrupt)
+            try:
+                if not _ended(view, result, waits=may_go_on):
+                    return result
+            except KeyboardInterrupt:  # the run is over: what came of it is still to be written
+                return result
+        restart = view.take_restart()
         if restart is None:
             return result
         request = _afresh(request, restart)
 
 
-def _ended(view: LiveView, result: RunResult | TogetherResult, *, waits: bool) -> messages.Restart | None:
-    """Tells all pages that the run has ended. Returns what a page asks for then."""
+def _ended(view: LiveView, result: RunResult | TogetherResult, *, waits: bool) -> bool:
+    """Tells all pages that the run has ended. Where another one may be asked for, waits until a page does, or none is
+    open any more, and returns True."""
     robots = [result] if isinstance(result, RunResult) else result.robots
     tables: list[dict[str, Any]] = [dict(robot.table()) for robot in robots]
     ended = str(tables[0]["ended"]) if result.error is None else str(result.error) or "interrupted"
     again = waits and robots[0].world is not None
     view.announce_end(tables, ended, again=again)
-    if not again:
-        return None
-    with contextlib.suppress(KeyboardInterrupt):
-        return view.wait_for_restart()
-    return None
+    if again:
+        view.wait_for_restart()
+    return again
 
 
 def _afresh(request: Request, wanted: messages.Restart) -> Request:
