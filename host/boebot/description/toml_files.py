@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import reprlib
 import sys
+import threading
 import tomllib
 import types
 import typing
@@ -25,6 +26,7 @@ from boebot.errors import BoebotError, did_you_mean, printable
 
 _T = TypeVar("_T")
 
+_CONVERTING = threading.Lock()  # msgspec looks at a type when it first meets it, and no two threads may do that at once
 SLOW = 2_000_000  # bytes that take about a second: a notice says why nothing happens
 
 
@@ -151,7 +153,8 @@ def convert(table: dict[str, Any], kind: type[_T], file: str, error: type[Boebot
     fault = _not_finite(table, "")
     if fault is None:
         try:
-            return msgspec.convert(table, kind)
+            with _CONVERTING:
+                return msgspec.convert(table, kind)
         except msgspec.ValidationError as cause:
             fault = _fault(table, kind, "") or Fault("", str(cause))
     raise error(f"{where(table, file, fault.place)}: {fault.what}")

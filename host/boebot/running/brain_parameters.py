@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,8 @@ def _declared(brain: LoadedBrain) -> list[tuple[Process, str]]:
     for process in brain.brain.processes:
         for one in dataclasses.fields(process):
             value = getattr(process, one.name)
-            if one.name != "period" and one.init and isinstance(value, float | int) and not isinstance(value, bool):
+            is_number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
+            if one.name != "period" and one.init and is_number:
                 found.append((process, one.name))
     return found
 
@@ -54,9 +56,14 @@ def _find(brain: LoadedBrain, name: str) -> tuple[Process, str]:
 
 
 def check_parameter(process: Process, field: str, value: float) -> None:
-    """Raises BrainError where the process would refuse that value when it is made."""
+    """Raises BrainError where the process would refuse that value when it is made, in whichever way."""
     changed: dict[str, Any] = {field: value}
-    dataclasses.replace(process, **changed)
+    try:
+        dataclasses.replace(process, **changed)
+    except BrainError:
+        raise
+    except Exception as error:
+        raise BrainError(f"{process.name} does not take {field} = {value!r}: {error}") from None
 
 
 def bounds(brain: LoadedBrain, name: str) -> tuple[float, float]:
