@@ -102,6 +102,8 @@ def explored(arena: str | Path, seen: LineMap, pose: Pose, seed: int, explore: E
     true = trial.result.true_pose
     assert true is not None
     coverage.add_path(np.column_stack((true.x, true.y, true.heading)), HALF_TURN, RAYS, REACH)
+    assert len(trial.time)  # is kept, with the path
+    del trial.result.series  # all that the laser saw, which takes much memory
     return Exploration(trial, explore, coverage.share)
 
 
