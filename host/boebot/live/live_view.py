@@ -6,11 +6,12 @@ its time; the server's thread sends them. Neither waits for the other.
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TextIO
+from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
 from boebot.boards import imperfections
@@ -31,6 +32,7 @@ EACH_S = 0.05  # of the wall clock, from chunk to chunk
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
 SHARE = 60  # of the time of a run that hurries a chunk takes this part at most
+_OUTPUT = threading.Lock()  # held while sys.stdout is put back
 RATE_S = 1.0  # over which the speed of a run is measured
 
 
@@ -279,15 +281,27 @@ class LiveView:
 
 
 class Heard:
-    """Standard output, that the live view hears, too."""
+    """Standard output, that the live view hears, too, for as long as a `with` block lasts: of several in threads, that
+    end in any order, none stays."""
 
-    def __init__(self, own: TextIO, view: LiveView) -> None:
-        self._own, self._view = own, view
+    def __init__(self, view: LiveView) -> None:
+        self._own, self._view = sys.stdout, view
+        self._has_ended = False
+
+    def __enter__(self) -> None:
+        sys.stdout = self
+
+    def __exit__(self, *error: object) -> None:
+        self._has_ended = True
+        with _OUTPUT:
+            while isinstance(sys.stdout, Heard) and sys.stdout._has_ended:
+                sys.stdout = sys.stdout._own
 
     def write(self, text: str) -> int:
         """Both get it."""
         count = self._own.write(text)
-        self._view.print(text)
+        if not self._has_ended:
+            self._view.print(text)
         return count
 
     def __getattr__(self, name: str) -> Any:

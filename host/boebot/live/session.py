@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import html
-import sys
 import webbrowser
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -56,7 +55,7 @@ def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result
         waits: at a run's end as long as a page is open, which may ask for another one.
     """
     while True:
-        with contextlib.redirect_stdout(Heard(sys.stdout, view)):
+        with Heard(view):
             result = run(request)
         if not isinstance(result.error, RestartedError):
             may_go_on = waits and not isinstance(result.error, KeyboardInterrupt)
