@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
 from boebot.live import messages
+from boebot.live.audience import PAST, thinned
 from boebot.live.controls import SILENT_S, Controls
 from boebot.live.outbox import EVENTS, LETTERS, Outbox
 from boebot.live.pace import Pace
@@ -26,6 +28,16 @@ def controls(can: frozenset[str] = ALL, *, robots: int = 1, speed: float | None 
     for page in (1, 2):
         made.came(page)
     return made
+
+
+def test_past_of_a_long_run_is_bounded_and_even() -> None:
+    past: deque[Any] = deque()
+    for time_s in range(20 * PAST):
+        past.append({"of": 1, "time": time_s, "runs": [], "printed": ""})
+        past = thinned(past) if len(past) > PAST else past
+    times = [chunk["time"] for chunk in past]
+    assert PAST / 8 < len(times) <= PAST and times[-1] == 20 * PAST - 1
+    assert max(later - time_s for time_s, later in zip([0, *times], times, strict=False)) <= 20 * 8
 
 
 def test_deeds_are_given_once_and_in_their_order() -> None:

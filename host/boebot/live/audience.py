@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Iterable
 from typing import Any, Protocol
 
 from boebot.errors import BoebotError
@@ -127,10 +128,9 @@ class Audience:
         with self._lock:
             for known, rows in zip(self._layers, chunk["runs"], strict=True):
                 known.update((layer["name"], layer) for layer in rows["layers"])
-            self._past.append(chunk | {"runs": [rows | {"layers": []} for rows in chunk["runs"]]})
+            self._past.append(chunk | {"runs": [rows | {"layers": []} for rows in chunk["runs"]], "of": 1})
             if len(self._past) > PAST:
-                pairs = zip(*[iter(self._past)] * 2, strict=False)
-                self._past = deque([merged(one, other) for one, other in pairs])
+                self._past = thinned(self._past)
             is_first = len(self._past) == 1
             for page in self._pages.values():
                 if is_first:
@@ -175,6 +175,19 @@ class Audience:
     def _send(self, page: Page, message: Message) -> None:
         page.outbox.put(message)
         self._server.wake(page)
+
+
+def thinned(past: Iterable[Message]) -> deque[Message]:
+    """At most about half as many as `PAST` chunks, evenly over the run: `of` says how many each is made of."""
+    chunks = list(past)
+    most = -(-4 * sum(chunk["of"] for chunk in chunks) // PAST)
+    kept: deque[Message] = deque()
+    for chunk in chunks:
+        if kept and kept[-1]["of"] + chunk["of"] <= most:
+            kept[-1] = merged(kept[-1], chunk) | {"of": kept[-1]["of"] + chunk["of"]}
+        else:
+            kept.append(chunk)
+    return kept
 
 
 def _as_seen_by(page: Page, message: Message) -> Message:
