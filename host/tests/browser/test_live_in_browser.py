@@ -161,6 +161,7 @@ def test_pause_step_and_speed(page: Page) -> None:
     page.select_option("#speed", "1")
 
 
+@pytest.mark.soak
 def test_driving_by_keys_arrows_and_gamepad(page: Page) -> None:
     page.keyboard.down("w")
     wait_for(page, f"{SIGNALS}.every(v => Math.abs(v - 0.6) < 0.02)")
@@ -209,6 +210,7 @@ def test_space_stops_whatever_has_the_focus(page: Page) -> None:
     wait_for(page, "$('driver').classList.contains('alerted')")
 
 
+@pytest.mark.soak
 def test_robot_is_dragged_or_moved_by_keys(page: Page) -> None:
     page.click("#pause")
     wait_for(page, "state.paused && now === run.duration")
@@ -243,6 +245,7 @@ def test_robot_is_dragged_or_moved_by_keys(page: Page) -> None:
     assert page.evaluate("placeOf(run)") == pytest.approx(after)
 
 
+@pytest.mark.soak
 def test_finger_drags_the_robot_on_a_phone(url: str, open_page: OpenPage) -> None:
     """Upwards, which elsewhere on the arena scrolls the page."""
     page = open_page(url, 390, 844)
@@ -258,6 +261,7 @@ def test_finger_drags_the_robot_on_a_phone(url: str, open_page: OpenPage) -> Non
     wait_for(page, f"state.touched > {touched} || !$('notice').hidden")
 
 
+@pytest.mark.soak
 def test_moving_shape_is_dragged(page: Page) -> None:
     page.click("#pause")
     wait_for(page, "state.paused && now === run.duration")
@@ -284,6 +288,7 @@ def test_parameters_are_sliders(page: Page) -> None:
     wait_for(page, f"Math.abs(state.robots[0].parameters['{name}'] - {value}) < 1e-6 * Math.max(1, Math.abs({value}))")
 
 
+@pytest.mark.soak
 def test_one_page_drives_at_a_time(page: Page, url: str, open_page: OpenPage) -> None:
     second = open_page(url)
     page.keyboard.down("w")
@@ -294,6 +299,7 @@ def test_one_page_drives_at_a_time(page: Page, url: str, open_page: OpenPage) ->
     page.keyboard.up("w")
 
 
+@pytest.mark.soak
 def test_scrubbing_back_and_live_again(page: Page) -> None:
     page.focus("#slider")
     for _ in range(5):
@@ -310,6 +316,7 @@ def test_scrubbing_back_and_live_again(page: Page) -> None:
     wait_for(page, "run.duration - now < 0.5")
 
 
+@pytest.mark.soak
 def test_restart_with_another_seed_and_without_an_imperfection(watched: Watched, open_page: OpenPage) -> None:
     page = open_page(watched.start("demo", "--robot", "shieldbot-charging", "--arena", "room", "--seconds", "900"))
     wait_for(page, "state !== null && run.duration > 1")
@@ -337,6 +344,7 @@ def test_what_cannot_be_done_is_absent(watched: Watched, open_page: OpenPage) ->
     watched.running[-1].kill()
 
 
+@pytest.mark.soak
 def test_lost_connection_is_one_sentence(watched: Watched, browser: Browser) -> None:
     page = browser.new_page()  # what Chromium itself says of a connection refused is on its console
     page.goto(watched.start("wander", "--arena", "room", "--seconds", "900"))
