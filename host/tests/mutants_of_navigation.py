@@ -153,7 +153,7 @@ NAVIGATION = [
     ),
     Mutant("E36", "d_min", put(ExplorationGraph, "__init__", lambda init: lambda self, at, _: init(self, at, 0.0))),
     Mutant("E36", "the nearest is next", put(ExplorationGraph, "length", lambda _: lambda self, path: 0.0)),
-    Mutant("E37", "γ_min", put(Placement, "bearings", bearings_with(least_angle=0.0))),
+    Mutant("E37", "γ_min", put(Placement, "bearings", bearings_with(least_angle=1e-9))),
     Mutant("E37", "several nodes in a wide interval", put(Placement, "bearings", bearings_with(least_distance=2.0))),
     Mutant("E37", "the margin Δ", put(Placement, "bearings", bearings_with(margin=0.0))),
     Mutant("E41", "the heuristic", put(Lattice, "distance", without_heuristic)),
