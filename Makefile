@@ -13,7 +13,7 @@ PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-
 	--constraint requirements.lock
 
 # Made by protocol/generate.py. Of the headers in firmware/src/generated one is named here; it makes them all.
-GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host/boebot/devices/attributes.pyi
+GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host/boebot/can/layout.py host/boebot/devices/attributes.pyi
 GENERATED_FROM := $(wildcard protocol/*.py protocol/*.toml protocol/robots/*.toml host/boebot/devices/*.py) firmware/src/tasks.def
 FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
@@ -140,7 +140,7 @@ clean:
 lock:
 	@rm -rf build/lock-venv && $$(tools/find_python.sh) -m venv build/lock-venv
 	@build/lock-venv/bin/pip install --quiet \
-		$$(build/lock-venv/bin/python tools/requirements.py build run firmware foxglove test browser bench check)
+		$$(build/lock-venv/bin/python tools/requirements.py build run can firmware foxglove test browser bench check)
 	@{ sed -n 1p requirements.lock; build/lock-venv/bin/pip freeze --all --exclude pip --exclude wheel; } >build/requirements.lock
 	@mv build/requirements.lock requirements.lock
 
@@ -198,7 +198,7 @@ $(VENV)/.done-run: $(VENV)/.done-firmware $(DECLARED)
 	@$(call INSTALL,run)
 $(VENV)/.done-test: $(DECLARED) | $(VENV)/.done-boebot
 	@echo "Installing Python packages for tests"
-	@$(call INSTALL,foxglove test browser)
+	@$(call INSTALL,can foxglove test browser)
 $(VENV)/.done-bench: $(DECLARED) | $(VENV)/.done-test
 	@echo "Installing what the bench compares with"
 	@$(call INSTALL,bench)

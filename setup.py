@@ -46,6 +46,7 @@ PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in 
 WHEEL_DATA = {
     "boebot/data/robots": ("protocol/robots", ("*.toml",)),
     "boebot/data/images": ("build/images", ("*.elf", "*.hex")),
+    "boebot/data/protocol": ("protocol", ("boebot.dbc",)),
 }
 
 MSVC = sys.platform == "win32"

@@ -4,9 +4,9 @@
     python protocol/generate.py --pages    writes what is in git, for it is read there
     python protocol/generate.py --check    exits 1 and names each file in git that is stale
 
-Built: the C headers in firmware/src/generated, the Python module host/boebot/link/messages.py, and the stub
-host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest begin with it; a file that would be the same
-is left alone. In git: the golden vectors protocol/vectors/frames.json, the CAN database protocol/boebot.dbc, and the
+Built: the C headers in firmware/src/generated, the Python modules host/boebot/link/messages.py and
+host/boebot/can/layout.py, and the stub host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest
+begin with it; a file that would be the same is left alone. In git: the golden vectors protocol/vectors/frames.json, the CAN database protocol/boebot.dbc, and the
 tables of PROTOCOL.md. Each kind of file has a module beside this one.
 """
 
@@ -30,6 +30,7 @@ sys.path.insert(0, str(HERE))
 import attributes_stub  # noqa: E402
 import c_headers  # noqa: E402
 import can_database  # noqa: E402
+import can_module  # noqa: E402
 import device_header  # noqa: E402
 import pin_headers  # noqa: E402
 import protocol_page  # noqa: E402
@@ -58,6 +59,7 @@ def built() -> dict[Path, str]:
     return {
         **{GENERATED / name: text for name, text in headers.items()},
         ROOT / "host" / "boebot" / "link" / "messages.py": python_module.python_module(spec),
+        ROOT / "host" / "boebot" / "can" / "layout.py": can_module.can_module(spec),
         attributes_stub.STUB: attributes_stub.stub(),
     }
 

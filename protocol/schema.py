@@ -19,7 +19,7 @@ TASKS = HERE.parent / "firmware" / "src" / "tasks.def"
 
 DELIVERIES = ("handshake", "telemetry", "set_point", "stop", "exactly_once")
 # Keys that both ends need not agree on. The firmware checks a parameter's range.
-NOT_ON_THE_WIRE = ("doc", "device", "devices", "default", "default_from", "each_task", "since", "docs")
+NOT_ON_THE_WIRE = ("doc", "device", "devices", "default", "default_from", "each_task", "since", "docs", "can_id")
 MINORS = 16
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
 
@@ -105,6 +105,7 @@ class Message:
     fields: list[Field]
     since: int = 0
     devices: list[str] = dataclasses.field(default_factory=list)  # of the firmware, that fill it (device_header.py)
+    can_id: int = 0  # of its first CAN frame at node 0; 0: it goes by ISO-TP (can_layout.py)
 
     @property
     def length(self) -> int:

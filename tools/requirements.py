@@ -1,6 +1,6 @@
 """Prints the Python packages that a purpose needs, as pyproject.toml declares them, one to a line.
 
-    python tools/requirements.py build|run|firmware|foxglove|test|check ...
+    python tools/requirements.py build|run|can|firmware|foxglove|test|check ...
 
 `build` is what setup.py needs, `run` what the installed distribution needs; the others are its extras. The
 exact versions are in requirements.lock, which pip takes as --constraint.

@@ -2,8 +2,9 @@
 
 One URL names a board: an emulated one by its kind (`avr`, `native`: whatever the entry point group
 `boebot.boards` offers), a real or served one by its port (`/dev/ttyACM0`, `COM3`,
-`serial:/dev/ttyUSB0?baud=250000&reset=no`, `socket://localhost:5000`, `rfc2217://server:2217?baud=115200`). The host
-library knows emulated boards only through the interfaces below; it never imports the simulator.
+`serial:/dev/ttyUSB0?baud=250000&reset=no`, `socket://localhost:5000`, `rfc2217://server:2217?baud=115200`,
+`can:socketcan:can0?node=2`). The host library knows emulated boards only through the interfaces below; it never
+imports the simulator.
 """
 
 from __future__ import annotations
@@ -410,7 +411,7 @@ def find_server() -> Server:
 
 def is_live(url: str) -> bool:
     """Whether `url` names a port rather than an emulated board."""
-    return bool(re.match(r"(serial:|socket://|rfc2217://|/|COM\d+(\?|$)|\\\\\.\\)", url))
+    return bool(re.match(r"(serial:|socket://|rfc2217://|can:|/|COM\d+(\?|$)|\\\\\.\\)", url))
 
 
 def open_port(url: str, baud: int) -> Transport:
@@ -419,6 +420,7 @@ def open_port(url: str, baud: int) -> Transport:
         PORT or serial:PORT       its path, such as /dev/ttyACM0 or a pty's, or COM3
         socket://HOST:PORT        a TCP connection
         rfc2217://HOST:PORT       a serial port that another computer shares
+        can:INTERFACE:CHANNEL     a board on a CAN bus (boebot.can.transport)
 
     Serial ports, shared ones too, take settings after a question mark, joined by `&`: `baud=RATE` (bit/s, else
     `baud`) and `reset=no` (do not reset the board by DTR; boebot.link.ports.serial_port says how far that goes).
@@ -426,6 +428,10 @@ def open_port(url: str, baud: int) -> Transport:
     Raises:
         BoardError: the URL is malformed, or the port is missing, busy, forbidden or refused.
     """
+    if url.startswith("can:"):
+        from boebot.can.transport import open_can  # not before it is asked for: few have CAN
+
+        return open_can(url)
     address, _, query = url.partition("?")
     if address.startswith("socket://"):
         if query:
@@ -482,7 +488,7 @@ def _unknown(url: str) -> str:
     emulated = ", ".join(kinds) if kinds else "none: the simulator is not installed"
     return (
         f"there is no board {url!r}; expected an emulated board ({emulated}), "
-        "a port such as /dev/ttyACM0 or serial:PORT, socket://HOST:PORT, or rfc2217://HOST:PORT"
+        "a port such as /dev/ttyACM0 or serial:PORT, socket://HOST:PORT, rfc2217://HOST:PORT, or can:INTERFACE:CHANNEL"
         + did_you_mean(url, kinds)
     )
 

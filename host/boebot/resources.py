@@ -13,6 +13,7 @@ _CHECKOUT = _PACKAGE.parents[1]
 _FOLDERS: dict[str, tuple[Path, Path]] = {
     "robots": (_PACKAGE / "data" / "robots", _CHECKOUT / "protocol" / "robots"),
     "images": (_PACKAGE / "data" / "images", _CHECKOUT / "build" / "images"),
+    "protocol": (_PACKAGE / "data" / "protocol", _CHECKOUT / "protocol"),
     "arenas": (_PACKAGE / "arenas" / "bundled", _PACKAGE / "arenas" / "bundled"),
 }
 
@@ -23,7 +24,8 @@ def checkout() -> Path | None:
 
 
 def folder(kind: str) -> Path:
-    """The folder that holds `kind`: "robots", "images" (firmware) or "arenas"."""
+    """The folder that holds `kind`: "robots", "images" (firmware), "protocol" (CAN database) or
+    "arenas"."""
     installed, in_checkout = _FOLDERS[kind]
     return in_checkout if checkout() is not None else installed
 

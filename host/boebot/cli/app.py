@@ -26,6 +26,8 @@ COMMANDS = {
     ),
     "experiment": ("experiment.experiment", "Run experiments of the notes: figures, measured against expected."),
     "serve": ("serve.serve", "Offer the emulated robot to other programs, until Ctrl-C."),
+    "bridge": ("bridge.bridge", "Put a board on a CAN bus: every message both ways, until Ctrl-C."),
+    "dbc": ("dbc.dbc", "Write the CAN database of a robot's messages, for CAN tools; or check one."),
     "doctor": (
         "doctor.doctor",
         "Examine port, firmware and each device of a robot that stands still; say what is not as it should be.",

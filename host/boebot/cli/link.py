@@ -14,7 +14,7 @@ from boebot.description.robots import load_robot
 from boebot.link import reset_cause
 from boebot.link.fields import text
 from boebot.link.link import Link
-from boebot.link.transport import BaudSelectable
+from boebot.link.transport import BaudSelectable, OnBus, Transport
 
 _PERIOD_S = 1.0
 _WAIT_S = 0.05
@@ -83,6 +83,7 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "board": transport.name,
         "robot": None if hello is None else text(hello.robot),
         "baud": transport.baud if isinstance(transport, BaudSelectable) else None,
+        **_bus(transport),
         "session": None if hello is None or not watched.session.is_open else f"{hello.session:06x}",
         "telemetry_period_s": None if hello is None else round(hello.telemetry_period / hello.tick_rate, 6),
         "last_reset": None if hello is None else reset_cause.in_words(hello.reset_cause),
@@ -101,6 +102,19 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
             name: None if cycles is None else cycles / _CYCLES_PER_S
             for name, cycles in watched.task_times.cycles.items()
         },
+    }
+
+
+def _bus(transport: Transport) -> dict[str, Any]:
+    """Of a board on a CAN bus: load and errors of the bus."""
+    if not isinstance(transport, OnBus):
+        return {}
+    seen = transport.bus_figures()
+    return {
+        "bus_load": None if seen.load is None else round(seen.load, 4),
+        "bus_error_frames": seen.errors,
+        "bus_lost_messages": seen.lost,
+        "bus_stale_messages": seen.stale,
     }
 
 

@@ -22,7 +22,7 @@ On = Annotated[
         "--on",
         metavar="BOARD",
         autocompletion=completion.boards,
-        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT.",
+        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT, can:BUS.",
     ),
 ]
 RunOn = Annotated[
@@ -31,8 +31,8 @@ RunOn = Annotated[
         "--on",
         metavar="BOARD",
         autocompletion=completion.boards,
-        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT; direct for a robot without a "
-        "board. Else native, or direct.",
+        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT, can:BUS; direct for a robot "
+        "without a board. Else native, or direct.",
     ),
 ]
 RobotName = Annotated[

@@ -5,7 +5,7 @@ The ports of this computer are in boebot.link.ports; an in-process board brings 
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 
 class Transport(Protocol):
@@ -80,3 +80,24 @@ class CountsOverruns(Protocol):
     @property
     def overruns(self) -> int:
         """How many since it was opened, as far as the operating system counts them."""
+
+
+class BusFigures(NamedTuple):
+    """What the host sees of a CAN bus on which its board is."""
+
+    load: float | None
+    """Share of the time for which the bus was busy in the last second, stuffed bits counted; None: not yet known."""
+    errors: int
+    """Error frames."""
+    lost: int
+    """Messages to this host of which a frame was missing."""
+    stale: int
+    """Messages to this host that were of another session."""
+
+
+@runtime_checkable
+class OnBus(Protocol):
+    """A transport whose board is on a CAN bus."""
+
+    def bus_figures(self) -> BusFigures:
+        """What was seen of the bus."""

@@ -338,4 +338,6 @@ def _pose_now(robot: Hands) -> tuple[float, float, float] | None:
 
 def _quality(robot: Hands) -> Message | None:
     quality = robot.driver.link_quality()
-    return None if quality is None else quality._asdict()
+    if quality is None:
+        return None
+    return {**quality._asdict(), "bus": None if quality.bus is None else quality.bus._asdict()}

@@ -29,6 +29,7 @@ from boebot.link.fields import reader, text
 from boebot.link.frame import FRAME_OVERHEAD
 from boebot.link.link import Link
 from boebot.link.telemetry import StampedTelemetry as Received
+from boebot.link.transport import OnBus
 from boebot.record.brain_record import BrainNames
 from boebot.record.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
@@ -265,7 +266,9 @@ class BoardDriver:
         """See `boebot.running.driver.Driver`."""
         link = self.link
         decoder, trip_s = link.line.decoder, link.clock.round_trips.quantile(0.5)
-        return LinkQuality(decoder.lost, decoder.bad, link.counts.sessions_lost, self.resets, trip_s)
+        transport = link.transport
+        bus = transport.bus_figures() if isinstance(transport, OnBus) else None
+        return LinkQuality(decoder.lost, decoder.bad, link.counts.sessions_lost, self.resets, trip_s, bus)
 
     # ---- the run -----------------------------------------------------------------------------------------------------
 

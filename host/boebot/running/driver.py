@@ -15,6 +15,7 @@ from boebot.arguments import duration
 from boebot.boards import BoardRequest, BoardSession, VehicleSession
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
+from boebot.link.transport import BusFigures
 from boebot.record.brain_record import append_brain
 from boebot.record.keepers import Temporary
 from boebot.record.record import Record
@@ -63,6 +64,8 @@ class LinkQuality(NamedTuple):
     """of the board"""
     round_trip_s: float | None
     """median from question to answer; None: not known"""
+    bus: BusFigures | None = None
+    """of the CAN bus, if the board is on one"""
 
 
 class Driver(Protocol):

@@ -156,19 +156,29 @@ function tellLink() {
   if (!link && load == null) return;
   if (!linkCells) {
     linkCells = Object.fromEntries(
-      ["lost frames", "damaged frames", "round trip", "sessions lost", "resets", "load of the tick"].map(name => [
-        name,
-        row(name, " "),
-      ]),
+      [
+        "lost frames",
+        "damaged frames",
+        "round trip",
+        "sessions lost",
+        "resets",
+        "load of the bus",
+        "errors on the bus",
+        "lost on the bus",
+        "load of the tick",
+      ].map(name => [name, row(name, " ")]),
     );
     $("linkCard").append(...Object.values(linkCells).map(([it]) => it));
   }
   const values = {
     "lost frames": link?.lost,
     "damaged frames": link?.bad,
-    "round trip": link?.round_trip == null ? null : (1000 * link.round_trip).toFixed(1) + " ms",
+    "round trip": link?.round_trip_s == null ? null : (1000 * link.round_trip_s).toFixed(1) + " ms",
     "sessions lost": link?.sessions_lost,
     resets: link?.resets,
+    "load of the bus": link?.bus?.load == null ? null : (100 * link.bus.load).toFixed(1) + " %",
+    "errors on the bus": link?.bus?.errors,
+    "lost on the bus": link?.bus?.lost,
     "load of the tick": load == null ? null : (100 * load).toFixed(0) + " %",
   };
   for (const [name, [it, cell]] of Object.entries(linkCells)) {

@@ -1,0 +1,60 @@
+"""The CAN database (DBC) of the protocol's messages, for each node of a bus.
+
+protocol/can_database.py makes it; the package holds that of node 1.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from boebot import resources
+from boebot.can.extra import import_extra
+from boebot.can.layout import NODE_SHIFT
+from boebot.errors import BoardError
+from boebot.link import messages
+
+
+def of_node(node: int) -> str:
+    """The text of the database of the board with that number, 1 to 7."""
+    text = (resources.folder("protocol") / "boebot.dbc").read_text("utf-8")
+    shift = node - 1 << NODE_SHIFT
+    return re.sub(r"\b(BO_|SG_|VAL_) (\d+)\b", lambda found: f"{found[1]} {int(found[2]) + shift}", text)
+
+
+def write(path: Path, text: str) -> None:
+    """Writes a database.
+
+    Raises:
+        BoardError: it cannot be written there.
+    """
+    try:
+        path.write_text(text, "utf-8")
+    except OSError as error:
+        raise BoardError(f"{path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+
+
+def check(path: Path) -> int:
+    """How many messages a database has that fits this version's messages.
+
+    Raises:
+        BoardError: it cannot be read, or is of another version.
+    """
+    cantools = import_extra("cantools.database")
+    try:
+        database = cantools.load_file(path, strict=True)
+    except OSError as error:
+        raise BoardError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+    except Exception as error:  # parsers of several formats
+        reason = str(error).strip().splitlines() or [type(error).__name__]
+        raise BoardError(f"{path} is no CAN database: {reason[0]}") from None
+    attribute = getattr(getattr(database, "dbc", None), "attributes", {}).get("SchemaHash")
+    wanted = f"0x{messages.SCHEMA_HASH:08X}"
+    if attribute is None:
+        raise BoardError(f"{path} does not name its schema; expected SchemaHash {wanted}, as `boebot dbc` writes it")
+    if attribute.value != wanted:
+        raise BoardError(
+            f"{path} is of another version of the protocol: its SchemaHash is {attribute.value}, expected {wanted}; "
+            "write it anew with `boebot dbc`"
+        )
+    return len(database.messages)

@@ -1,0 +1,98 @@
+"""`boebot bridge`: puts a board, emulated or real, on a CAN bus."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from boebot.boards import BoardRequest, is_live, open_board
+from boebot.cli import completion, options, output
+from boebot.description.robots import load_robot
+
+
+def bridge(
+    board: Annotated[
+        str,
+        typer.Argument(
+            metavar="BOARD",
+            autocompletion=completion.boards,
+            help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT.",
+        ),
+    ] = "native",
+    can: Annotated[
+        str | None,
+        typer.Option(
+            "--can", metavar="BUS", help="A bus of python-can, INTERFACE:CHANNEL[?KEY=VALUE&...], as in socketcan:can0."
+        ),
+    ] = None,
+    socketcand: Annotated[
+        int | None,
+        typer.Option(
+            "--socketcand",
+            metavar="PORT",
+            min=0,
+            max=65535,
+            help="A bus of its own, which CAN tools join on this TCP port of loopback; 0: any.",
+        ),
+    ] = None,
+    node: Annotated[int, typer.Option("--node", metavar="N", min=1, max=7, help="The board's number on the bus.")] = 1,
+    bitrate: Annotated[
+        int, typer.Option("--bitrate", metavar="N", min=1, help="Of the bus (bit/s), for its load.")
+    ] = 500_000,
+    robot: options.RobotName = "shieldbot",
+    arena: options.ArenaName = None,
+    seed: options.Seed = 1,
+    without: options.Without = None,
+    json: options.Json = False,
+) -> None:
+    """Put a board on a CAN bus: every message both ways, until Ctrl-C."""
+    from boebot.can.bridge import Bridge
+    from boebot.can.bus import Bus, BusName, PythonCanBus
+    from boebot.can.extra import import_extra
+    from boebot.can.load import BusLoad
+    from boebot.can.socketcand_server import SocketcandBus
+
+    if (can is None) == (socketcand is None):
+        raise typer.BadParameter("give one of --can BUS and --socketcand PORT")
+    import_extra("isotp")
+    name = None if can is None else BusName.parse(can)
+    description = load_robot(robot)
+    request = BoardRequest(
+        robot=description, arena=arena, seed=seed, realtime=True, record=False, without=options.names(without)
+    )
+    with contextlib.ExitStack() as stack:
+        session = open_board(board, request)
+        stack.callback(session.close)
+        transport = session.transport
+        bus: Bus = PythonCanBus(name) if name is not None else SocketcandBus(socketcand or 0, transport.now)
+        stack.callback(bus.close)
+        made = Bridge(transport, bus, node, BusLoad(bitrate))
+        made.wait_for_board()
+        url = f"can:{bus.name}" + ("" if node == 1 else f"{'&' if '?' in bus.name else '?'}node={node}")
+        if json:
+            output.print_json({"url": url, "board": transport.name, "node": node}, indent=None)
+        else:
+            what = f"the board at {board}" if is_live(board) else f"{description.name} on {board}"
+            output.line(f"{what} is node {node} on {bus.name}")
+            output.line(f"drive it:   boebot run wander --on '{url}'")
+            if isinstance(bus, SocketcandBus):
+                output.line(f"watch it:   python -m can.viewer {_joining(bus.port)}")
+            output.line("end it:     Ctrl-C")
+        with contextlib.suppress(KeyboardInterrupt):
+            made.run(lambda: True)
+        counted = asdict(made.counters())
+        if isinstance(bus, SocketcandBus):
+            counted |= {"dropped": bus.dropped, "rubbish": bus.rubbish}
+        counted["error_frames"] = bus.errors
+        if json:
+            output.print_json(counted, indent=None)
+        else:
+            output.line(", ".join(f"{name.replace('_', ' ')} {count:,}" for name, count in counted.items()))
+
+
+def _joining(port: int) -> str:
+    """How python-can's tools join our bus."""
+    return f"-i socketcand -c can0 --bus-kwargs host=localhost port={port}"

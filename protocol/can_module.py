@@ -1,0 +1,56 @@
+"""The Python module of the CAN frames' layout, host/boebot/can/layout.py."""
+
+from __future__ import annotations
+
+import can_layout
+import schema
+
+
+def can_module(spec: schema.Schema) -> str:
+    """host/boebot/can/layout.py"""
+    names = ("ROUND", "SESSION", "SEQUENCE", "TIME_TO_LIVE", "PART")
+    lines = [
+        '"""Which bytes of a message stand in which CAN frame, from protocol/messages.toml by protocol/can_layout.py.',
+        "",
+        schema.MADE_NOTE,
+        '"""',
+        "",
+        "# fmt: off",
+        "# ruff: noqa: E501",
+        "",
+        "from __future__ import annotations",
+        "",
+        "from typing import NamedTuple",
+        "",
+        *(f"{name} = {getattr(can_layout, name)}" for name in names),
+        f"NODE_SHIFT = {can_layout.NODE_SHIFT}",
+        f"TIME_TO_LIVE_MS = {can_layout.TIME_TO_LIVE_MS}  # one count of a set-point's time to live",
+        f"ISO_TP_TO_BOARD = 0x{can_layout.ISO_TP_IDS['to_board']:03X}",
+        f"ISO_TP_TO_HOST = 0x{can_layout.ISO_TP_IDS['to_host']:03X}",
+        "",
+        "",
+        "class Layout(NamedTuple):",
+        '    """The CAN frames of one message."""',
+        "",
+        "    length: int  # bytes of the payload",
+        "    identifiers: tuple[int, ...]  # at node 0, one for each frame",
+        "    choices: tuple[bytes, ...]  # each frame's bytes by their places in: payload, round, session, sequence, time to live, 0, 1, 2, ...",
+        "    payload: bytes  # its bytes by their places in the frames' data, one after another, and NULs behind",
+        "    session: int  # where its byte stands there; -1: nowhere",
+        "    is_set_point: bool",
+        "",
+        "",
+        "LAYOUTS: dict[int, Layout] = {",
+    ]
+    for message in spec.message:
+        frames = can_layout.frames(message)
+        if not frames:
+            continue
+        choices = "".join(f"bytes({frame.choice}), " for frame in frames)
+        identifiers = "".join(f"0x{frame.identifier:03X}, " for frame in frames)
+        lines.append(
+            f"    0x{message.id:02X}: Layout({message.length}, ({identifiers}), ({choices}), "
+            f"bytes({can_layout.payload_choice(message)}), {can_layout.session_place(message)}, "
+            f"{message.delivery == 'set_point'}),  # {message.name}"
+        )
+    return "\n".join([*lines, "}", ""])
