@@ -1,4 +1,5 @@
-"""A board's line led over CAN frames, in simulated time: bytes, frames, bytes; frames may be lost or changed there."""
+"""A board's line led over CAN frames, in simulated time: bytes, frames, bytes; frames may be lost or changed there.
+And how tests drive a board over any link."""
 
 from __future__ import annotations
 
@@ -6,6 +7,8 @@ from collections.abc import Callable
 
 from boebot.can.frames import CanFrame
 from boebot.can.translator import BoardEnd, HostEnd
+from boebot.link import messages
+from boebot.link.link import Link
 from boebot.link.transport import Transport
 
 Carry = Callable[[CanFrame], list[CanFrame]]
@@ -52,3 +55,20 @@ class CanLine:
     def _over(self, frames: list[CanFrame]) -> list[CanFrame]:
         self.seen += frames
         return [arrived for frame in frames for arrived in self.carry(frame)]
+
+
+def drive(link: Link, seconds: float, left: float = 0.5, right: float = 0.5) -> list[messages.Telemetry]:
+    """Answers each observation by the same signals; what was observed."""
+    seen = []
+    end_s = link.transport.now() + seconds
+    while link.transport.now() < end_s:
+        for received in link.poll(0.02):
+            telemetry = messages.Telemetry.unpack(received[0])
+            link.send_signal(left, right, 250, telemetry.tick)
+            seen.append(telemetry)
+    return seen
+
+
+def after(link: Link, seconds: float) -> messages.Telemetry:
+    """The newest telemetry after so long a silence."""
+    return messages.Telemetry.unpack(link.poll(seconds, seconds)[-1][0])

@@ -22,7 +22,7 @@ from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.fields import text
 from boebot.link.link import Link
-from can_line import CanLine, Carry
+from can_line import CanLine, Carry, after, drive
 from command import boebot
 
 
@@ -37,23 +37,6 @@ def over_can(carry: Carry = lambda frame: [frame], node: int = 1) -> Iterator[tu
         yield link, line, session
     finally:
         session.close()
-
-
-def drive(link: Link, seconds: float, left: float = 0.5, right: float = 0.5) -> list[messages.Telemetry]:
-    """Answers each observation by the same signals; what was observed."""
-    seen = []
-    end_s = link.transport.now() + seconds
-    while link.transport.now() < end_s:
-        for received in link.poll(0.02):
-            telemetry = messages.Telemetry.unpack(received[0])
-            link.send_signal(left, right, 250, telemetry.tick)
-            seen.append(telemetry)
-    return seen
-
-
-def after(link: Link, seconds: float) -> messages.Telemetry:
-    """The newest telemetry after so long a silence."""
-    return messages.Telemetry.unpack(link.poll(seconds, seconds)[-1][0])
 
 
 def test_everything_that_the_link_does_goes_over_can() -> None:

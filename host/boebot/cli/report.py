@@ -12,8 +12,12 @@ from boebot.cli.run_table import Detail, detail, print_run
 from boebot.errors import BoebotError
 from boebot.record.mending import mend
 from boebot.record.reading import CutError, read_run, robots_of
+from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RECORD, RunFolder
 from boebot.view import IncompleteError
+
+
+CAN_LOGS = ("blf", "asc", "log")
 
 
 def report(
@@ -24,6 +28,14 @@ def report(
     foxglove: Annotated[
         bool, typer.Option("--foxglove", help="Also foxglove.mcap, which Foxglove draws without set-up.")
     ] = False,
+    can: Annotated[
+        str | None,
+        typer.Option(
+            "--can",
+            metavar="blf|asc|log",
+            help="Also can.blf, can.asc or can.log: the messages as CAN frames, for CAN tools.",
+        ),
+    ] = None,
     mended: Annotated[
         bool, typer.Option("--mend", help="Of a record that is cut: a whole one beside it, record-mended.mcap.")
     ] = False,
@@ -32,6 +44,8 @@ def report(
     quiet: options.Quiet = False,
 ) -> None:
     """Print a run's figures and write its files anew, from its record. A record that is cut is read up to there."""
+    if can is not None and can not in CAN_LOGS:
+        raise typer.BadParameter(f"there is no format {can!r}; expected one of {', '.join(CAN_LOGS)}")
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
     folder = run if run.is_dir() else run.parent
     result = read_run(run)
@@ -44,6 +58,8 @@ def report(
                 from boebot.view import save_for_foxglove
 
                 files.append(save_for_foxglove([*robots_of(result).values()], folder))
+            if can is not None:
+                files += _can_logs(result, folder, can)
             if mended and isinstance(result.error, CutError):
                 files.append(mend(folder / RECORD, result))
         except BoebotError as error:  # the figures are printed all the same
@@ -59,3 +75,17 @@ def report(
             output.line(ending.files_in(folder, files))
     if unsaved is not None:
         raise unsaved
+
+
+def _can_logs(result: RunResult | TogetherResult, folder: Path, kind: str) -> list[Path]:
+    """Writes a log for each robot that has a board."""
+    from boebot.can.log import save_log
+
+    robots = robots_of(result)
+    if len(robots) == 1:
+        return [save_log(robots[1], folder / f"can.{kind}")]
+    return [
+        save_log(one, folder / f"robot-{number}" / f"can.{kind}", min(number, 7))
+        for number, one in robots.items()
+        if one.layout is None
+    ]

@@ -29,6 +29,9 @@ FILES = (
     "to_host.bin",
     "wire.csv",
     "foxglove.mcap",
+    "can.blf",
+    "can.asc",
+    "can.log",
     MENDED,
 )
 """What is made from a record; of a run of several robots also in a folder for each, `robot-1` and so on."""
