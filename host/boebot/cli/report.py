@@ -16,7 +16,6 @@ from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RECORD, RunFolder
 from boebot.view import IncompleteError
 
-
 CAN_LOGS = ("blf", "asc", "log")
 
 
