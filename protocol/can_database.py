@@ -1,24 +1,26 @@
-"""The CAN database boebot.dbc: the messages as CAN frames of at most 8 data bytes (PROTOCOL.md, "On CAN").
+"""The CAN database boebot.dbc: the frames that can_layout.py lays out, of the board with node number 1, for CAN tools.
 
-A message's fields are packed in their order, each into the frame before it where it still fits, else into a new one; so
-the data of a message's frames, one after another, are its payload. A text is cut into chunks of 8 bytes. Flags become
-one signal for each bit, the bits without a name one more. Identifiers are ordered by urgency:
-
-    bits 10..8  delivery class, the most urgent first     bit 7  0: to the board, 1: to the host
-    bits 6..3   the message among those of its class and direction, in order of ids     bits 2..0  frame of the message
+A number is one signal with its field's name, scale, unit and range; flags are one signal for each bit, and one for the
+bits without a name; a text is cut into signals of up to 6 bytes.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import can_layout
 import schema
+from can_layout import Frame, Place
 
-# The most urgent first: on a CAN bus the lowest identifier wins.
-URGENCY = ("stop", "set_point", "exactly_once", "telemetry", "handshake")
-DATA_BYTES = 8
+NODE = 1  # of the board in protocol/boebot.dbc
 NAME_LENGTH = 32  # longest name that the format allows
-NODES = {"to_board": ("HOST", "BOARD"), "to_host": ("BOARD", "HOST")}  # direction -> sender, receiver
+SENDERS = {"to_board": ("HOST", "BOARD"), "to_host": ("BOARD", "HOST")}  # direction -> sender, receiver
+ADDED = {
+    "session": "low byte of the session's number, which hello names: what is of another session is dropped",
+    "sequence": "of this set-point: telemetry says which one was the last accepted, setpoint_sequence",
+    "round": "one more with each message of this kind: frames with the same one belong together",
+    "part": "number of this frame among those of its message",
+}
 
 
 class Signal(NamedTuple):
@@ -36,153 +38,128 @@ class Signal(NamedTuple):
     values: list[str]
 
 
-class CanFrame(NamedTuple):
-    """One CAN frame of a message; `part` counts from 0."""
-
-    identifier: int
-    name: str
-    part: int
-    size: int
-    signals: list[Signal]
+def signals(spec: schema.Schema, frame: Frame) -> list[Signal]:
+    """The signals of a frame, the lowest bits first."""
+    return [signal for place in frame.places for signal in _of_place(spec, frame, place)]
 
 
-def frames(spec: schema.Schema, message: schema.Message) -> list[CanFrame]:
-    """The CAN frames of a message."""
-    packed: list[tuple[int, list[Signal]]] = [(0, [])]
-    for size, signals in pieces(spec, message):
-        used, _ = packed[-1]
-        if used + size > DATA_BYTES:
-            packed.append((0, []))
-            used = 0
-        packed[-1][1].extend(signal._replace(start=signal.start + 8 * used) for signal in signals)
-        packed[-1] = (used + size, packed[-1][1])
-    first = first_identifier(spec, message)
-    if len(packed) > 8:
-        raise ValueError(f"message {message.name}: {len(packed)} CAN frames, but identifiers have room for 8")
-    return [
-        CanFrame(first + part, message.name if len(packed) == 1 else f"{message.name}_{part + 1}", part, size, signals)
-        for part, (size, signals) in enumerate(packed)
-    ]
-
-
-def first_identifier(spec: schema.Schema, message: schema.Message) -> int:
-    """The identifier of the message's first CAN frame."""
-    alike = [m.id for m in spec.message if (m.delivery, m.direction) == (message.delivery, message.direction)]
-    place = sorted(alike).index(message.id)
-    if place > 15:
-        raise ValueError(f"message {message.name}: more than 16 of its class and direction")
-    return (URGENCY.index(message.delivery) + 1) << 8 | (message.direction == "to_host") << 7 | place << 3
-
-
-def pieces(spec: schema.Schema, message: schema.Message) -> list[tuple[int, list[Signal]]]:
-    """What must not be split: bytes, and the signals in them."""
-    found: list[tuple[int, list[Signal]]] = []
-    for field in message.fields:
-        if field.text_length:
-            found += text_chunks(field)
-        elif field.flags:
-            found.append((field.size, flag_bits(spec, field)))
-        else:
-            found.append((field.size, [number_signal(spec, field)]))
-    return found
-
-
-def number_signal(spec: schema.Schema, field: schema.Field) -> Signal:
-    """An integer field with its scale, unit, range and named values."""
+def _of_place(spec: schema.Schema, frame: Frame, place: Place) -> list[Signal]:
+    field = place.field
+    if field is None:
+        least, greatest = (frame.part, frame.part) if place.name == "part" else (0, 255)
+        return [_integer(place, 1.0, least, greatest, doc=ADDED[place.name])]
+    if field.flags:
+        return _flag_bits(spec, field, place)
+    if field.text_length:
+        doc = "; ".join(filter(None, (field.doc, f"UTF-8 from byte {place.start} on, the first byte lowest")))
+        return [_integer(place, 1.0, 0, 2 ** (8 * place.size) - 1, doc=doc)]
+    if place.counts_time_to_live:
+        scale = can_layout.TIME_TO_LIVE_MS
+        return [_integer(place, scale, 0, field.greatest // scale, field.unit, field.doc)]
+    if place.is_low_byte:
+        doc = "; ".join(filter(None, (field.doc, "low byte")))
+        return [_integer(place, 1.0, 0, 255, field.unit, doc)]
+    signal = _integer(place, field.scale, field.least, field.greatest, field.unit, field.doc)
     values = spec.enum[field.enum].values if field.enum else []
-    least, greatest = (round(count * field.scale, 9) for count in (field.least, field.greatest))
-    signed = field.type.startswith("i")
-    return Signal(field.name, 0, 8 * field.size, signed, field.scale, least, greatest, field.unit, field.doc, values)
+    return [signal._replace(signed=field.least < 0, values=values)]
 
 
-def flag_bits(spec: schema.Schema, field: schema.Field) -> list[Signal]:
+def _integer(place: Place, scale: float, least: int, greatest: int, unit: str = "", doc: str = "") -> Signal:
+    """All bytes of a place as one unsigned integer; `least` and `greatest` in counts."""
+    low, high = round(least * scale, 9), round(greatest * scale, 9)
+    return Signal(place.name, 8 * place.at, 8 * place.size, False, scale, low, high, unit, doc, [])
+
+
+def _flag_bits(spec: schema.Schema, field: schema.Field, place: Place) -> list[Signal]:
     """A flags field, bit by bit, and what is left of it."""
     flags = spec.flags[field.flags]
+    start = 8 * place.at
     bits = [
-        Signal(f"{field.name}_{bit}", i, 1, False, 1.0, 0, 1, "", field.doc or flags.doc, [])
+        Signal(
+            f"{field.name}_{bit}", start + i, 1, False, 1.0, 0, 1, "", flags.docs.get(bit) or field.doc or flags.doc, []
+        )
         for i, bit in enumerate(flags.bits)
     ]
-    spare = 8 * field.size - len(bits)
+    spare = 8 * place.size - len(bits)
     if spare:
-        doc = "bits without a name"
-        bits.append(Signal(f"{field.name}_spare", len(bits), spare, False, 1.0, 0, 2**spare - 1, "", doc, []))
+        name, doc = f"{field.name}_spare", "bits without a name"
+        bits.append(Signal(name, start + len(bits), spare, False, 1.0, 0, 2**spare - 1, "", doc, []))
     return bits
 
 
-def text_chunks(field: schema.Field) -> list[tuple[int, list[Signal]]]:
-    """A text as integers of up to 8 bytes, the first byte lowest."""
-    chunks = []
-    for part, start in enumerate(range(0, field.text_length, DATA_BYTES)):
-        size = min(DATA_BYTES, field.text_length - start)
-        doc = "; ".join(filter(None, (field.doc, f"UTF-8 from byte {start} on, the first byte lowest")))
-        signal = Signal(f"{field.name}_{part + 1}", 0, 8 * size, False, 1.0, 0, 2 ** (8 * size) - 1, "", doc, [])
-        chunks.append((size, [signal]))
-    return chunks
-
-
-def number(value: float) -> str:
-    """A number as short as it can be written, without an exponent."""
-    return str(int(value)) if float(value).is_integer() else f"{value:.9f}".rstrip("0")
+# ---- the file --------------------------------------------------------------------------------------------------------
 
 
 def database(spec: schema.Schema) -> str:
     """protocol/boebot.dbc"""
-    rows = sorted(((f, m) for m in spec.message for f in frames(spec, m)), key=lambda row: row[0].identifier)
-    lines = [f'VERSION "{spec.version}"', "", "NS_ :", "", "BS_:", "", "BU_: BOARD HOST", ""]
-    for frame, message in rows:
-        lines += [*frame_lines(frame, message), ""]
-    lines += [comment("", "Made by protocol/generate.py from protocol/messages.toml; do not edit.")]
-    for frame, message in rows:
-        lines += [comment(f"BO_ {frame.identifier} ", message.doc)]
-        lines += [comment(f"SG_ {frame.identifier} {s.name} ", s.doc) for s in frame.signals if s.doc]
-    lines += attributes(spec, rows)
-    for frame, _ in rows:
-        lines += [value_table(frame, signal) for signal in frame.signals if signal.values]
+    rows = [
+        (identifier + (NODE << can_layout.NODE_SHIFT), message, frame, signals(spec, frame))
+        for identifier, (message, frame) in can_layout.identifiers(spec).items()
+    ]
+    lines = [f'VERSION "{spec.version}.{spec.minor}"', "", "NS_ :", "", "BS_:", "", "BU_: BOARD HOST", ""]
+    for identifier, message, frame, held in rows:
+        lines += [*_frame_lines(identifier, message, frame, held), ""]
+    lines.append(_comment("", "Made by protocol/generate.py from protocol/messages.toml; do not edit."))
+    for identifier, message, _, held in rows:
+        lines.append(_comment(f"BO_ {identifier} ", message.doc))
+        lines += [_comment(f"SG_ {identifier} {s.name} ", s.doc) for s in held if s.doc]
+    lines += _attributes(spec, [(identifier, message, frame) for identifier, message, frame, _ in rows])
+    for identifier, _, _, held in rows:
+        lines += [_value_table(identifier, signal) for signal in held if signal.values]
     return "\n".join(lines) + "\n"
 
 
-def frame_lines(frame: CanFrame, message: schema.Message) -> list[str]:
+def _frame_lines(identifier: int, message: schema.Message, frame: Frame, held: list[Signal]) -> list[str]:
     """BO_ and SG_ of one CAN frame."""
-    sender, receiver = NODES[message.direction]
-    for name in (frame.name, *(signal.name for signal in frame.signals)):
+    sender, receiver = SENDERS[message.direction]
+    for name in (frame.name, *(signal.name for signal in held)):
         if len(name) > NAME_LENGTH:
             raise ValueError(f"message {message.name}: {name} is longer than {NAME_LENGTH} characters")
-    lines = [f"BO_ {frame.identifier} {frame.name}: {frame.size} {sender}"]
-    for s in frame.signals:
-        limits = f"[{number(s.least)}|{number(s.greatest)}]"
+    lines = [f"BO_ {identifier} {frame.name}: {frame.size} {sender}"]
+    for s in held:
+        limits = f"[{_number(s.least)}|{_number(s.greatest)}]"
         place = f"{s.start}|{s.bits}@1{'-' if s.signed else '+'}"
-        lines.append(f' SG_ {s.name} : {place} ({number(s.scale)},0) {limits} "{s.unit}" {receiver}')
+        lines.append(f' SG_ {s.name} : {place} ({_number(s.scale)},0) {limits} "{s.unit}" {receiver}')
     return lines
 
 
-def comment(owner: str, text: str) -> str:
+def _number(value: float) -> str:
+    """A number as short as it can be written, without an exponent."""
+    return str(int(value)) if float(value).is_integer() else f"{value:.9f}".rstrip("0")
+
+
+def _comment(owner: str, text: str) -> str:
     """A CM_ line."""
     quoted = text.replace('"', "'")
     return f'CM_ {owner}"{quoted}";'
 
 
-def attributes(spec: schema.Schema, rows: list[tuple[CanFrame, schema.Message]]) -> list[str]:
-    """What the format has no field for: the message behind a CAN frame, its class, the schema's hash."""
-    classes = ",".join(f'"{name}"' for name in URGENCY)
+def _attributes(spec: schema.Schema, rows: list[tuple[int, schema.Message, Frame]]) -> list[str]:
+    """What the format has no field for: message, part, class and cycle time of each frame, and the schema's hash."""
+    classes = ",".join(f'"{name}"' for name in can_layout.CLASSES)
     lines = [
         'BA_DEF_ "SchemaHash" STRING ;',
         'BA_DEF_ BO_ "MessageId" INT 0 255;',
-        'BA_DEF_ BO_ "Part" INT 0 7;',
-        f'BA_DEF_ BO_ "Delivery" ENUM {classes};',
+        'BA_DEF_ BO_ "Part" INT 1 16;',
+        f'BA_DEF_ BO_ "Class" ENUM {classes};',
+        'BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;',
         'BA_DEF_DEF_ "SchemaHash" "";',
         'BA_DEF_DEF_ "MessageId" 0;',
-        'BA_DEF_DEF_ "Part" 0;',
-        f'BA_DEF_DEF_ "Delivery" "{URGENCY[0]}";',
+        'BA_DEF_DEF_ "Part" 1;',
+        f'BA_DEF_DEF_ "Class" "{can_layout.CLASSES[0]}";',
+        'BA_DEF_DEF_ "GenMsgCycleTime" 0;',
         f'BA_ "SchemaHash" "0x{spec.hash:08X}";',
     ]
-    for frame, message in rows:
-        lines.append(f'BA_ "MessageId" BO_ {frame.identifier} {message.id};')
-        lines.append(f'BA_ "Part" BO_ {frame.identifier} {frame.part};')
-        lines.append(f'BA_ "Delivery" BO_ {frame.identifier} {URGENCY.index(message.delivery)};')
+    for identifier, message, frame in rows:
+        lines.append(f'BA_ "MessageId" BO_ {identifier} {message.id};')
+        lines.append(f'BA_ "Part" BO_ {identifier} {frame.part};')
+        lines.append(f'BA_ "Class" BO_ {identifier} {frame.identifier >> can_layout.CLASS_SHIFT};')
+        if message.cycle_ms:
+            lines.append(f'BA_ "GenMsgCycleTime" BO_ {identifier} {message.cycle_ms};')
     return lines
 
 
-def value_table(frame: CanFrame, signal: Signal) -> str:
+def _value_table(identifier: int, signal: Signal) -> str:
     """A VAL_ line."""
     values = " ".join(f'{i} "{name}"' for i, name in enumerate(signal.values))
-    return f"VAL_ {frame.identifier} {signal.name} {values} ;"
+    return f"VAL_ {identifier} {signal.name} {values} ;"

@@ -22,6 +22,7 @@ import schema
 DATA_BYTES = 8
 NODES = range(1, 8)  # 0 means all
 NODE_SHIFT = 5
+CLASS_SHIFT = 8
 ISO_TP_IDS = {"to_board": 0x51E, "to_host": 0x51F}  # at node 0, as `can_id`
 TIME_TO_LIVE_MS = 10  # one count of a set-point's time to live
 CLASSES = (
@@ -58,6 +59,16 @@ class Place(NamedTuple):
     start: int
     source: int
 
+    @property
+    def counts_time_to_live(self) -> bool:
+        """Whether it is a set-point's time to live, in counts of 10 ms."""
+        return self.field is not None and self.field.name == "time_to_live"
+
+    @property
+    def is_low_byte(self) -> bool:
+        """Whether it is only the low byte of a longer number."""
+        return self.field is not None and self.size == 1 and self.field.greatest > 255
+
 
 class Frame(NamedTuple):
     """One CAN frame of a message; `part` counts from 1."""
@@ -88,10 +99,7 @@ def frames(message: schema.Message) -> list[Frame]:
         return []
     pieces = [piece for field, offset in _fields(message) for piece in _pieces(message, field, offset)]
     pieces += [Place(name, 0, 1, None, 0, message.length + of) for name, of in _endings(message)]
-    if sum(piece.size for piece in pieces) <= DATA_BYTES:
-        packed = [pieces]
-    else:
-        packed = _in_parts(message, pieces)
+    packed = [pieces] if sum(piece.size for piece in pieces) <= DATA_BYTES else _in_parts(message, pieces)
     found = []
     for part, places in enumerate(packed, start=1):
         name = message.name if len(packed) == 1 else f"{message.name}_{part}"
@@ -155,7 +163,11 @@ def _endings(message: schema.Message) -> list[tuple[str, int]]:
 def _in_parts(message: schema.Message, pieces: list[Place]) -> list[list[Place]]:
     """The pieces in several frames, with what each begins with."""
     has_tick = pieces[0].name == "tick" and pieces[0].size == 4
-    count = Place("tick", 0, 1, pieces[0].field, 0, 0) if has_tick else Place("round", 0, 1, None, 0, message.length + ROUND)
+    count = (
+        Place("tick", 0, 1, pieces[0].field, 0, 0)
+        if has_tick
+        else Place("round", 0, 1, None, 0, message.length + ROUND)
+    )
     parts: list[list[Place]] = [[]]
     if not has_tick:
         parts[0] = [count, _part_number(message, 1)]
@@ -173,12 +185,18 @@ def _part_number(message: schema.Message, part: int) -> Place:
 def _check(message: schema.Message, found: list[Frame]) -> None:
     """Refuses identifiers that break the rules above."""
     first, last = found[0].identifier, found[-1].identifier
-    if first >> NODE_SHIFT & 7 or not 0 < first < len(CLASSES) << 8:
-        raise ValueError(f"message {message.name}: can_id {first:#05x}; expected one of node 0 and of a class below {len(CLASSES)}")
+    if first >> NODE_SHIFT & 7 or not 0 < first < len(CLASSES) << CLASS_SHIFT:
+        raise ValueError(
+            f"message {message.name}: can_id {first:#05x}; expected one of node 0 and of a class below {len(CLASSES)}"
+        )
     if first % 2 != (message.direction == "to_host"):
-        raise ValueError(f"message {message.name}: can_id {first:#05x}; expected an even one to the board, an odd one to the host")
+        raise ValueError(
+            f"message {message.name}: can_id {first:#05x}; expected an even one to the board, an odd one to the host"
+        )
     if first >> NODE_SHIFT != last >> NODE_SHIFT:
-        raise ValueError(f"message {message.name}: {len(found)} CAN frames from can_id {first:#05x} on run into another class")
+        raise ValueError(
+            f"message {message.name}: {len(found)} CAN frames from can_id {first:#05x} on run into another class"
+        )
 
 
 def identifiers(spec: schema.Schema) -> dict[int, tuple[schema.Message, Frame]]:
@@ -192,6 +210,8 @@ def identifiers(spec: schema.Schema) -> dict[int, tuple[schema.Message, Frame]]:
         for frame in frames(message):
             if frame.identifier in found or frame.identifier in ISO_TP_IDS.values():
                 other = found[frame.identifier][0].name if frame.identifier in found else "ISO-TP"
-                raise ValueError(f"message {message.name}: its CAN identifier {frame.identifier:#05x} is that of {other}")
+                raise ValueError(
+                    f"message {message.name}: its CAN identifier {frame.identifier:#05x} is that of {other}"
+                )
             found[frame.identifier] = message, frame
     return dict(sorted(found.items()))

@@ -34,7 +34,7 @@ def can_module(spec: schema.Schema) -> str:
         "",
         "    length: int  # bytes of the payload",
         "    identifiers: tuple[int, ...]  # at node 0, one for each frame",
-        "    choices: tuple[bytes, ...]  # each frame's bytes by their places in: payload, round, session, sequence, time to live, 0, 1, 2, ...",
+        "    choices: tuple[bytes, ...]  # each frame's bytes, see below",
         "    payload: bytes  # its bytes by their places in the frames' data, one after another, and NULs behind",
         "    session: int  # where its byte stands there; -1: nowhere",
         "    is_set_point: bool",

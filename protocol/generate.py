@@ -6,8 +6,8 @@
 
 Built: the C headers in firmware/src/generated, the Python modules host/boebot/link/messages.py and
 host/boebot/can/layout.py, and the stub host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest
-begin with it; a file that would be the same is left alone. In git: the golden vectors protocol/vectors/frames.json, the CAN database protocol/boebot.dbc, and the
-tables of PROTOCOL.md. Each kind of file has a module beside this one.
+begin with it; a file that would be the same is left alone. In git: the golden vectors protocol/vectors/frames.json,
+the CAN database protocol/boebot.dbc, and the tables of PROTOCOL.md. Each kind of file has a module beside this one.
 """
 
 from __future__ import annotations

@@ -1,21 +1,28 @@
-"""The tables and the worked frame of PROTOCOL.md."""
+"""The tables, the worked frame and the CAN frames of PROTOCOL.md."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import can_layout
 import reference_frame
 import schema
 
 PAGE = Path(__file__).with_name("PROTOCOL.md")
 BEGIN, END = "<!-- tables: made by generate.py -->", "<!-- end of tables -->"
 WORKED_BEGIN, WORKED_END = "<!-- worked frame: made by generate.py -->", "<!-- end of worked frame -->"
+CAN_BEGIN, CAN_END = "<!-- CAN frames: made by generate.py -->", "<!-- end of CAN frames -->"
 
 
 def protocol_page(spec: schema.Schema) -> str:
-    """PROTOCOL.md with its worked frame and its tables renewed."""
+    """PROTOCOL.md with all that is made renewed."""
     text = PAGE.read_text(encoding="utf-8")
-    for begin, end, made in ((WORKED_BEGIN, WORKED_END, worked_frame(spec)), (BEGIN, END, tables(spec))):
+    parts = (
+        (WORKED_BEGIN, WORKED_END, worked_frame(spec)),
+        (CAN_BEGIN, CAN_END, can_frames(spec)),
+        (BEGIN, END, tables(spec)),
+    )
+    for begin, end, made in parts:
         head, rest = text.split(begin)
         text = f"{head}{begin}\n\n{made}\n\n{end}{rest.split(end)[1]}"
     return text
@@ -89,3 +96,13 @@ def worked_frame(spec: schema.Schema) -> str:
         ("on the wire", wire.hex(" ")),
     ]
     return "\n".join(["```text", *(f"{name:<23}{value}" for name, value in steps), "```"])
+
+
+def can_frames(spec: schema.Schema) -> str:
+    """The table of CAN frames: what each data byte holds."""
+    lines = ["| at node 0 | frame | class | data, each with its bytes |", "|---|---|---|---|"]
+    for identifier, (_, frame) in can_layout.identifiers(spec).items():
+        data = ", ".join(f"`{place.name}` {place.size}" for place in frame.places)
+        kind = can_layout.CLASSES[identifier >> can_layout.CLASS_SHIFT]
+        lines.append(f"| `0x{identifier:03X}` | `{frame.name}` | {kind} | {data} |")
+    return "\n".join(lines)

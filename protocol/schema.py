@@ -19,7 +19,18 @@ TASKS = HERE.parent / "firmware" / "src" / "tasks.def"
 
 DELIVERIES = ("handshake", "telemetry", "set_point", "stop", "exactly_once")
 # Keys that both ends need not agree on. The firmware checks a parameter's range.
-NOT_ON_THE_WIRE = ("doc", "device", "devices", "default", "default_from", "each_task", "since", "docs", "can_id")
+NOT_ON_THE_WIRE = (
+    "doc",
+    "device",
+    "devices",
+    "default",
+    "default_from",
+    "each_task",
+    "since",
+    "docs",
+    "can_id",
+    "cycle_ms",
+)
 MINORS = 16
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
 
@@ -106,6 +117,7 @@ class Message:
     since: int = 0
     devices: list[str] = dataclasses.field(default_factory=list)  # of the firmware, that fill it (device_header.py)
     can_id: int = 0  # of its first CAN frame at node 0; 0: it goes by ISO-TP (can_layout.py)
+    cycle_ms: int = 0  # time between two of them by default; 0: sent when there is something to say
 
     @property
     def length(self) -> int:

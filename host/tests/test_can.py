@@ -8,7 +8,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import cantools.database
 import pytest
 
 from boebot.boards import BoardRequest, BoardSession, open_board
@@ -212,17 +214,20 @@ def test_database_of_a_node_and_of_another_version(tmp_path: Path, capsys: pytes
     assert boebot(capsys, "dbc", str(made), "--node", "3")[0] == 0
     code, out, _ = boebot(capsys, "dbc", "--check", str(made))
     assert code == 0 and "fits this version" in out
-    loaded = pytest.importorskip("cantools.database").load_file(made, strict=True)
+    loaded: Any = cantools.database.load_file(made, strict=True)
     assert {message.frame_id >> 5 & 7 for message in loaded.messages} == {3}
     assert loaded.get_message_by_name("setpoint_signal").frame_id == 0x160
     other = tmp_path / "other.dbc"
     other.write_text(made.read_text().replace(f"0x{messages.SCHEMA_HASH:08X}", "0x12345678"))
     code, _, err = boebot(capsys, "dbc", "--check", str(other))
-    assert code == 2 and err == (
+    assert code == 1 and err == (
         f"boebot: {other} is of another version of the protocol: its SchemaHash is 0x12345678, expected "
         f"0x{messages.SCHEMA_HASH:08X}; write it anew with `boebot dbc`\n"
     )
+    other.write_text(made.read_text().replace("SG_ ping_echo : 16|16@1+ (1,0)", "SG_ ping_echo : 16|16@1+ (2,0)"))
+    code, _, err = boebot(capsys, "dbc", "--check", str(other))
+    assert code == 1 and "lays out telemetry_5 in another way" in err
     made.write_text("no database")
     code, _, err = boebot(capsys, "dbc", "--check", str(made))
-    assert code == 2 and err.startswith(f"boebot: {made} is no CAN database: ") and err.count("\n") == 1
+    assert code == 1 and err.startswith(f"boebot: {made} is no CAN database: ") and err.count("\n") == 1
     assert database.of_node(1).count("BO_ 256 ") >= 1

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 from boebot import resources
 from boebot.can.extra import import_extra
+from boebot.can.frames import NODE_MASK
 from boebot.can.layout import NODE_SHIFT
-from boebot.errors import BoardError
+from boebot.errors import BoebotError
 from boebot.link import messages
 
 
@@ -26,35 +28,59 @@ def write(path: Path, text: str) -> None:
     """Writes a database.
 
     Raises:
-        BoardError: it cannot be written there.
+        BoebotError: it cannot be written there.
     """
     try:
         path.write_text(text, "utf-8")
     except OSError as error:
-        raise BoardError(f"{path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        raise BoebotError(f"{path} cannot be written: {(error.strerror or str(error)).lower()}") from None
 
 
 def check(path: Path) -> int:
-    """How many messages a database has that fits this version's messages.
+    """How many frames a database has that fits this version's messages.
 
     Raises:
-        BoardError: it cannot be read, or is of another version.
+        BoebotError: it cannot be read, or is of another version.
     """
     cantools = import_extra("cantools.database")
     try:
         database = cantools.load_file(path, strict=True)
     except OSError as error:
-        raise BoardError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise BoebotError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from None
     except Exception as error:  # parsers of several formats
         reason = str(error).strip().splitlines() or [type(error).__name__]
-        raise BoardError(f"{path} is no CAN database: {reason[0]}") from None
+        raise BoebotError(f"{path} is no CAN database: {reason[0]}") from None
     attribute = getattr(getattr(database, "dbc", None), "attributes", {}).get("SchemaHash")
     wanted = f"0x{messages.SCHEMA_HASH:08X}"
     if attribute is None:
-        raise BoardError(f"{path} does not name its schema; expected SchemaHash {wanted}, as `boebot dbc` writes it")
+        raise BoebotError(f"{path} does not name its schema; expected SchemaHash {wanted}, as `boebot dbc` writes it")
     if attribute.value != wanted:
-        raise BoardError(
+        raise BoebotError(
             f"{path} is of another version of the protocol: its SchemaHash is {attribute.value}, expected {wanted}; "
             "write it anew with `boebot dbc`"
         )
+    own = cantools.load_string(of_node(1), "dbc", strict=True)
+    wrong = sorted(_layout(own) ^ _layout(database))
+    if wrong:
+        raise BoebotError(
+            f"{path} lays out {wrong[0][0]} in another way than this version; write it anew with `boebot dbc`"
+        )
     return len(database.messages)
+
+
+def _layout(database: Any) -> set[tuple[Any, ...]]:
+    """What must agree of each signal, whatever the node."""
+    return {
+        (
+            frame.name,
+            frame.frame_id & ~NODE_MASK,
+            frame.length,
+            one.name,
+            one.start,
+            one.length,
+            one.is_signed,
+            one.scale,
+        )
+        for frame in database.messages
+        for one in frame.signals
+    }

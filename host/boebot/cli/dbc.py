@@ -24,11 +24,11 @@ def dbc(
     from boebot.can import database
 
     if check is not None:
-        messages = database.check(check)
+        frames = database.check(check)
         if json:
-            output.print_json({"file": str(check), "messages": messages})
+            output.print_json({"file": str(check), "frames": frames})
         else:
-            output.line(f"{check} fits this version: {messages} messages")
+            output.line(f"{check} fits this version: {frames} frames")
         return
     text = database.of_node(node)
     if out is None:
