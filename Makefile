@@ -103,6 +103,10 @@ pictures:
 	@$(VENV)/bin/boebot robot shieldbot --out docs/images/robot-shieldbot.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
+	@$(VENV)/bin/boebot run wander --arena room --seconds 30 --out build/pictures/can
+	@$(VENV)/bin/boebot report build/pictures/can --can log --quiet
+	@$(VENV)/bin/boebot dbc build/pictures/boebot.dbc
+	@$(VENV)/bin/cantools plot build/pictures/boebot.dbc telemetry_5.ping_echo --ignore-unknown-frames -o docs/images/can-plot.png <build/pictures/can/can.log
 	@$(PYTHON_VENV) -m tools.live_pictures
 	@$(PYTHON_VENV) -m tools.experiment_pages
 	@$(MAKE) --no-print-directory timing

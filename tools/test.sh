@@ -14,7 +14,7 @@ echo "Testing, each into build/test-PART.log: $parts"
 # Ctrl-C reaches them all: xargs runs nothing in the background.
 echo "$parts" | tr ' ' '\n' | xargs -P "$(nproc)" -I '{}' tools/test_part.sh '{}' "$@" || failed=1
 echo "Those that look at the wall clock"
-grep -rl mark.wall_clock --include='test_*.py' host hil_tests sim_bridge | sed 's|.*/test_\(.*\)\.py|wall_clock-\1|' | sort -r |
+grep -rl mark.wall_clock --include='test_*.py' host hil_tests sim_bridge docs | sed 's|.*/test_\(.*\)\.py|wall_clock-\1|' | sort -r |
   xargs -P 4 -I '{}' tools/test_part.sh '{}' "$@" || failed=1
 build/venv/bin/python -m tools.times_table "$BOEBOT_TEST_TIMES" build/test-units.log
 exit $failed

@@ -10,7 +10,7 @@ shift
 log=build/test-$part.log units=build/test-units.log
 
 of_wall_clock() {
-  build/venv/bin/python -m pytest "$(find host hil_tests sim_bridge -name "test_${part#wall_clock-}.py")" -m wall_clock "$@"
+  build/venv/bin/python -m pytest "$(find host hil_tests sim_bridge docs -name "test_${part#wall_clock-}.py")" -m wall_clock "$@"
 }
 
 of_folder() { build/venv/bin/python -m pytest "$part" -m "not wall_clock and not soak" "$@"; }
