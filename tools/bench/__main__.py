@@ -30,6 +30,7 @@ MODULES = (
     "speed",
     "record",
     "live",
+    "can_bus",
     "demo_brain",
     "world",
     "navigation",
