@@ -36,7 +36,7 @@ def periods(devices: Mapping[str, Any], layout: Layout, count: int) -> tuple[flo
 def ages(periods_s: tuple[float, ...], time_s: float, tick_s: float) -> tuple[float, ...]:
     """Age of each reading at a time: a sensor samples in the first step at or after each multiple of its period."""
     found = {period_s: _age(period_s, time_s, tick_s) for period_s in set(periods_s)}
-    return tuple(found[period_s] for period_s in periods_s)
+    return tuple(map(found.__getitem__, periods_s))
 
 
 def _age(period_s: float, time_s: float, tick_s: float) -> float:
