@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 Layout = Mapping[str, slice]
@@ -35,8 +36,17 @@ def periods(devices: Mapping[str, Any], layout: Layout, count: int) -> tuple[flo
 
 def ages(periods_s: tuple[float, ...], time_s: float, tick_s: float) -> tuple[float, ...]:
     """Age of each reading at a time: a sensor samples in the first step at or after each multiple of its period."""
-    found = {period_s: _age(period_s, time_s, tick_s) for period_s in set(periods_s)}
-    return tuple(map(found.__getitem__, periods_s))
+    kinds, each = _kinds(periods_s)
+    found = [_age(period_s, time_s, tick_s) for period_s in kinds]
+    return tuple(map(found.__getitem__, each))  # a sweep has hundreds that are alike
+
+
+@lru_cache(maxsize=32)
+def _kinds(periods_s: tuple[float, ...]) -> tuple[list[float], list[int]]:
+    """The different periods, and which of them each reading has."""
+    kinds = list(dict.fromkeys(periods_s))
+    place = {period_s: index for index, period_s in enumerate(kinds)}
+    return kinds, [place[period_s] for period_s in periods_s]
 
 
 def _age(period_s: float, time_s: float, tick_s: float) -> float:
