@@ -16,6 +16,7 @@ from boebot.live.audience import PAST, thinned
 from boebot.live.controls import SILENT_S, Controls
 from boebot.live.outbox import EVENTS, LETTERS, Outbox
 from boebot.live.pace import Pace
+from boebot.record.record import Record
 from boebot.running.brain_parameters import bounds, meaning, parameters, set_parameter
 from boebot.running.interventions import Arm, Hand, Place, Release, Stop
 
@@ -200,3 +201,23 @@ def test_every_slider_of_the_bundled_brain_stays_within_what_its_process_takes()
         set_parameter(brain, "avoid.fly", 1.0)
     with pytest.raises(BoebotError, match="avoid: turn"):
         set_parameter(brain, "avoid.turn", 2.0)
+
+
+def test_news_of_a_record_are_told_once_and_all_is_kept_in_its_order() -> None:
+    record = Record()
+    told: list[bytes] = []
+
+    def look() -> None:
+        told.extend(data for _, data in record.news()["command"].rows())
+
+    record.append("command", 0.0, b"a")
+    look()
+    for data in (b"bb", b"c"):
+        record.append("command", 1.0, data)
+    assert record.rows("command") == [(0.0, b"a"), (1.0, b"bb"), (1.0, b"c")] and record.count("command") == 3
+    record.keep(1.0)
+    record.append("command", 2.0, b"d")
+    look()
+    assert told == [b"a", b"bb", b"c", b"d"] and dict(record.news()) == {}
+    record.keep(2.0)
+    assert [data for _, data in record.rows("command")] == told and record.count("command") == 4

@@ -53,12 +53,14 @@ class Controls:
         can: what people may do, as the page has it.
         pace: how fast the run goes.
         restart: what the run is to begin afresh with; None: it goes on.
+        is_idle: nothing is to be done to any robot, and nobody drives one by hand.
     """
 
     def __init__(self, robots: int, shapes: int, can: frozenset[str], pace: Pace) -> None:
         """`shapes`: how many of them move in the arena."""
         self.can, self.pace = can, pace
         self.restart: messages.Restart | None = None
+        self.is_idle = True
         self._robots, self._shapes = robots, shapes
         self._lock = threading.Lock()
         self._deeds: list[deque[Deed]] = [deque() for _ in range(robots)]
@@ -134,6 +136,7 @@ class Controls:
         if len(self._deeds[robot]) >= WAITING:
             raise BoebotError(f"{WAITING} interventions wait already; expected fewer at once")
         self._deeds[robot].append(deed)
+        self.is_idle = False
 
     def _may_drive(self, page: int, robot: int) -> None:
         wheel = self._wheels[robot]
@@ -147,6 +150,7 @@ class Controls:
             if speed is None or speed > REAL_TIME:
                 self.pace.set_speed(REAL_TIME)
         self._wheels[robot] = Wheel(page, left, right, time.monotonic())
+        self.is_idle = False
 
     # ---- to the run ------------------------------------------------------------------------------------------------
 
@@ -155,6 +159,7 @@ class Controls:
         with self._lock:
             deeds = list(self._deeds[robot])
             self._deeds[robot].clear()
+            self.is_idle = not any(self._deeds) and self._wheels.count(None) == self._robots
             wheel = self._wheels[robot]
             if wheel is None:
                 return deeds

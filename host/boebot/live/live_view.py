@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
@@ -59,6 +59,7 @@ class LiveView:
             BoebotError: the port is taken.
         """
         self._show = show
+        self._imperfections = imperfections()  # now: that takes longer than many steps of a run
         self._speed = speed
         self._pace = Pace(speed)
         self._controls: Controls | None = None
@@ -121,10 +122,15 @@ class LiveView:
         if self._number == 1:
             self._show(self.url)
 
-    def before_step(self, number: int, time_s: float) -> Iterator[Deed]:
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
         """See `Onlooker`. While time stands still, what people do is carried out at once."""
         controls = self._controls
         assert controls is not None
+        if controls.is_idle and controls.restart is None and self._pace.is_free:
+            return ()  # at each step of a run that hurries: nothing else may take time there
+        return self._deeds(controls, number, time_s)
+
+    def _deeds(self, controls: Controls, number: int, time_s: float) -> Iterator[Deed]:
         while True:
             if controls.restart is not None:
                 raise RestartedError("restarted by hand")
@@ -198,7 +204,7 @@ class LiveView:
             "seed": request.seed,
             "seconds": None if self._robots[0].task.seconds == float("inf") else self._robots[0].task.seconds,
             "imperfections": [
-                {"name": name, "text": text, "off": name in off} for name, text in imperfections().items()
+                {"name": name, "text": text, "off": name in off} for name, text in self._imperfections.items()
             ],
             "robots": [{"parameters": _sliders(robot)} for robot in self._robots],
         }

@@ -46,6 +46,11 @@ class Pace:
         self.paused = self._stepping = True
         self.changed.set()
 
+    @property
+    def is_free(self) -> bool:
+        """No step has to wait."""
+        return self.speed is None and not self.paused
+
     def holds(self, time_s: float) -> bool:
         """Whether the step at that time of the run has to wait. If it does, waits for a moment."""
         if self.paused:

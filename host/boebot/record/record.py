@@ -29,7 +29,7 @@ from __future__ import annotations
 import bisect
 import time as wall
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from struct import Struct
 from typing import Any, TypeVar
 
@@ -62,6 +62,7 @@ class Record:
         self._keeper: Keeper = InMemory() if keeper is None else keeper
         self._rows: defaultdict[str, list[Row]] = defaultdict(list)
         self._blocks: dict[str, Block] = {}  # of other streams, that wait with those rows
+        self._room = STEPS_AT_MOST  # steps of the brain until rows are due
         self._told: Counter[str] | None = None  # how many of those that wait `news` has given; None: nobody asks
         self._untold: dict[str, Block] = {}  # that were kept before somebody asked again
         self._counts: Counter[str] | None = Counter() if is_new else None  # of the rows that are kept; None: not known
@@ -90,7 +91,7 @@ class Record:
 
     def is_due(self) -> bool:
         """A second of the wall clock has passed since rows were last handed over to be kept, or there are many."""
-        return wall.perf_counter() >= self._due_s or len(self._rows["command"]) >= STEPS_AT_MOST
+        return wall.perf_counter() >= self._due_s or len(self._rows["command"]) >= self._room
 
     def keep(self, time_s: float) -> None:
         """Hands over the rows so far to be kept, as a group; `time_s`: of the run.
@@ -102,7 +103,7 @@ class Record:
         if self._told is not None:
             self._untold, self._told = dict(self.news()), Counter()
         rows: Rows = {**self._rows, **self._blocks}
-        self._rows, self._blocks = defaultdict(list), {}
+        self._rows, self._blocks, self._room = defaultdict(list), {}, STEPS_AT_MOST
         if any(rows.values()):
             self._counted(rows)
             self._keeper.write(rows, time_s)
@@ -115,12 +116,14 @@ class Record:
     def news(self) -> Group:
         """The rows that came since this was last asked; of the first time only those that are not kept yet."""
         told = self._told = self._told or Counter()
-        new: dict[str, Sequence[Row] | Block] = {stream: rows[told[stream] :] for stream, rows in self._rows.items()}
-        new |= {stream: block.part(told[stream], len(block)) for stream, block in self._blocks.items()}
-        told.update({stream: len(rows) for stream, rows in new.items()})
+        self._room -= len(self._rows["command"])
+        self.put(group_of(self._rows))  # as blocks they wait to be kept, too: made once
+        self._rows = defaultdict(list)
         found, self._untold = self._untold, {}
-        for stream, block in group_of({stream: rows for stream, rows in new.items() if len(rows)}).items():
-            found[stream] = joined(found.get(stream), block)
+        for stream, block in self._blocks.items():
+            if len(block) > told[stream]:
+                found[stream] = joined(found.get(stream), block.part(told[stream], len(block)))
+                told[stream] = len(block)
         return found
 
     def recount(self) -> None:
@@ -157,7 +160,9 @@ class Record:
     def groups(self) -> Iterator[Group]:
         """What is kept, and what waits to be, oldest first; each group by itself is small."""
         yield from self._keeper.groups()
-        waiting = {**group_of(self._rows), **self._blocks}
+        waiting = dict(self._blocks)
+        for stream, block in group_of(self._rows).items():
+            waiting[stream] = joined(waiting.get(stream), block)
         if waiting:
             yield waiting
 
