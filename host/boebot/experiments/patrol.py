@@ -17,8 +17,8 @@ from boebot.cognition import Odometry
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, experiment, with_progress
 from boebot.experiments.paths import floor
 from boebot.experiments.trials import Trial, trial_seeds, true_pose, try_once
-from boebot.navigation import FollowPath, LineMap, Localization, RandomSearch
-from boebot.navigation.frames import Pose, composed
+from boebot.navigation import Estimator, FollowPath, LineMap, Localization, RandomSearch
+from boebot.navigation.frames import composed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,6 +29,7 @@ ARENA = "blocks"
 ROUND = ((2.8, 1.2), (2.8, 2.7), (4.4, 2.8), (4.4, 4.65), (1.2, 4.65), (0.8, 2.8), (0.8, 0.8))  # m
 START = (0.8, 0.8, 0.0)  # m, m, rad
 SECONDS, SEEDS = 120.0, 12
+EVERY = 5.0  # s from scan to scan
 JUMP = 0.05  # m: from here on a correction is one that can be seen
 
 
@@ -84,13 +85,15 @@ class Errors:
     """of each scan: how far the estimate went (m)"""
 
 
-def patrolled(seed: int, robot: str, seconds: float, every: float, box: Pose, on: str | None = None) -> Errors:
-    """One run. `every`: s from scan to scan; `box`: of the random search."""
+def patrolled(
+    seed: int, robot: str, seconds: float, every: float, estimator: Estimator, on: str | None = None
+) -> Errors:
+    """One run. `every`: s from scan to scan."""
     localization = Localization(
         plan=LineMap.of(ARENA),
         start=START,
         every=every,
-        estimator=RandomSearch(box=box),
+        estimator=estimator,
         utility=Utility(b=-1.0, w={"due": 3.0}, tau=0.05),
     )
     watch = Watch(localization=localization)
@@ -124,7 +127,7 @@ def patrolled(seed: int, robot: str, seconds: float, every: float, box: Pose, on
 )
 def patrol(seed: int, progress: Progress) -> Outcome:
     seeds = with_progress(trial_seeds(seed, SEEDS), progress)
-    runs = [patrolled(number, "roller", SECONDS, 5.0, (0.1, 0.1, 0.1)) for number in seeds]
+    runs = [patrolled(number, "roller", SECONDS, EVERY, RandomSearch()) for number in seeds]
     alone = [float(run.odometry.max()) for run in runs]
     corrected = [float(run.localization.max()) for run in runs]
     jumps = [int((run.jumps > JUMP).sum()) for run in runs]
@@ -156,7 +159,10 @@ AVR_SECONDS, AVR_SEEDS = 240.0, 5
 )
 def patrol_avr(seed: int, progress: Progress) -> Outcome:
     seeds = with_progress(trial_seeds(seed, AVR_SEEDS), progress)
-    runs = [patrolled(number, "shieldbot-turret", AVR_SECONDS, 10.0, (0.15, 0.15, 0.3), "avr") for number in seeds]
+    runs = [
+        patrolled(number, "shieldbot-turret", AVR_SECONDS, 10.0, RandomSearch(box=(0.15, 0.15, 0.3)), "avr")
+        for number in seeds
+    ]
     alone = [float(run.odometry.max()) for run in runs]
     corrected = [float(run.localization.max()) for run in runs]
     measured = [
