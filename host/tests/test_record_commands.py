@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -227,4 +228,4 @@ def test_brain_is_replayed_on_what_was_sensed(
     code, out, err = boebot(capsys, "replay", "run", "--brain", brain)
     assert (code, err) == (0, "") and "all 40 commands are the same" in out
     code, out, _ = boebot(capsys, "replay", "run", "--brain", "other.py")
-    assert code == 1 and out.startswith("step 0 (0.00 s) differs: ")
+    assert code == 1 and re.match(r"step 0 \((tick \d+, )?0\.00 s\) differs: ", out)

@@ -7,23 +7,27 @@ over CAN or not. A log has no host times, no seed and no interventions: a brain 
 from __future__ import annotations
 
 import heapq
+import logging
+import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from boebot.can.extra import import_extra
-from boebot.can.frames import PARTS, Assembler, CanFrame, CanMessage, ForeignFrameError, whole_tick
+from boebot.can.frames import NODE_MASK, NODES, PARTS, Assembler, CanFrame, CanMessage, ForeignFrameError
 from boebot.can.iso_tp import LongMessages
 from boebot.can.layout import NODE_SHIFT
 from boebot.can.translator import BoardEnd, HostEnd
-from boebot.description.board_parameters import adapted
-from boebot.description.robots import RobotDescription, load_robot
+from boebot.description.board_parameters import adapted, parameters_of
+from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import BoebotError
-from boebot.link import messages
+from boebot.link import messages, mismatch
 from boebot.link.fields import text
+from boebot.record.reading import CutError
 from boebot.record.record import Record
 from boebot.record.result import RunResult
+from boebot.record.run_folder import write_whole
 from boebot.robot import Command
 
 KINDS = ("blf", "asc", "log")
@@ -31,7 +35,7 @@ KINDS = ("blf", "asc", "log")
 
 _PER_UNIT = 10_000  # counts of a set-point per unit
 _SET_POINTS = {messages.SetpointSignal.ID: "signal", messages.SetpointSpeed.ID: "speed"}
-_PARAMETER = {spec.id: (name, spec.scale) for name, spec in messages.PARAMETERS.items()}
+_PARAMETER = {spec.id: name for name, spec in messages.PARAMETERS.items()}
 
 
 class Sent(NamedTuple):
@@ -75,16 +79,23 @@ def frames_of(result: RunResult, node: int = 1) -> Iterator[Sent]:
 
 
 def save_log(result: RunResult, path: Path, node: int = 1) -> Path:
-    """Writes a run's CAN frames; the format is by the suffix, one of `KINDS`.
+    """Writes a run's CAN frames, whole or not at all; the format is by the suffix, one of `KINDS`.
+
+    Args:
+        result: the run.
+        path: of the log.
+        node: the board's, where the run did not go over CAN.
 
     Raises:
-        BoebotError: there are none, or the file cannot be written.
+        BoebotError: there are no frames, or the file cannot be written.
     """
     can = import_extra("can")
-    partial = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        with can.Logger(str(partial)) as log:
-            for time_s, frame in frames_of(result, node):
+    over_can = re.match(r"can:.*[?&]node=([1-7])(&|$)", result.board)
+    sent = frames_of(result, int(over_can[1]) if over_can else node)
+
+    def write(part: Path) -> None:
+        with can.Logger(str(part)) as log:
+            for time_s, frame in sent:
                 log.on_message_received(
                     can.Message(
                         timestamp=time_s,
@@ -95,24 +106,20 @@ def save_log(result: RunResult, path: Path, node: int = 1) -> Path:
                         is_rx=bool(frame.identifier & 1),
                     )
                 )
-        partial.replace(path)
-    except OSError as error:
-        raise BoebotError(f"{path} cannot be written: {(error.strerror or str(error)).lower()}") from None
-    finally:
-        partial.unlink(missing_ok=True)
-    return path
+
+    return write_whole(path, write)
 
 
 # ---- a log as a run --------------------------------------------------------------------------------------------------
 
 
 def is_log(path: Path) -> bool:
-    """Whether a file is such a log, by its name."""
-    return path.suffix[1:].lower() in KINDS
+    """Whether that is such a log, by its name, and not the folder of a run."""
+    return path.suffix[1:].lower() in KINDS and not path.is_dir()
 
 
 def read_log(path: Path, robot: str | None = None, node: int | None = None, seed: int = 1) -> RunResult:
-    """The run in a log of CAN frames, as far as it shows there.
+    """The run in a log of CAN frames, as far as it shows there: the first session in which somebody drove the robot.
 
     Args:
         path: of the log.
@@ -120,20 +127,24 @@ def read_log(path: Path, robot: str | None = None, node: int | None = None, seed
         node: the board's; None: the only one of the log.
         seed: of the brain's chance, which no log shows.
 
+    Returns:
+        The run. Of a log that breaks off it has ended there, with a `CutError` that says so.
+
     Raises:
         BoebotError: it cannot be read, has no hello of a board or no set-points, or several boards and no `node`.
     """
-    sent = _read(path)
-    node = _only_node(path, sent) if node is None else node
-    reader = _LogReader(node)
-    for one in sent:
-        reader.take(one)
-    if reader.hello is None:
-        raise BoebotError(f"{path} has no hello of a board as node {node}; expected a log from before the run began")
-    if not reader.commands:
-        raise BoebotError(f"{path} has no set-points for node {node}: nobody drove the robot")
-    described = load_robot(robot or text(reader.hello.robot))
-    return reader.result(path, adapted(described, _known(described, reader.parameters)), seed)
+    readers = {number: _LogReader(number) for number in NODES}
+    cut: CutError | None = None
+    try:
+        for sent in _sent(path):
+            if reader := readers.get((sent.frame.identifier & NODE_MASK) >> NODE_SHIFT):
+                reader.take(sent)
+    except CutError as error:
+        cut = error
+    reader = _chosen(path, readers, node)
+    result = reader.result(path, _robot(path, reader, robot), seed)
+    result.error = cut
+    return result
 
 
 def as_on_the_wire(command: Command) -> Command:
@@ -141,104 +152,150 @@ def as_on_the_wire(command: Command) -> Command:
     return Command(command.kind, *(round(value * _PER_UNIT) / _PER_UNIT for value in command[1:]))
 
 
-def _read(path: Path) -> list[Sent]:
+def _sent(path: Path) -> Iterator[Sent]:
+    """The frames of a log.
+
+    Raises:
+        BoebotError: it cannot be read.
+        CutError: it breaks off after some frames.
+    """
     can = import_extra("can")
+    logging.getLogger("can").addHandler(logging.NullHandler())  # else its remarks go to standard error
+    count = 0
     try:
         with can.LogReader(str(path)) as log:
-            return [
-                Sent(message.timestamp, CanFrame(message.arbitration_id, bytes(message.data)))
-                for message in log
-                if not (message.is_error_frame or message.is_extended_id or message.is_remote_frame or message.is_fd)
-            ]
+            for message in log:
+                count += 1
+                if not (message.is_error_frame or message.is_extended_id or message.is_remote_frame or message.is_fd):
+                    yield Sent(message.timestamp, CanFrame(message.arbitration_id, bytes(message.data)))
+            if getattr(log, "file_size", 0) > path.stat().st_size:  # of a BLF: as its header says
+                raise EOFError("it is shorter than it says")
     except OSError as error:
         raise BoebotError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from None
     except Exception as error:  # each format has its own
-        reason = str(error).strip().splitlines() or [type(error).__name__]
-        raise BoebotError(f"{path} is no log of CAN frames: {reason[0]}") from None
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+        if count:
+            raise CutError(f"{path} breaks off after {count:,} frames: {reason}") from None
+        raise BoebotError(f"{path} is no log of CAN frames: {reason}") from None
 
 
-def _only_node(path: Path, sent: list[Sent]) -> int:
-    (hello,) = (
-        identifier for identifier, part in PARTS.items() if (part.message_id, part.place) == (messages.Hello.ID, 0)
-    )
-    seen = {frame.identifier >> NODE_SHIFT & 7 for _, frame in sent if frame.identifier & ~(7 << NODE_SHIFT) == hello}
-    if len(seen) != 1:
-        boards = ", ".join(map(str, sorted(seen))) or "none"
-        raise BoebotError(f"{path} has the hello of these boards: {boards}; expected one, or --node")
-    (node,) = seen
-    return node
+def _chosen(path: Path, readers: dict[int, _LogReader], node: int | None) -> _LogReader:
+    """The reader of a board that was driven."""
+    heard = [number for number, reader in readers.items() if reader.hello is not None]
+    if not heard:
+        raise BoebotError(f"{path} has no hello of a board; expected a log from before the run began")
+    if node is None and len(heard) > 1:
+        raise BoebotError(f"{path} has boards of several nodes; expected --node {' or '.join(map(str, heard))}")
+    node = heard[0] if node is None else node
+    if node not in heard:
+        raise BoebotError(f"{path} has no hello of a board of node {node}; expected {' or '.join(map(str, heard))}")
+    hello = readers[node].hello
+    assert hello is not None
+    if not mismatch.speaks_alike(hello):
+        raise BoebotError(
+            f"the board in {path} speaks protocol version {mismatch.version_name(hello.protocol_version)} with message "
+            f"schema {hello.schema_hash:08x}; expected {mismatch.version_name()} and {messages.SCHEMA_HASH:08x}"
+        )
+    if not readers[node].commands:
+        raise BoebotError(f"{path} has no set-points for node {node}: nobody drove the robot")
+    return readers[node]
 
 
-def _known(robot: RobotDescription, values: dict[str, float]) -> dict[str, float]:
-    """Those parameters that are keys of this robot's description."""
-    return {
-        name: value
-        for name, value in values.items()
-        if name == "devices"
-        or robot.has(messages.PARAMETERS[name].default_from.partition(".")[0])
-        or messages.PARAMETERS[name].default_from.startswith("body.")
-    }
+def _robot(path: Path, reader: _LogReader, robot: str | None) -> RobotDescription:
+    """The robot of a log, with the parameters of its board in place of those that its description has otherwise."""
+    assert reader.hello is not None
+    name = text(reader.hello.robot)
+    if robot is None and name not in robot_names():
+        raise BoebotError(f"the board in {path} says that it is {name!r}, which is no bundled robot; expected --kind")
+    described = load_robot(robot or name)
+    other = {}
+    for parameter, own in parameters_of(described).items():
+        scale = messages.PARAMETERS[parameter].scale
+        count = reader.parameters.get(parameter)
+        if count is not None and count != round(own / scale):
+            other[parameter] = count * scale
+    return adapted(described, other)
 
 
 class _LogReader:
-    """Follows what a host and the board of a node said to each other.
+    """Follows what a host and the board of a node said to each other, until the first session with set-points ends.
 
     Attributes:
         hello: the board's last before the first set-point.
-        parameters: values in force that the board has answered, in their units.
+        parameters: counts in force then, as the board has answered them.
         commands: (tick, command) of each set-point.
     """
 
     def __init__(self, node: int) -> None:
         self.hello: messages.Hello | None = None
-        self.parameters: dict[str, float] = {}
+        self.parameters: dict[str, int] = {}
         self.commands: list[tuple[int, Command]] = []
+        self._is_over = False
+        self._session: int | None = None  # of the newest telemetry
         self._ends = [Assembler(to_board, frozenset({node})) for to_board in (True, False)]
         self._asked: dict[int, int] = {}  # number of a request -> parameter
         self._telemetry: list[tuple[float, messages.Telemetry]] = []
         self._slow: list[tuple[int, type[messages.Message], bytes]] = []  # how much telemetry had come before
 
     def take(self, sent: Sent) -> None:
-        """The next frame of the log."""
+        """The next frame of this node."""
+        if self._is_over or sent.frame.identifier & ~NODE_MASK not in PARTS:
+            return
         for end in self._ends:
-            if end.takes(sent.frame.identifier) and sent.frame.identifier & ~(7 << NODE_SHIFT) in PARTS:
+            if end.takes(sent.frame.identifier):
                 try:
                     message = end.add(sent.frame)
                 except ForeignFrameError:
                     continue
                 if message is not None:
-                    self._message(sent.time_s, message)
+                    self._take(sent.time_s, message)
 
-    def _message(self, time_s: float, came: CanMessage) -> None:
+    def _take(self, time_s: float, came: CanMessage) -> None:
         kind = messages.MESSAGES[came.id]
         if came.sequence is not None:
-            self._set_point(came)
+            self._take_set_point(came)
         elif kind is messages.Telemetry:
-            self._telemetry.append((time_s, messages.Telemetry.unpack(came.payload)))
+            self._take_telemetry(time_s, came)
         elif kind in messages.DEVICE_MESSAGES:
             self._slow.append((len(self._telemetry), kind, came.payload))
-        elif kind is messages.Hello and not self.commands:
+        elif self.commands:
+            self._is_over = kind is messages.Close
+        elif kind is messages.Hello:
             self.hello = messages.Hello.unpack(came.payload)
         elif kind in (messages.GetParameter, messages.SetParameter):
             request: Any = kind.unpack(came.payload)
             self._asked[request.number] = request.parameter
         elif kind is messages.Answer:
             answer = messages.Answer.unpack(came.payload)
-            name, scale = _PARAMETER.get(self._asked.get(answer.number, -1), ("", 0.0))
-            if name and answer.status == messages.AnswerStatus.OK and not self.commands:
-                self.parameters[name] = answer.value * scale
+            name = _PARAMETER.get(self._asked.get(answer.number, -1))
+            if name is not None and answer.status == messages.AnswerStatus.OK:
+                self.parameters[name] = answer.value
 
-    def _set_point(self, came: CanMessage) -> None:
-        if not self._telemetry:
+    def _take_telemetry(self, time_s: float, came: CanMessage) -> None:
+        telemetry = messages.Telemetry.unpack(came.payload)
+        newest = self._telemetry[-1][1].tick if self._telemetry else -1
+        if telemetry.tick == newest:
+            return  # logged twice
+        was_reset = telemetry.tick < newest
+        if self.commands and (was_reset or came.session != self._session):
+            self._is_over = True
             return
+        if was_reset:
+            self._telemetry.clear()
+            self._slow.clear()
+        self._session = came.session
+        self._telemetry.append((time_s, telemetry))
+
+    def _take_set_point(self, came: CanMessage) -> None:
+        if not self._telemetry or came.session != self._session:
+            return
+        point: Any = messages.MESSAGES[came.id].unpack(came.payload)
         newest = self._telemetry[-1][1].tick
-        payload = whole_tick(came.payload, newest)
-        point: Any = messages.MESSAGES[came.id].unpack(payload)
-        tick = newest - ((newest - point.answers_tick) & 0xFFFF)
-        name = _SET_POINTS.get(came.id)
-        signals = (0.0, 0.0) if name is None else (point.left / _PER_UNIT, point.right / _PER_UNIT)
+        tick = newest - ((newest - point.answers_tick) & 0xFF)
+        kind = _SET_POINTS.get(came.id)
+        signals = (0.0, 0.0) if kind is None else (point.left / _PER_UNIT, point.right / _PER_UNIT)
         if not self.commands or tick > self.commands[-1][0]:
-            self.commands.append((tick, Command(name or "stop", *signals)))
+            self.commands.append((tick, Command(kind or "stop", *signals)))
 
     def result(self, path: Path, robot: RobotDescription, seed: int) -> RunResult:
         """The run. Its time 0 is the tick that the first set-point answers."""
@@ -246,19 +303,18 @@ class _LogReader:
         tick_s = 1.0 / self.hello.tick_rate
         first, last = self.commands[0][0], self.commands[-1][0]
         record = Record()
-        places = {}
-        rows = [(stamp, one) for stamp, one in self._telemetry if first <= one.tick <= last]
-        for stamp, telemetry in rows:
-            places[telemetry.tick] = (telemetry.tick - first) * tick_s
-            record.append_telemetry(places[telemetry.tick], telemetry.pack(), stamp, 0.0)
+        times = {}
+        for stamp_s, telemetry in self._telemetry:
+            if first <= telemetry.tick <= last:
+                time_s = times[telemetry.tick] = (telemetry.tick - first) * tick_s
+                record.append_telemetry(time_s, telemetry.pack(), stamp_s, 0.0)
         for place, kind, payload in self._slow:
             if place < len(self._telemetry):  # the brain saw it with the next telemetry
-                time_s = (self._telemetry[place][1].tick - first) * tick_s
-                record.append(kind.NAME, time_s, payload)
+                record.append(kind.NAME, (self._telemetry[place][1].tick - first) * tick_s, payload)
         for tick, command in self.commands:
-            if tick not in places:
+            if tick not in times:
                 raise BoebotError(f"{path} lacks the telemetry of tick {tick}, which a set-point answers")
-            record.append_command(places[tick], *command)
+            record.append_command(times[tick], *command)
         gaps = Counter(after[0] - before[0] for before, after in zip(self.commands, self.commands[1:], strict=False))
         return RunResult(
             brain="unknown",

@@ -6,19 +6,23 @@ Exit codes: 0 all commands are the same; 1 one differs; 2 it cannot be replayed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from boebot.can.log import as_on_the_wire, is_log, read_log
 from boebot.cli import completion, options, output
 from boebot.errors import BoebotError
+from boebot.link.fields import reader
+from boebot.link.messages import Telemetry
 from boebot.record.compare import replayed
-from boebot.record.reading import read_run, robots_of
+from boebot.record.reading import CutError, read_run, robots_of
+from boebot.record.result import RunResult
 from boebot.robot import Command
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
+_TICK = reader(Telemetry, "tick")
 
 
 def replay(
@@ -47,32 +51,50 @@ def replay(
     node: Annotated[
         int | None, typer.Option("--node", metavar="N", min=1, max=7, help="Of a CAN log: which board, if several.")
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of a CAN log: seed of the brain's chance.")] = 1,
+    seed: Annotated[
+        int | None, typer.Option("--seed", metavar="N", help="Of a CAN log: seed of the brain's chance; else 1.")
+    ] = None,
 ) -> None:
     """Run a brain on what was sensed in a run, and name the first command that differs."""
-    carried: Callable[[Command], Command] = lambda command: command  # noqa: E731
     try:
-        if run.suffix in (".blf", ".asc", ".log"):
-            from boebot.can.log import as_on_the_wire, read_log
-
-            result, carried = read_log(run, kind, node, seed), as_on_the_wire
+        if is_log(run):
+            if robot is not None:
+                raise BoebotError(f"{run} is a log of CAN frames; expected --node in place of --robot")
+            result = read_log(run, kind, node, 1 if seed is None else seed)
+            commands = [as_on_the_wire(command) for command in replayed(result, brain)]
         else:
-            robots = robots_of(read_run(run), robot)
-            if len(robots) > 1:
-                raise BoebotError(f"{run} is a run of {len(robots)} robots; expected --robot 1 to {len(robots)}")
-            (result,) = robots.values()
-        commands = [carried(command) for command in replayed(result, brain)]
+            result = _recorded(run, robot)
+            if (kind, node, seed) != (None, None, None):
+                raise BoebotError(f"{run} is no log of CAN frames; expected no --kind, --node or --seed")
+            commands = replayed(result, brain)
     except BoebotError as error:
         output.say(str(error))
         raise typer.Exit(EXIT_USAGE) from None
-    steps, times = result.record.steps, result.record.times
+    if isinstance(result.error, CutError):
+        output.say(str(result.error))
+    steps = result.record.steps
     for number, (step, command) in enumerate(zip(steps, commands, strict=False)):
         recorded = Command(*step[1:])
         if recorded != command:
-            where = f"step {number} ({times[step[0]]:.2f} s)"
-            output.line(f"{where} differs: {recorded} in the run, {command} in the replay")
+            output.line(f"{_place(result, number)} differs: {recorded} in the run, {command} in the replay")
             raise typer.Exit(EXIT_DIFFERS)
     if len(commands) < len(steps):
         output.line(f"the brain was over after {len(commands)} steps; the run has {len(steps)}")
         raise typer.Exit(EXIT_DIFFERS)
     output.line(f"all {len(steps)} commands are the same")
+
+
+def _recorded(run: Path, number: int | None) -> RunResult:
+    """The run in a folder, of one robot."""
+    robots = robots_of(read_run(run), number)
+    if len(robots) > 1:
+        raise BoebotError(f"{run} is a run of {len(robots)} robots; expected --robot 1 to {len(robots)}")
+    (result,) = robots.values()
+    return result
+
+
+def _place(result: RunResult, step: int) -> str:
+    """A step of the brain in words, with the board's tick that it answered, if there is a board."""
+    index = result.record.steps[step][0]
+    tick = f"tick {_TICK(result.record.telemetry[index])[0]}, " if result.layout is None else ""
+    return f"step {step} ({tick}{result.record.times[index]:.2f} s)"

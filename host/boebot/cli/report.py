@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from boebot.can import log
 from boebot.cli import ending, options, output
 from boebot.cli.run_table import Detail, detail, print_run
 from boebot.errors import BoebotError
@@ -15,8 +16,6 @@ from boebot.record.reading import CutError, read_run, robots_of
 from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RECORD, RunFolder
 from boebot.view import IncompleteError
-
-CAN_LOGS = ("blf", "asc", "log")
 
 
 def report(
@@ -43,8 +42,8 @@ def report(
     quiet: options.Quiet = False,
 ) -> None:
     """Print a run's figures and write its files anew, from its record. A record that is cut is read up to there."""
-    if can is not None and can not in CAN_LOGS:
-        raise typer.BadParameter(f"there is no format {can!r}; expected one of {', '.join(CAN_LOGS)}")
+    if can is not None and can not in log.KINDS:
+        raise typer.BadParameter(f"there is no format {can!r}; expected one of {', '.join(log.KINDS)}")
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
     folder = run if run.is_dir() else run.parent
     result = read_run(run)
@@ -78,13 +77,13 @@ def report(
 
 def _can_logs(result: RunResult | TogetherResult, folder: Path, kind: str) -> list[Path]:
     """Writes a log for each robot that has a board."""
-    from boebot.can.log import save_log
-
     robots = robots_of(result)
     if len(robots) == 1:
-        return [save_log(robots[1], folder / f"can.{kind}")]
+        return [log.save_log(robots[1], folder / f"can.{kind}")]
+    boards = {number: robot for number, robot in robots.items() if robot.layout is None}
+    if not boards:
+        raise BoebotError("no robot of the run has a board, so there are no CAN frames")
     return [
-        save_log(one, folder / f"robot-{number}" / f"can.{kind}", min(number, 7))
-        for number, one in robots.items()
-        if one.layout is None
+        log.save_log(robot, folder / f"robot-{number}" / f"can.{kind}", (number - 1) % 7 + 1)
+        for number, robot in boards.items()
     ]

@@ -9,7 +9,8 @@ import errno
 import fcntl
 import os
 import re
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO
@@ -111,6 +112,24 @@ def locked(path: Path | None) -> AbstractContextManager[RunFolder | None]:
 def unfinished(path: Path) -> Path:
     """Where a file is written, before it is whole and gets its name."""
     return path.with_name(f".part-{path.name}")
+
+
+def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
+    """A file of a run, whole or not at all: `write` writes it to the path that it is given. Returns `path`.
+
+    Raises:
+        BoebotError: the folder cannot be written to.
+    """
+    part = unfinished(path)
+    try:
+        write(part)
+        part.replace(path)
+    except OSError as error:
+        raise unwritable(path.parent, error) from None
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+    return path
 
 
 def unwritable(folder: Path, error: OSError) -> BoebotError:

@@ -18,7 +18,6 @@ each.
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import os
 from functools import partial
@@ -26,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
-from boebot.record.run_folder import unfinished, unwritable
+from boebot.record.run_folder import unwritable, write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -83,7 +82,7 @@ def save(result: RunResult, folder: Path, *, csv: bool = False) -> list[Path]:
                 "brain.csv": partial(tables.write_steps, result.record, names),
                 "switches.csv": partial(tables.write_switches, result.record),
             }
-    paths = [_write(folder / name, write) for name, write in wanted.items()]
+    paths = [write_whole(folder / name, write) for name, write in wanted.items()]
     if not result.ticks:
         return paths
     drawn, failed = _draw(
@@ -135,25 +134,7 @@ def save_for_foxglove(results: Sequence[RunResult], folder: Path) -> Path:
         raise BoebotError(
             "Foxglove's schemas are not installed; expected the extra of that name: pip install 'boebot[foxglove]'"
         ) from None
-    return _write(folder / "foxglove.mcap", partial(foxglove.write, results))
-
-
-def _write(path: Path, write: Write) -> Path:
-    """A file, whole or not at all.
-
-    Raises:
-        BoebotError: the folder cannot be written to.
-    """
-    part = unfinished(path)
-    try:
-        write(part)
-        part.replace(path)
-    except OSError as error:
-        raise unwritable(path.parent, error) from None
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
-    return path
+    return write_whole(folder / "foxglove.mcap", partial(foxglove.write, results))
 
 
 def _draw(folder: Path, files: dict[str, Write]) -> tuple[list[Path], list[str]]:
@@ -161,7 +142,7 @@ def _draw(folder: Path, files: dict[str, Write]) -> tuple[list[Path], list[str]]
     paths, failed = [], []
     for name, write in files.items():
         try:
-            paths.append(_write(folder / name, write))
+            paths.append(write_whole(folder / name, write))
         except BoebotError:
             raise
         except Exception as error:  # whatever drawing meets: the run is worth more than its picture
