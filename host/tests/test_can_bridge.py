@@ -29,6 +29,7 @@ from boebot.robot import Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 from can_line import after, drive
+from command import boebot as boebot_command
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.unsanitized]
 
@@ -236,7 +237,7 @@ def test_multicast_stays_on_this_computer_and_brings_no_echo() -> None:
         assert board.error is None, "its own frames would be those of another board"
 
 
-def test_command_puts_a_board_on_a_bus_and_says_what_it_carried() -> None:
+def test_command_puts_a_board_on_a_bus_and_says_what_it_carried(capsys: pytest.CaptureFixture[str]) -> None:
     command = [sys.executable, "-m", "boebot", "bridge", "native", "--socketcand", "0", "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -246,6 +247,9 @@ def test_command_puts_a_board_on_a_bus_and_says_what_it_carried() -> None:
                 link = Link(transport)
                 link.open()
                 assert transport.bus_figures().errors == 0
+                link.close()
+            code, examined, _ = boebot_command(capsys, "doctor", url, "--json")
+            assert code == 0, examined
         finally:
             process.terminate()
         carried = json.loads(process.stdout.readline())

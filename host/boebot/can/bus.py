@@ -219,5 +219,5 @@ def _reason(error: Exception) -> str:
     """An exception in one line."""
     if isinstance(error, OSError) and error.errno and not str(error).count("\n"):
         return os.strerror(error.errno).lower()
-    text = str(error).strip().splitlines()
-    return text[0] if text else type(error).__name__
+    text = str(error).partition("Traceback")[0].strip().splitlines()  # of socketcand's client
+    return text[0].strip() if text else type(error).__name__

@@ -52,7 +52,8 @@ def doctor(
         str | None,
         typer.Argument(
             metavar="URL",
-            help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT; without it the only port that there is.",
+            help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT, can:BUS; "
+            "without it the only port that there is.",
         ),
     ] = None,
     robot: options.RobotName = "shieldbot",
@@ -127,7 +128,7 @@ def _which(ports: list[str]) -> str:
 def _port(url: str) -> Iterator[Check]:
     """A serial port of this computer: whether it is there, may be opened, and is free."""
     path = url.removeprefix("serial:").partition("?")[0]
-    if os.name != "posix" or not is_live(url) or "://" in path:
+    if os.name != "posix" or not is_live(url) or "://" in path or url.startswith("can:"):
         return
     if not os.access(path, os.F_OK):
         yield Check("port", "missing", path, f"is it plugged in? those there are: {', '.join(_ports()) or 'none'}")
