@@ -69,7 +69,7 @@ def foreign(start: object) -> list[str]:
     return [f"{one.way}: {one.kind}" for one in walk(start) if one.is_foreign]
 
 
-@pytest.mark.parametrize("robot", ["shieldbot", "shieldbot-quad", "arsim"])
+@pytest.mark.parametrize("robot", ["shieldbot", "shieldbot-quad", "shieldbot-turret", "arsim", "roller"])
 def test_e66_nothing_leads_from_a_robot_to_the_world(robot: str) -> None:
     """The boards are the native one and direct; what the AVR image runs on is driven as the native one is."""
     met: list[Met] = []

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot.brain import Brain
+from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
-from boebot.navigation import FollowField, LineMap, Potential, PotentialField
+from boebot.experiments.potential_fields import WEDGE
+from boebot.navigation import FollowField, Lattice, LineMap, LockDetector, Potential, PotentialField
 from boebot.navigation.potential_field import check_goal, of_walls, waypoints
 
 GOAL = Potential(-1.3, 1.3, -1.0, 3.0, 3.0)
@@ -76,3 +77,26 @@ def test_what_moves_is_gone_around(is_seen: bool) -> None:
     behavior = FollowField(goal=Potential(2.5, 0, -1, 2.5, 2.5), moving=moving)
     boebot.run(Brain([behavior, Odometry()]), robot="roller", arena="empty", seconds=30)
     assert behavior.arrived and (min(gaps) > 0.3) == is_seen
+
+
+def test_no_way_around_is_said_and_it_stands_until_there_is_one() -> None:
+    """A wall with a door that is closed on the map that the lock detector has, until its author gives it another."""
+    opened = LineMap.of("wedge")
+    door = [[(1.4, -1.8), (1.4, 1.8)]]
+    closed = LineMap.from_lines(np.concatenate((opened.segments, door)))
+    start, opens_s = (-1.0, 0.0, 0.0), 30.0
+    follow = FollowField(goal=Potential(2.0, 0.0, -1.0, 2.0, 2.0), hills=WEDGE, speed=0.2, turn_speed=0.1)
+    detector = LockDetector(field=follow, plan=closed, lattice=Lattice.of(closed, 0.15, 0.2), clearance=0.35)
+
+    class Author(CognitiveProcess):
+        def step(self, robot: boebot.Robot) -> None:
+            if robot.time > opens_s:
+                detector.plan, detector.lattice = opened, Lattice.of(opened, 0.15, 0.2)
+
+    brain = Brain([follow, detector, Author(), Odometry(start=start)])
+    result = boebot.run(brain, robot="roller", arena="wedge", pose=start, seconds=70)
+    assert result.true_pose is not None
+    before = (result.series.time > 20.0) & (result.series.time < opens_s)
+    assert set(result.shown.at(result.series.time[before]).texts["follow_field_state"]) == {"no path"}
+    assert np.ptp(result.true_pose.x[before]) < 1e-3 and len(detector.locked) == 1
+    assert follow.arrived and follow.state == "arrived"

@@ -31,11 +31,13 @@ FLAT = 1e-6  # 1/m; a field with less slope leads nowhere
 
 @dataclass(kw_only=True)
 class FollowField(SteeredBehavior):
-    """Drives down the field to its goal, and stops there; stops as well where the field is flat.
+    """Drives down the field to its goal, and stops there; stops as well where the field is flat, or where it is locked
+    and there is no way around.
 
     Attributes:
         arrived: it is at the goal.
         lost: the field is flat here.
+        no_path: it is locked, and its lock detector knows no way around; it stands until one is found.
         way: valleys that lead around something; each goes when the robot passes it.
     """
 
@@ -61,7 +63,7 @@ class FollowField(SteeredBehavior):
 
     def forget(self) -> None:
         super().forget()
-        self.arrived = self.lost = False
+        self.arrived = self.lost = self.no_path = False
         self.way: list[Potential] = []
 
     @property
@@ -76,15 +78,26 @@ class FollowField(SteeredBehavior):
         now = () if self.moving is None else self.moving(robot)
         slope = PotentialField.of([self.goal, *self.hills, *self.way, *now]).gradient(np.array((x, y)))
         self.lost = bool(np.hypot(*slope) < FLAT)
-        if self.arrived or self.lost:
+        if self.arrived or self.lost or self.no_path:
             self.stand(robot)
         else:
             self.steer(robot, math.atan2(-slope[1], -slope[0]) - heading)
+        robot.show(f"{self.name}_state", self.state)
+
+    @property
+    def state(self) -> str:
+        """ "arrived", "lost", "no path" or "on the way"; shown as `follow_field_state`."""
+        if self.arrived:
+            return "arrived"
+        if self.lost:
+            return "lost"
+        return "no path" if self.no_path else "on the way"
 
 
 @dataclass(kw_only=True)
 class LockDetector(CognitiveProcess):
-    """Notices that the robot comes no further though it has not arrived, and puts valleys on a way around.
+    """Notices that the robot comes no further though it has not arrived, and puts valleys on a way around. Where there
+    is none it says so to the behavior, which stands, and looks again after the same time.
 
     Attributes:
         locked: times (s) at which it noticed.
@@ -119,15 +132,17 @@ class LockDetector(CognitiveProcess):
         begun_s, first_x, first_y = self._seen[0]
         is_long = robot.time - begun_s >= self.time - 2 * self.step_time
         if is_long and not self.field.arrived and math.dist((x, y), (first_x, first_y)) < self.distance:
-            self.locked.append(robot.time)
+            if not self.field.no_path:
+                self.locked.append(robot.time)
             self._seen.clear()
-            self.field.way = self._around((x, y))
+            way = self._around((x, y))
+            self.field.way, self.field.no_path = way or [], way is None
 
-    def _around(self, here: tuple[float, float]) -> list[Potential]:
-        """Valleys at the corners of the shortest way from here to the goal; none: there is no way."""
+    def _around(self, here: tuple[float, float]) -> list[Potential] | None:
+        """Valleys at the corners of the shortest way from here to the goal; None: there is no way."""
         goal = self.field.goal
         start, target = (self.lattice.nearest_free(*place, within=1.0) for place in (here, (goal.x, goal.y)))
         if start is None or target is None:
-            return []
+            return None
         path = [self.lattice.centre(cell) for cell in search(self.lattice, start, target).path]
-        return waypoints(tightened(path, self.plan, self.clearance)) if path else []
+        return waypoints(tightened(path, self.plan, self.clearance)) if path else None
