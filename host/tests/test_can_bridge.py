@@ -250,6 +250,9 @@ def test_command_puts_a_board_on_a_bus_and_says_what_it_carried(capsys: pytest.C
                 link.close()
             code, examined, _ = boebot_command(capsys, "doctor", url, "--json")
             assert code == 0, examined
+            code, told, _ = boebot_command(capsys, "link", "--on", url, "--once", "--json")
+            assert code == 0 and 0.14 < json.loads(told)["bus_load"] < 0.25, "telemetry alone takes 16 %"
+            assert json.loads(told)["bus_error_frames"] == 0
         finally:
             process.terminate()
         carried = json.loads(process.stdout.readline())
