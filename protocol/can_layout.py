@@ -1,7 +1,7 @@
 """How messages go over CAN: which bytes stand in which frame (PROTOCOL.md, "On CAN").
 
-A CAN frame carries at most 8 bytes. Most bytes are the payload's own, in its order; no number is split. What the UART's
-frame has around the payload, CAN has not, so some bytes are added:
+A CAN frame carries at most 8 bytes. They are the payload's, in its order, without a number split between two frames, and
+some that are added in place of what a frame on the serial line has around its payload:
 
     message of one frame          fields, session
     set-point                     fields, session, sequence; `time_to_live` and `answers_tick` as one byte each

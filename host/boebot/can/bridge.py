@@ -18,7 +18,7 @@ from boebot.can.translator import BoardEnd
 from boebot.errors import BoardError
 from boebot.link.transport import Transport
 
-STEP_S = 0.0004  # of waiting for the board, between two looks at the bus: so much a frame to it may be late
+STEP_S = 0.0004  # wait for the board between two looks at the bus: a frame to it is late by as much at most
 _HELLO_LIMIT_S = 4.0  # a boot loader may wait first
 _LAST_WORDS_S = 0.02
 
@@ -78,7 +78,7 @@ class Bridge:
             self.stop()
 
     def step(self) -> None:
-        """Carries what there is."""
+        """Carries what has come, both ways."""
         data = self.transport.read(STEP_S)
         if data:
             self._heard |= bool(frames := self._end.from_board(data))

@@ -26,8 +26,8 @@ from boebot.link.ports.tcp import TIMEOUT_S, why_not
 
 _ERR_ACK = 0x20  # error frame of SocketCAN: nobody acknowledged (linux/can/error.h)
 _ERR_BUS_OFF = 0x40
-_AT_ONCE = 1000  # frames of one look, so that a flood lets the board be heard
-_ECHOES = 4096  # own frames that udp_multicast has still to bring back, at most
+_AT_ONCE = 1000  # most frames of one look: a flood must not keep the board unheard
+_ECHOES = 4096  # most own frames to be recognised when udp_multicast brings them back
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "udp_multicast": {"hop_limit": 0},  # they stay on this computer
     "socketcand": {"host": "localhost", "tcp_tune": True},

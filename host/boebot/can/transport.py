@@ -13,7 +13,7 @@ from boebot.can.translator import HostEnd
 from boebot.errors import BoardError
 from boebot.link.transport import BusFigures
 
-_SLICE_S = 0.05  # as often the end of a bus is noticed
+_SLICE_S = 0.05  # the end of a bus is noticed within this time
 
 
 def open_can(url: str) -> CanTransport:
