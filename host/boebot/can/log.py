@@ -192,13 +192,14 @@ def _chosen(path: Path, readers: dict[int, _LogReader], node: int | None) -> _Lo
     hello = readers[node].hello
     assert hello is not None
     if not mismatch.speaks_alike(hello):
-        raise BoebotError(
-            f"the board in {path} speaks protocol version {mismatch.version_name(hello.protocol_version)} with message "
-            f"schema {hello.schema_hash:08x}; expected {mismatch.version_name()} and {messages.SCHEMA_HASH:08x}"
-        )
+        raise mismatch.refusal(hello, str(path), _no_description)
     if not readers[node].commands:
         raise BoebotError(f"{path} has no set-points for node {node}: nobody drove the robot")
     return readers[node]
+
+
+def _no_description(_: int) -> messages.Description:
+    raise BoebotError("a log answers nothing")
 
 
 def _robot(path: Path, reader: _LogReader, robot: str | None) -> RobotDescription:
@@ -291,7 +292,7 @@ class _LogReader:
             return
         point: Any = messages.MESSAGES[came.id].unpack(came.payload)
         newest = self._telemetry[-1][1].tick
-        tick = newest - ((newest - point.answers_tick) & 0xFF)
+        tick = newest - 128 + ((point.answers_tick - newest + 128) & 0xFF)  # the nearest one with that low byte
         kind = _SET_POINTS.get(came.id)
         signals = (0.0, 0.0) if kind is None else (point.left / _PER_UNIT, point.right / _PER_UNIT)
         if not self.commands or tick > self.commands[-1][0]:

@@ -1,0 +1,341 @@
+"""A run's CAN frames in logs that stock tools open, and logs of stock tools as runs: `boebot report --can`,
+`boebot replay LOG`. python-can and cantools judge."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import can
+import cantools.database
+import pytest
+from test_can_bridge import bridged
+
+import boebot as library
+from boebot.can.frames import CanFrame
+from boebot.can.log import KINDS, Sent, frames_of, save_log
+from boebot.can.socketcand_server import SocketcandBus
+from boebot.errors import BoebotError
+from boebot.link.messages import Telemetry
+from boebot.record.result import RunResult
+from command import boebot, heed_signals
+
+DATABASE = cantools.database.load_file(Path(__file__).resolve().parents[2] / "protocol" / "boebot.dbc")
+HELLO = range(0x621, 0x631, 2)
+NODE = 0xE0  # bits of an identifier
+OPEN, SET_POINT, TELEMETRY = 0x620, 0x120, 0x321
+ISO_TP_TO_BOARD, ISO_TP_TO_HOST = 0x53E, 0x53F
+
+
+@pytest.fixture(scope="module")
+def run() -> RunResult:
+    """Two seconds on the native board."""
+    return library.run("wander", seconds=2, seed=5)
+
+
+def stock(path: Path) -> list[can.Message]:
+    """A log as python-can reads it."""
+    with can.LogReader(path) as log:
+        return list(log)
+
+
+def write(path: Path, frames: Iterable[CanFrame]) -> Path:
+    """A log as python-can writes it, a frame each millisecond."""
+    with can.Logger(path) as log:
+        for number, frame in enumerate(frames):
+            log.on_message_received(
+                can.Message(number / 1000, arbitration_id=frame.identifier, data=frame.data, is_extended_id=False)
+            )
+    return path
+
+
+def frames(sent: Iterable[Sent]) -> list[CanFrame]:
+    return [frame for _, frame in sent]
+
+
+# ---- a run as a log --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def logs(run: RunResult, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[can.Message]]:
+    """The same run in each format, as python-can reads it."""
+    folder = tmp_path_factory.mktemp("logs")
+    return {kind: stock(save_log(run, folder / f"can.{kind}")) for kind in KINDS}
+
+
+def test_stock_tools_decode_what_the_run_has_recorded(run: RunResult, logs: dict[str, list[can.Message]]) -> None:
+    telemetry: dict[int, dict[str, Any]] = {}
+    set_points = []
+    for message in logs["blf"]:
+        if message.arbitration_id in (ISO_TP_TO_BOARD, ISO_TP_TO_HOST):
+            continue  # no message of a database
+        signals = DATABASE.decode_message(message.arbitration_id, message.data, decode_choices=False)
+        if message.arbitration_id == TELEMETRY:
+            newest = telemetry[signals["tick"]] = {}
+        elif 0x320 <= message.arbitration_id < 0x340:
+            newest |= signals
+        elif message.arbitration_id == SET_POINT:
+            set_points.append((signals["left"], signals["right"]))
+    recorded = [Telemetry.unpack(payload) for payload in run.record.telemetry]
+    assert len(recorded) == 201 and max(seen.ping_echo for seen in recorded) > 0
+    for seen in recorded:
+        decoded = telemetry[seen.tick]
+        assert (decoded["tick"], decoded["ping_echo"]) == (seen.tick & 0xFF, seen.ping_echo)
+        pulses = decoded["pulse_left"], decoded["pulse_right"]
+        assert pulses == (seen.pulse_left / 16, seen.pulse_right / 16), "counts of the 16 MHz clock, in µs"
+    wanted = [command[2:] for command in run.record.steps]
+    assert set_points == [pytest.approx(command, abs=0.00005) for command in wanted] and len(wanted) == 40
+
+
+def test_formats_hold_the_same_frames(run: RunResult, logs: dict[str, list[can.Message]]) -> None:
+    one, *others = ([(m.arbitration_id, bytes(m.data), m.is_rx) for m in logs[kind]] for kind in KINDS)
+    assert others == [one, one] and not any(message.is_extended_id for message in logs["asc"])
+    assert all(is_rx == identifier % 2 for identifier, _, is_rx in one), "the host receives odd ones"
+    for messages in logs.values():
+        times = [message.timestamp for message in messages]
+        assert times == sorted(times) and times == pytest.approx([time_s for time_s, _ in frames_of(run)], abs=2e-6)
+
+
+def test_identity_goes_by_iso_tp_with_its_flow_control(run: RunResult, logs: dict[str, list[can.Message]]) -> None:
+    assert run.identity is not None
+    asked, first, go_on, *further = [
+        bytes(m.data) for m in logs["log"] if m.arbitration_id in (ISO_TP_TO_BOARD, ISO_TP_TO_HOST)
+    ]
+    wanted = b"\x81" + run.identity.pack()
+    assert asked == b"\x01\x02", "identify, as a single frame of one byte"
+    assert first == bytes((0x10, len(wanted))) + wanted[:6]
+    assert go_on == b"\x30\x00\x00", "clear to send, all at once, without a pause"
+    assert [frame[0] for frame in further] == [0x20 + number for number in range(1, len(further) + 1)]
+    assert wanted[6:] == b"".join(frame[1:] for frame in further)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs and reports leave no pictures and pages: those take their time, and other tests look at them."""
+    monkeypatch.setattr("boebot.view._draw", lambda folder, files: ([], []))
+
+
+def together(folder: Path, *robots: str) -> str:
+    """The folder of a run of these robots."""
+    library.run_together([library.Member(robot=robot) for robot in robots], "empty", seconds=0.1, out=folder)
+    return str(folder)
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_each_robot_with_a_board_has_a_log(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    mixed = together(tmp_path / "mixed", "arsim", "shieldbot", "boebot")
+    code, out, err = boebot(capsys, "report", mixed, "--can", "asc", "--json")
+    assert (code, err) == (0, "")
+    logs = [Path(name) for name in json.loads(out)["files"] if "can" in Path(name).name]
+    assert (
+        logs == [Path(mixed, f"robot-{number}", "can.asc") for number in (2, 3)] == sorted(Path(mixed).rglob("can.*"))
+    )
+    for number, log in enumerate(logs, 2):
+        assert {message.arbitration_id >> 5 & 7 for message in stock(log)} == {number}, "each is a node"
+
+
+@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.parametrize(
+    ("robots", "sentence"),
+    [
+        (["arsim"], "robot 'arsim' has no line in this run, so no CAN frames"),
+        (["arsim", "arsim"], "no robot of the run has a board, so there are no CAN frames"),
+        (["shieldbot"], "the run's files cannot be written to {}: Is a directory"),
+    ],
+)
+def test_where_no_log_can_be_written_figures_are_printed_all_the_same(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, robots: list[str], sentence: str
+) -> None:
+    folder = together(tmp_path / "run", *robots)
+    Path(folder, "can.blf").mkdir()
+    code, out, err = boebot(capsys, "report", folder, "--can", "blf")
+    assert (code, err) == (1, f"boebot: {sentence.format(folder)}\n") and robots[0] in out
+
+
+def test_log_is_whole_or_not_there(run: RunResult, tmp_path: Path) -> None:
+    for kind in KINDS:
+        (tmp_path / f".part-can.{kind}").symlink_to("/dev/full")
+        with pytest.raises(BoebotError) as failed:
+            save_log(run, tmp_path / f"can.{kind}")
+        assert str(failed.value) == f"the run's files cannot be written to {tmp_path}: No space left on device"
+    assert not list(tmp_path.iterdir())
+
+
+# ---- a log as a run --------------------------------------------------------------------------------------------------
+
+
+def by_way(log: Path) -> list[list[tuple[int, bytes]]]:
+    """The frames of a log from the host's first `open` on, with identifiers of node 1: those to the board, those to the
+    host, and the long messages, which wait for each other. The board's hellos are without their `round`: it counts
+    those before a host came, too."""
+    found = [(message.arbitration_id & ~NODE | 0x20, bytes(message.data)) for message in stock(log)]
+    begin = next(place for place, (identifier, _) in enumerate(found) if identifier == OPEN)
+    ways: list[list[tuple[int, bytes]]] = [[], [], []]
+    for identifier, data in found[begin:]:
+        way = 2 if identifier in (ISO_TP_TO_BOARD, ISO_TP_TO_HOST) else identifier % 2
+        ways[way].append((identifier, data[identifier in HELLO :]))
+    return ways
+
+
+@pytest.mark.wall_clock
+@pytest.mark.unsanitized
+def test_log_of_a_stock_tool_drives_a_brain(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A run over CAN that python-can's logger follows. It sees the frames that the run's record gives, in
+    their order, from the handshake on until the host has left."""
+    log = tmp_path / "bus.blf"
+    with bridged(node=3) as board:
+        assert isinstance(board.bus, SocketcandBus)
+        bus = ["-i", "socketcand", "-c", "can0", "--bus-kwargs", "host=localhost", f"port={board.bus.port}"]
+        with subprocess.Popen(
+            [sys.executable, "-u", "-m", "can.logger", "-f", str(log), *bus],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,  # its remarks on frames that come in parts
+            text=True,
+            preexec_fn=heed_signals,
+        ) as logger:
+            try:
+                assert logger.stdout is not None
+                assert any(line.startswith("Can Logger (Started") for line in logger.stdout)
+                result = library.run("wander", on=board.url, seconds=0.6)
+                time.sleep(0.3)  # for the logger
+            finally:
+                logger.send_signal(signal.SIGINT)
+    own = save_log(result, tmp_path / "own.log")
+    for path in (log, own):
+        code, out, err = boebot(capsys, "replay", str(path), "--brain", "wander")
+        assert (code, out, err) == (0, f"all {result.steps} commands are the same\n", "")
+    (to_board, to_host, long), made = by_way(log), by_way(own)
+    assert [to_board, to_host[: len(made[1])], long] == made, "to a host that has left the board speaks for a while"
+    assert len(made[0]) > 10
+
+
+def test_first_command_that_differs_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    brain, other = tmp_path / "brain.py", tmp_path / "other.py"
+    brain.write_text("def step(robot):\n    robot.drive(robot.ping.age, 0.5)\n")
+    other.write_text("def step(robot):\n    robot.drive(robot.ping.age, 0.5 if robot.time < 0.29 else 0.25)\n")
+    result = library.run(brain, seconds=0.5)
+    log = str(save_log(result, tmp_path / "can.asc"))
+    assert boebot(capsys, "replay", log, "--brain", str(brain)) == (0, "all 10 commands are the same\n", "")
+    code, out, err = boebot(capsys, "replay", log, "--brain", str(other))
+    index, *command = result.record.steps[6]
+    tick, left = Telemetry.unpack(result.record.telemetry[index]).tick, round(command[1], 4)
+    assert (code, err) == (1, "") and " ".join(out.split()) == (
+        f"step 6 (tick {tick}, 0.30 s) differs: Command(kind='signal', left={left}, right=0.5) in the run, "
+        f"Command(kind='signal', left={left}, right=0.25) in the replay"
+    )
+
+
+def test_log_says_what_the_board_was_set_to(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The robot's file is not needed where the board's parameters say what is in it."""
+    (tmp_path / "narrow.toml").write_text('extends = "shieldbot"\n[body]\ntrack_width_m = 0.09\n')
+    brain = tmp_path / "brain.py"
+    brain.write_text("def step(robot):\n    robot.drive(robot.dimensions.track_width, 0.0)\n")
+    log = str(save_log(library.run(brain, robot=tmp_path / "narrow.toml", seconds=0.2), tmp_path / "can.log"))
+    assert boebot(capsys, "replay", log, "--brain", str(brain))[:2] == (0, "all 4 commands are the same\n")
+
+
+Change = Callable[[list[CanFrame]], list[CanFrame]]
+
+
+def without(*identifiers: int) -> Change:
+    return lambda frames: [frame for frame in frames if frame.identifier not in identifiers]
+
+
+def with_data(identifier: int, place: int, data: bytes) -> Change:
+    """Other bytes from a place on in each frame of that identifier."""
+    return lambda frames: [
+        frame._replace(data=frame.data[:place] + data + frame.data[place + len(data) :])
+        if frame.identifier == identifier
+        else frame
+        for frame in frames
+    ]
+
+
+def as_node_2(frames: list[CanFrame]) -> list[CanFrame]:
+    return [frame._replace(identifier=frame.identifier + 0x20) for frame in frames]
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "sentence"),
+    [
+        (without(*HELLO), "", "{} has no hello of a board; expected a log from before the run began"),
+        (without(SET_POINT), "", "{} has no set-points for node 1: nobody drove the robot"),
+        (lambda frames: frames + as_node_2(frames), "", "{} has boards of several nodes; expected --node 1 or 2"),
+        (as_node_2, "--node 5", "{} has no hello of a board of node 5; expected 2"),
+        (as_node_2, "--robot 2", "{} is a log of CAN frames; expected --node in place of --robot"),
+        (
+            with_data(0x62B, 2, b"nobody"),
+            "",
+            "the board in {} says that it is 'nobodybot', which is no bundled robot; expected --kind",
+        ),
+        (
+            with_data(0x621, 2, b"\x20"),
+            "",
+            "the board at {} speaks protocol version 2.0, this kit speaks version 3.1; flash the firmware that came "
+            "with this kit",
+        ),
+        (
+            with_data(0x625, 2, bytes(2)),
+            "",
+            "the board at {} says that it makes 0 control ticks in a second; expected more",
+        ),
+        (
+            lambda frames: [frame for frame in frames if (frame.identifier, frame.data[0]) != (0x323, 30)],
+            "",
+            "{} lacks the telemetry of tick 30, which a set-point answers",
+        ),
+    ],
+)
+def test_log_that_is_no_run_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, run: RunResult, change: Change, options: str, sentence: str
+) -> None:
+    log = write(tmp_path / "can.log", change(frames(frames_of(run))))
+    code, out, err = boebot(capsys, "replay", str(log), "--brain", "wander", *options.split())
+    assert (code, out, err) == (2, "", f"boebot: {sentence.format(log)}\n")
+
+
+def test_log_ends_with_the_first_run(capsys: pytest.CaptureFixture[str], tmp_path: Path, run: RunResult) -> None:
+    """Others may drive the robot afterwards; and another one, of a board that has been reset meanwhile, may follow."""
+    again = frames(frames_of(library.run("wander", seconds=0.5, seed=6)))
+    log = write(tmp_path / "can.log", frames(frames_of(run)) + again)
+    assert boebot(capsys, "replay", str(log), "--brain", "wander", "--seed", "5")[1] == "all 40 commands are the same\n"
+
+
+@pytest.mark.parametrize("kind", ["blf", "log"])
+def test_log_that_breaks_off_is_replayed_up_to_there(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, run: RunResult, kind: str
+) -> None:
+    log = save_log(run, tmp_path / f"can.{kind}")
+    data = log.read_bytes()
+    log.write_bytes(data[: data.index(b"\n", len(data) // 2) + 9])
+    code, out, err = boebot(capsys, "replay", str(log), "--brain", "wander", "--seed", "5")
+    assert code == 0 and re.fullmatch(r"all (1|2)\d commands are the same\n", out)
+    assert re.fullmatch(rf"boebot: {re.escape(str(log))} breaks off after [\d,]+ frames: .+\n", err)
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "sentence"),
+    [
+        ("text.asc", b"Hello, world\n" * 9, "{} has no hello of a board; expected a log from before the run began"),
+        ("picture.asc", b"\x89PNG\r\n", "{} is no log of CAN frames: 'utf-8' codec can't decode byte 0x89 "),
+        ("text.log", b"Hello, world\n", "{} is no log of CAN frames: not enough values to unpack "),
+        ("text.blf", b"Hello, world\n" * 99, "{} is no log of CAN frames: Unexpected file format"),
+        ("empty.blf", b"", "{} is no log of CAN frames: unpack requires a buffer of "),
+        ("absent.log", None, "{} cannot be read: no such file or directory"),
+    ],
+)
+def test_file_that_is_no_log_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, data: bytes | None, sentence: str
+) -> None:
+    file = tmp_path / name
+    if data is not None:
+        file.write_bytes(data)
+    code, out, err = boebot(capsys, "replay", str(file), "--brain", "wander")
+    assert (code, out, err.count("\n")) == (2, "", 1) and err.startswith(f"boebot: {sentence.format(file)}")
