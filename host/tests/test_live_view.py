@@ -22,7 +22,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
+from boebot.record.reading import read_run
+from boebot.record.result import RunResult
 from boebot.view.page_data import FORMAT
+from boebot.view.replay import content
 from command import heed_signals
 
 LIMIT_S = 30.0
@@ -208,6 +211,10 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> N
     code, out, error = run.end()
     assert code == 0, error
     assert json.loads(out)["touched"] == 3  # lifted, a parameter, by hand
+    watched = read_run(folder)
+    assert isinstance(watched, RunResult)
+    shown = [text for _, kind, text in content([watched])["runs"][0]["rows"]["events"] if kind == "intervention"]
+    assert shown[:2] == ["put at 0.00, 0.00 m, 57°", "wander.forward = 0.3"] and "driven by hand" in shown[2]
     for command in (["run", "--again", str(folder)], ["replay", str(folder), "--brain", "demo"]):
         again = subprocess.run([sys.executable, "-m", "boebot", *command], capture_output=True, text=True, check=False)
         assert again.returncode == 0, again.stdout + again.stderr

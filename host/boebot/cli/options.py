@@ -86,6 +86,7 @@ def _speed(given: str | float) -> float:
 View = Annotated[
     bool, typer.Option("--view", help="Show the run in the browser while it goes on, where people may interfere.")
 ]
+ServedView = Annotated[bool, typer.Option("--view", help="Show the robot in the browser meanwhile.")]
 Speed = Annotated[
     float | None,
     typer.Option(

@@ -27,7 +27,7 @@ def serve(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
-    view: options.View = False,
+    view: options.ServedView = False,
     view_port: options.ViewPort = None,
     json: options.Json = False,
 ) -> None:

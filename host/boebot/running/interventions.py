@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
@@ -22,27 +22,22 @@ if TYPE_CHECKING:
     from boebot.running.driver import Driver, Task
 
 STREAM = "intervention"  # of the record
+SLIDE_S = 1.0  # of the run; a slider that is dragged gives new values all the time
 
 
 class Intervention(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower):
     """One of those below, of one robot."""
 
-    COUNTS: ClassVar[bool] = True
-    """It is a deed of its own: a run's result counts it."""
-
 
 class Hand(Intervention, frozen=True):
     """The robot is driven by these motor signals (-1 to 1), whatever its brain says, until `Release`."""
 
-    COUNTS = False  # each time by itself; that the robot is taken over is counted once
     left: float
     right: float
 
 
 class Release(Intervention, frozen=True):
     """Its brain drives it again."""
-
-    COUNTS = False
 
 
 class Stop(Intervention, frozen=True):
@@ -112,15 +107,20 @@ class Hands:
         driver, task: of the robot.
         onlooker: who does it.
         held: the motor signals that it is driven by; None: its brain drives it.
-        count: of interventions so far, as a result counts them.
+        count: of interventions so far, as a result counts them (`touched`).
     """
 
     def __init__(self, driver: Driver, task: Task, number: int, onlooker: Onlooker) -> None:
         """`number`: of the robot, from 0."""
         self.driver, self.task = driver, task
         self.held: Hand | None = None
-        self.count = 0
+        self._tally = Tally()
         self.onlooker, self._number = onlooker, number
+
+    @property
+    def count(self) -> int:
+        """See above."""
+        return self._tally.count
 
     def before_step(self, time_s: float) -> None:
         """What is due."""
@@ -130,6 +130,7 @@ class Hands:
             except BoebotError as error:
                 self.onlooker.refuse(self._number, error)
             else:
+                self._tally.add(time_s, one)
                 self.task.record.append(STREAM, time_s, msgspec.json.encode(one))
 
     def after_step(self) -> None:
@@ -139,7 +140,6 @@ class Hands:
 
     def _carry_out(self, one: Deed) -> None:
         robot = self.driver.robot
-        taken_over = self.held is None and isinstance(one, Hand)
         match one:
             case Hand():
                 self.held = one
@@ -155,7 +155,6 @@ class Hands:
                 self.driver.session.place_shape(index, x, y, heading)
             case Parameter(name, value):
                 set_parameter(self.task.brain, name, value)
-        self.count += one.COUNTS or taken_over
 
 
 class Repeated:
@@ -206,10 +205,34 @@ def in_words(data: bytes) -> str:
 
 
 def touched(record: Record) -> int:
-    """How often a person has interfered with a robot's run: driving by hand counts once, until its brain drives it
-    again."""
-    count, by_hand = 0, False
-    for _, one in interventions(record):
-        count += one.COUNTS or (isinstance(one, Hand) and not by_hand)
-        by_hand = isinstance(one, Hand) or (by_hand and not isinstance(one, Release))
-    return count
+    """How often a person has interfered with a robot's run, as `Tally` counts."""
+    tally = Tally()
+    for time_s, one in interventions(record):
+        tally.add(time_s, one)
+    return tally.count
+
+
+class Tally:
+    """Counts interventions: driving by hand once, until the brain drives again; a parameter that is moved on within
+    `SLIDE_S` of the run, and nothing else in between, once.
+
+    Attributes:
+        count: so far.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._by_hand = False
+        self._slid: tuple[str, float] = "", 0.0  # the parameter that was moved last, and when
+
+    def add(self, time_s: float, one: Deed) -> None:
+        """It has been carried out before the step at that time of the run."""
+        name, last_s = self._slid
+        self._slid = (one.name, time_s) if isinstance(one, Parameter) else ("", 0.0)
+        if isinstance(one, Hand):
+            self.count += not self._by_hand
+            self._by_hand = True
+        elif isinstance(one, Release):
+            self._by_hand = False
+        else:
+            self.count += not (isinstance(one, Parameter) and one.name == name and time_s - last_s < SLIDE_S)

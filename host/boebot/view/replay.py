@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from boebot.running.interventions import STREAM, in_words
 from boebot.view import page_data, scene, web_page
 from boebot.view.utility_panel import shown_cognitive
 
@@ -71,6 +72,11 @@ def run_data(result: RunResult, view: scene.View, number: int = 1, room: int | N
     return about | {"rows": rows}
 
 
+def _deeds(result: RunResult) -> list[page_data.Event]:
+    """What people did to the robot meanwhile."""
+    return [(time_s, "intervention", in_words(data)) for time_s, data in result.record.rows(STREAM)]
+
+
 def stretch(result: RunResult, view: scene.View) -> page_data.Stretch:
     """The whole run."""
     few = result.overview
@@ -86,6 +92,6 @@ def stretch(result: RunResult, view: scene.View) -> page_data.Stretch:
         swept=view.swept,
         true_contacts=view.true_contacts,
         touches=view.touches,
-        events=page_data.events(few.series, few.contact, result.whiskers),
+        events=sorted(page_data.events(few.series, few.contact, result.whiskers) + _deeds(result)),
         pins=page_data.pins(result.record, result.robot, result.clock_offset),
     )

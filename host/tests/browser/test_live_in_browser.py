@@ -186,13 +186,20 @@ def test_driving_by_keys_arrows_and_gamepad(page: Page) -> None:
     wait_for(page, f"{SIGNALS}.every(v => Math.abs(v - 0.6) < 0.02)")
     page.keyboard.up("Enter")
     page.evaluate(
-        """() => { window.stick = [0, -1];
-          navigator.getGamepads = () => [{ connected: true, axes: stick, buttons: [] }];
+        """() => { window.stick = [0, -1]; window.second = { pressed: false };
+          navigator.getGamepads = () => [{ connected: true, axes: stick, buttons: [{}, second] }];
           dispatchEvent(new Event('gamepadconnected')); }"""
     )
     wait_for(page, f"{SIGNALS}.every(v => Math.abs(v - 0.6) < 0.02)")
-    page.evaluate("window.stick = [0, 0]")
+    touched = page.evaluate("state.touched")
+    page.evaluate("second.pressed = true")
+    wait_for(page, "$('driver').classList.contains('alerted')")
+    page.wait_for_timeout(300)  # held
+    page.evaluate("second.pressed = false; window.stick = [0, 0]")
     wait_for(page, f"{SIGNALS}.every(v => v === 0)")
+    assert page.evaluate("state.touched") == touched + 1
+    page.click("#arm")
+    wait_for(page, "!$('driver').classList.contains('alerted')")
     page.click("#release")
     wait_for(page, "$('driver').textContent === 'Its brain drives.'")
     assert page.is_disabled("#release")
@@ -200,9 +207,13 @@ def test_driving_by_keys_arrows_and_gamepad(page: Page) -> None:
 
 def test_space_stops_whatever_has_the_focus(page: Page) -> None:
     page.focus("#pause")
-    page.keyboard.press(" ")
+    touched = page.evaluate("state.touched")
+    for _ in range(5):  # held: a keyboard says it again and again
+        page.keyboard.down(" ")
+    page.keyboard.up(" ")
     wait_for(page, "$('driver').classList.contains('alerted')")
     assert not page.evaluate("state.paused"), "the button was not pressed"
+    assert page.evaluate("state.touched") == touched + 1
     wait_for(page, f"{SIGNALS}.every(v => v === 0)")
     page.click("#arm")
     wait_for(page, "!$('driver').classList.contains('alerted')")

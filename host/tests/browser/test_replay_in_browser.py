@@ -192,6 +192,9 @@ def test_events_one_after_the_other(together: tuple[TogetherResult, str], open_p
         assert page.evaluate("now") == pytest.approx(switch.time, abs=1e-3)
         assert page.inner_text("#event").startswith(f"{switch.time:.2f} s: switch to {switch.on}: ")
         assert page.inner_text("#behavior") == switch.on
+        step = int(np.searchsorted(record.time, switch.time - 1e-6))
+        utility = f"{record.utility_of(switch.on)[step]:+.2f}".replace("-", "−")
+        assert page.inner_text(".utility.active").split() == [switch.on, utility]
     page.click("#before")
     assert page.evaluate("now") == pytest.approx(switches[0].time, abs=1e-3)
 

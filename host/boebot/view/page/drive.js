@@ -17,6 +17,7 @@ const KEYS = {
 const held = new Set(); // of "ahead", "left", "back", "right"
 let handTimer = null;
 let pads = false;
+let padStops = false; // its button for that is down
 
 // Motor signals for what is held, by keys or arrows or else by the gamepad.
 function wanted() {
@@ -34,10 +35,10 @@ function wanted() {
 function padSticks() {
   const pad = pads && [...navigator.getGamepads()].find(one => one && one.connected);
   if (!pad) return [0, 0];
-  if (pad.buttons[1]?.pressed) {
-    stopRobot();
-    return [0, 0];
-  }
+  const stops = !!pad.buttons[1]?.pressed;
+  if (stops && !padStops) stopRobot(); // once for each time that it is pressed
+  padStops = stops;
+  if (stops) return [0, 0];
   const stick = v => (Math.abs(v) < DEAD_ZONE ? 0 : -v);
   return [stick(pad.axes[1]), stick(pad.axes[0])];
 }
@@ -143,7 +144,7 @@ function makeDrive() {
         onclick: () => send({ type: "arm", robot: runs.indexOf(run) }),
       }),
     ),
-    element("p", { className: "hint", textContent: "W A S D or arrow keys, or a gamepad's stick. Space stops." }),
+    element("p", { className: "hint", textContent: "W A S D, arrow keys or a gamepad drive; space stops." }),
   );
 }
 function tellDrive() {
@@ -170,6 +171,7 @@ function tellDrive() {
 // ---- keys: true, if it was one of these ----
 function driveKey(e) {
   if (e.key === " ") {
+    if (e.repeat) return can.has("hand") || can.has("pause"); // said once, however long it is held
     if (can.has("hand")) {
       stopRobot();
       return true;

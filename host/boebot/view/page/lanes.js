@@ -22,7 +22,7 @@ function makeLanes() {
     lanes.push(flagsLane("IR", 4, 8, "charger", ["left", "right"]));
   if (run.has("whisker_left") || run.has("whisker_right"))
     lanes.push(flagsLane("whiskers", 1, 2, "touch", ["left", "right"]));
-  if (run.known) lanes.push(flagsLane("true contact", CONTACT_BIT, 0, "estimate", ["contact"]));
+  if (run.known) lanes.push(flagsLane("true contact", CONTACT_BIT, 0, "contact", ["contact"]));
   if (run.load)
     lanes.push({
       name: "load of tick",

@@ -1,6 +1,6 @@
 // The panels beside the arena: signals of the chosen robot at the moment that is shown, its figures, the legend.
 
-let cells = { readings: [], shown: [] }; // what is written anew for each moment
+let cells = { readings: [], shown: [], utilities: [] }; // what is written anew for each moment
 let namesShown = -1; // for how many names the panels were made: a live run may show new ones
 
 function hide(id, is) {
@@ -23,6 +23,7 @@ function makePanels() {
     !["whisker_left", "whisker_right", "infrared_left", "infrared_right", "ping"].some(name => run.has(name)),
   );
   hide("mind", !run.mind);
+  makeUtilities();
   makeFigures();
   makeReadings();
   makeRobots();
@@ -54,6 +55,20 @@ function makeReadings() {
     it.insertCell().textContent = reading.name;
     return [it.insertCell(), it.insertCell()];
   });
+}
+// Of each process its utility, in the colour of its line below.
+const processes = () => (run.mind ? [...run.mind.behaviors, ...run.mind.cognitive] : []);
+function makeUtilities() {
+  cells.utilities = processes().map(({ name, colour }) => {
+    const fill = element("i"),
+      value = element("span", { className: "value" }),
+      label = element("span", { textContent: name, title: name });
+    label.style.color = colour ? inText(colour) : colours.faint;
+    fill.style.background = colour ? readable(colour) : colours.faint;
+    const whole = element("div", { className: "utility" }, label, element("div", { className: "bar" }, fill), value);
+    return { whole, fill, value };
+  });
+  $("utilities").replaceChildren(...cells.utilities.map(({ whole }) => whole));
 }
 function makeFigures() {
   const { table } = run,
@@ -103,6 +118,7 @@ function makeLegend() {
   if (run.has("whisker_left") || run.has("whisker_right"))
     entries.push([swatch("touch", colours.touch), "whisker touch"]);
   if (run.mind) for (const one of run.mind.behaviors) entries.push([swatch("block", readable(one.colour)), one.name]);
+  if (run.mind && run.mind.cognitive.length) entries.push([swatch("line", colours.faint), "cognitive process"]);
   for (const kind of ["switch", "fault", "lost", "reset", "intervention"])
     if (run.events.some(event => event.kind === kind))
       entries.push([swatch(kind, eventColour({ kind })), EVENT_KINDS[kind]]);
@@ -132,8 +148,7 @@ function swatch(form, colour) {
 }
 
 // ---- one moment ----
-function bar(name, value) {
-  const style = $(name + "Bar").style;
+function bar({ style }, value) {
   style.left = (value < 0 ? 50 + 50 * Math.max(-1, value) : 50) + "%";
   style.width = Math.min(50, Math.abs(50 * value)) + "%";
 }
@@ -151,7 +166,7 @@ function tellMoment() {
     ["right", run.right, 1],
   ].forEach(([name, column, k]) => {
     const pulse = run.pulses ? run.pulses[k].values[i] : NaN;
-    bar(name, column.values[i]);
+    bar($(name + "Bar"), column.values[i]);
     say(name + "Text", signed(column.values[i]) + (pulse > 0 ? "   " + pulse.toFixed(0) + " µs" : ""));
   });
   say("state", stateText(bits));
@@ -185,6 +200,13 @@ function tellMind() {
     behavior = mind.behaviors[mind.motor.values[step]]; // times are rounded to float32
   say("behavior", behavior.name);
   $("behavior").style.color = inText(behavior.colour);
+  processes().forEach((process, k) => {
+    const { whole, fill, value } = cells.utilities[k],
+      utility = process.utility.values[step] ?? NaN;
+    whole.classList.toggle("active", process === behavior);
+    bar(fill, utility || 0);
+    value.textContent = Number.isNaN(utility) ? "–" : signed(utility);
+  });
   if (!mind.switches.length) return;
   const [since, , reason] =
     mind.switches[

@@ -79,7 +79,7 @@ function bodyPath(c, robot) {
   c.closePath();
 }
 function drawBody(c, robot, bits, colour) {
-  const edge = bits & CONTACT_BIT ? colours.estimate : colour,
+  const edge = bits & CONTACT_BIT ? colours.contact : colour,
     front = robot.front;
   bodyPath(c, robot);
   c.fillStyle = colours.body;
