@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import base64
 import threading
 import time
 from collections import deque
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
 from boebot.live import messages
-from boebot.live.audience import PAST, thinned
+from boebot.live.audience import PAST, Audience, thinned
 from boebot.live.controls import SILENT_S, Controls
+from boebot.live.live_view import LiveView
 from boebot.live.outbox import EVENTS, LETTERS, Outbox
 from boebot.live.pace import Pace
 from boebot.record.record import Record
 from boebot.running.brain_parameters import bounds, meaning, parameters, set_parameter
-from boebot.running.interventions import Arm, Hand, Place, Release, Stop
+from boebot.running.interventions import Arm, Deed, Hand, Parameter, Place, Release, Stop, Tally
+from boebot.running.tasks import Member, Request
+from boebot.running.together import execute_together
 
 ALL = frozenset({"pause", "step", "speed", "restart", "drag", "hand", "parameters"})
 
@@ -201,6 +207,46 @@ def test_every_slider_of_the_bundled_brain_stays_within_what_its_process_takes()
         set_parameter(brain, "avoid.fly", 1.0)
     with pytest.raises(BoebotError, match="avoid: turn"):
         set_parameter(brain, "avoid.turn", 2.0)
+
+
+def test_first_chunk_has_all_robots_from_their_beginning(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Also where one begins later: a board by its clock, after a robot without one has stepped already."""
+    chunks: list[dict[str, Any]] = []
+    monkeypatch.setattr(Audience, "add", lambda _, chunk: chunks.append(chunk))
+    brain = tmp_path / "once.py"
+    brain.write_text("def step(robot):\n    if robot.time == 0:\n        robot.sketch('once', points=[(0, 0)])\n")
+    members = [Member(brain=str(brain), robot="roller", pose=(-0.8, 0.0, 0.0)), Member(brain="wander")]
+    view = LiveView(lambda url: None, speed=3.0)
+    result = execute_together(Request(members=members, arena="room", seconds=2.0), onlooker=view)
+    view.close()
+    assert result.error is None
+    for rows in chunks[0]["runs"]:
+        assert np.frombuffer(base64.b64decode(rows["time"]), "<f4")[0] == 0.0
+    assert [layer["name"] for layer in chunks[0]["runs"][0]["layers"]] == ["once"]
+
+
+def test_interventions_are_counted_as_people_count_them() -> None:
+    """Driving by hand once until the brain drives again, a slider once while it is dragged."""
+    deeds: list[tuple[float, Deed, int]] = [
+        (1.0, Place(0.0, 0.0, 0.0), 1),
+        (1.0, Hand(0.5, 0.5), 2),
+        (1.1, Hand(0.5, 0.2), 2),
+        (1.2, Stop(), 3),
+        (1.3, Hand(0.0, 0.0), 3),
+        (1.4, Release(), 3),
+        (1.5, Hand(0.1, 0.1), 4),
+        (2.0, Parameter("avoid.turn", 0.1), 5),
+        (2.9, Parameter("avoid.turn", 0.2), 5),
+        (3.5, Parameter("avoid.turn", 0.3), 5),
+        (4.5, Parameter("avoid.turn", 0.4), 6),
+        (4.6, Parameter("avoid.clear", 0.4), 7),
+        (4.7, Arm(), 8),
+        (4.8, Parameter("avoid.clear", 0.3), 9),
+    ]
+    tally = Tally()
+    for time_s, deed, count in deeds:
+        tally.add(time_s, deed)
+        assert tally.count == count, deed
 
 
 def test_news_of_a_record_are_told_once_and_all_is_kept_in_its_order() -> None:

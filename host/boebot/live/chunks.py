@@ -89,15 +89,20 @@ class Chunks:
         self._offset_s = 0.0  # the transport's clock at the run's time 0
         self._counters: Mapping[str, float] = {}  # of the board, when it was last looked at
 
-    def make(self) -> dict[str, Any] | None:
-        """The rows of a chunk; None: nothing has happened."""
+    def gather(self) -> bool:
+        """Takes what has happened since the last chunk; whether there is anything to show."""
         for name, block in self._source.news().items():
             kept = self._waiting if name in (*OF_TICKS, "truth") else self._others
             kept[name] = joined(kept.get(name), block)
-        record = record_of(self._waiting)
         is_simulated = self._result.world is not None
-        if record.ticks <= self._first or (is_simulated and "truth" not in self._waiting):
+        has_truth = not is_simulated or "truth" in self._waiting
+        return has_truth and record_of(self._waiting).ticks > self._first
+
+    def make(self) -> dict[str, Any] | None:
+        """The rows of a chunk; None: nothing has happened."""
+        if not self.gather():
             return None
+        record = record_of(self._waiting)
         if self.content is None:
             self._offset_s = self._source.clock_offset_s
         stretch, series = self._stretch(record, self._others)

@@ -163,9 +163,11 @@ class LiveView:
         return self._controls is not None and "speed" in self._controls.can and self._pace.speed is None
 
     def _make_chunk(self, time_s: float) -> None:
+        if not self._audience.knows_run and not all(chunks.gather() for chunks in self._chunks):
+            return  # a robot has not begun: the first chunk has all of them from their beginning
         rows = [chunks.make() for chunks in self._chunks]
-        if not any(rows) or any(chunks.content is None for chunks in self._chunks):
-            return  # nothing is new, or a robot has not begun
+        if not any(rows):
+            return  # nothing is new
         self._rates.append((time.perf_counter(), time_s))
         if not self._audience.knows_run:
             self._audience.begin(self._first_message())
