@@ -327,14 +327,17 @@ class Sim:
         movers = lib.sim_movers(self.handle, self._count, self._time)
         return tuple((m.x, m.y, math.atan2(m.sine, m.cosine)) for m in (movers[k] for k in range(self._count[0])))
 
-    def drain(self) -> Group:
+    def drain(self, *, ended: bool = False) -> Group:
         """The streams of a record that tell of the arena's moving shapes since it was last drained. "waits": rows
-        (shape, how long it has waited in all, s), the last one of each shape of now; "shifts": rows (shape, by how much
-        it is off its way from then on: m, m, rad). Empty without recording, and without moving shapes."""
+        (shape, how long it has waited in all, s); if the run has `ended`, the last one of each shape is of now, so that
+        it does not matter how often one drains. "shifts": rows (shape, by how much it is off its way from then on: m,
+        m, rad). Empty without recording, and without moving shapes."""
         waits = [
             (time, _WAIT.pack(shape, waited))
             for shape, late in enumerate(self.lateness())
-            for time, waited in zip(late.time.tolist(), late.waited.tolist(), strict=True)
+            for time, waited in list(zip(late.time.tolist(), late.waited.tolist(), strict=True))[
+                : None if ended else -1
+            ]
         ]
         shifts = [(shift.time, _SHIFT.pack(shift.shape, shift.x, shift.y, shift.heading)) for shift in self.shifts()]
         lib.sim_forget_world(self.handle)

@@ -186,9 +186,8 @@ def test_two_pages_one_drives(endless: Run) -> None:
 
 def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    run = Run(
-        "run", "demo", "--robot", "shieldbot-charging", "--view", "--seconds", "3", "--out", str(folder), "--json"
-    )
+    robot = ("--robot", "shieldbot-charging", "--arena", "showcase")
+    run = Run("run", "demo", *robot, "--view", "--seconds", "3", "--out", str(folder), "--json")
     with run.stream() as stream:
         page = Page(stream)
         page.until("run")
@@ -199,6 +198,8 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> N
         assert state["robots"][0]["pose"] == [0.0, 0.0, 1.0]
         page.say(type="place", robot=0, pose=[9.0, 9.0, 0.0])
         assert "cannot stand at 9.00 m, 9.00 m" in page.until("refused")["sentence"]
+        page.say(type="shape", shape=0, pose=[1.2, 0.3, 0.5])
+        page.state(lambda state: state["touched"] == 2)
         page.say(type="parameter", robot=0, name="wander.forward", value=0.3)
         page.say(type="step")
         later = page.state(lambda now: now["time"] > state["time"])
@@ -210,11 +211,12 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> N
         assert page.until("end")["ended"] == "complete"
     code, out, error = run.end()
     assert code == 0, error
-    assert json.loads(out)["touched"] == 3  # lifted, a parameter, by hand
+    assert json.loads(out)["touched"] == 4  # robot and shape lifted, a parameter, by hand
     watched = read_run(folder)
     assert isinstance(watched, RunResult)
     shown = [text for _, kind, text in content([watched])["runs"][0]["rows"]["events"] if kind == "intervention"]
-    assert shown[:2] == ["put at 0.00, 0.00 m, 57°", "wander.forward = 0.3"] and "driven by hand" in shown[2]
+    assert shown[:2] == ["put at 0.00, 0.00 m, 57°", "moving shape 1 put at 1.20, 0.30 m"]
+    assert shown[2] == "wander.forward = 0.3" and shown[3].startswith("driven by hand")
     for command in (["run", "--again", str(folder)], ["replay", str(folder), "--brain", "demo"]):
         again = subprocess.run([sys.executable, "-m", "boebot", *command], capture_output=True, text=True, check=False)
         assert again.returncode == 0, again.stdout + again.stderr

@@ -98,7 +98,7 @@ class InWorld:
 
 def drain(robot: SimRobot, *, ended: bool) -> Group:
     """See `boebot.boards.BoardSession`. What belongs to the world goes with its first robot."""
-    world = robot.sim.drain() if robot.number == min(robot.sim.members) else {}
+    world = robot.sim.drain(ended=ended) if robot.number == min(robot.sim.members) else {}
     return {**robot.drain(to_now=ended and not robot.description.has_board), **world}
 
 

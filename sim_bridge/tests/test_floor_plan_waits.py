@@ -16,6 +16,8 @@ from boebot.arenas import Arena, ArenaDescription, Start, Waypoint, description
 from boebot.arenas.floor_plan import Lateness, Moving, Solid, floor_plan
 from boebot.boards import Truth
 from boebot.description.robots import load_robot
+from boebot.record.record import Record
+from boebot.record.truth import lateness
 from sim_bridge._core import ffi, lib
 from sim_bridge.recorder import Recorder
 from sim_bridge.sessions.opening import alone, truth_of
@@ -159,6 +161,25 @@ def test_a_session_tells_it() -> None:
         session.step(*((1.0, 1.0) if step > 300 else (0.0, 0.0)))
         seen.append(poses_in(sim))
     check(session.truth(), sim.arena, seen)
+
+
+def test_record_does_not_depend_on_how_often_it_is_brought_up_to_date() -> None:
+    """A person who looks has it done more often. What comes of a run that broke off is drawn, too."""
+    records = []
+    for often in (True, False):
+        sim = Sim(press())
+        session, record = DirectSession(sim.add(None, load_robot("arsim")), alone(sim)), Record()
+        for step in range(700):
+            session.step(*((1.0, 1.0) if step > 300 else (0.0, 0.0)))
+            if often:
+                record.put(session.drain())
+        broken_off = lateness(record)
+        record.put(session.drain(ended=True))
+        records.append(record)
+    rows = records[0].rows("waits")
+    assert rows == records[1].rows("waits") and 2 < len(rows) < 100
+    assert lateness(records[0])[0].waited[-1] > 0.5
+    assert broken_off == [] and len(floor_plan(press(), 0.0, 7.0, broken_off).moving) == 1
 
 
 def test_view_and_recorder_have_the_vehicles_own() -> None:

@@ -164,9 +164,12 @@ def floor_plan(
     """The arena with its moving shapes from `begin` to `end` (s).
 
     Args:
-        late: of each of them, unless none ever waited.
+        late: of each of them; one that has no rows, or is not there, never waited.
         shifts: all of them, by time.
     """
+    never = Lateness(time=np.array([begin, end]), waited=np.zeros(2))
+    shapes = range(len(arena.description.moving))
+    late = [late[k] if k < len(late) and len(late[k].time) else never for k in shapes]
     time = _times(arena, begin, end, late, shifts)
     poses = _poses(arena, time, late)
     for shape, pose in enumerate(poses):
@@ -254,8 +257,7 @@ def _times(arena: Arena, begin: float, end: float, late: Sequence[Lateness], shi
     bends = [row.time for row in late]
     bends += [np.array((shift.time - JUMP_S, shift.time)) for shift in shifts]
     for k, moving in enumerate(arena.description.moving):
-        clock = late[k] if late else Lateness(time=np.array([begin, end]), waited=np.zeros(2))
-        bends.append(_waypoint_times(moving, begin, end, clock))
+        bends.append(_waypoint_times(moving, begin, end, late[k]))
     kept = np.unique(np.concatenate([np.empty(0), *bends]))
     kept = kept[(kept > begin) & (kept < end)]
     kept = kept[:: math.ceil(2 * len(kept) / SAMPLES_MAXIMUM) or 1]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any, Protocol
 
 import numpy as np
@@ -156,7 +157,7 @@ class Chunks:
             swept=scene.swept(few, path),
             true_contacts=_where(true, events, "contact", series),
             touches=_where(seen, events, "touch", series),
-            events=sorted(events),
+            events=sorted(events, key=itemgetter(0)),
             load=self._load(len(kept)),
             pins=page_data.pins(record_of({"pins": news["pins"]}), result.robot, self._offset_s)
             if "pins" in news

@@ -4,6 +4,7 @@ view (boebot.view.web_page), with the data of the whole run in it (boebot.view.p
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,6 +93,6 @@ def stretch(result: RunResult, view: scene.View) -> page_data.Stretch:
         swept=view.swept,
         true_contacts=view.true_contacts,
         touches=view.touches,
-        events=sorted(page_data.events(few.series, few.contact, result.whiskers) + _deeds(result)),
+        events=sorted(page_data.events(few.series, few.contact, result.whiskers) + _deeds(result), key=itemgetter(0)),
         pins=page_data.pins(result.record, result.robot, result.clock_offset),
     )
