@@ -27,7 +27,7 @@ from boebot.link.messages import Telemetry
 from boebot.record.result import RunResult
 from command import boebot, heed_signals
 
-DATABASE = cantools.database.load_file(Path(__file__).resolve().parents[2] / "protocol" / "boebot.dbc")
+DATABASE: Any = cantools.database.load_file(Path(__file__).resolve().parents[2] / "protocol" / "boebot.dbc")
 HELLO = range(0x621, 0x631, 2)
 NODE = 0xE0  # bits of an identifier
 OPEN, SET_POINT, TELEMETRY = 0x620, 0x120, 0x321
@@ -213,19 +213,19 @@ def test_log_of_a_stock_tool_drives_a_brain(capsys: pytest.CaptureFixture[str], 
         assert (code, out, err) == (0, f"all {result.steps} commands are the same\n", "")
     (to_board, to_host, long), made = by_way(log), by_way(own)
     assert [to_board, to_host[: len(made[1])], long] == made, "to a host that has left the board speaks for a while"
-    assert len(made[0]) > 10
+    assert len(made[0]) > 10 and {message.arbitration_id & NODE for message in stock(own)} == {3 << 5}
 
 
 def test_first_command_that_differs_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     brain, other = tmp_path / "brain.py", tmp_path / "other.py"
-    brain.write_text("def step(robot):\n    robot.drive(robot.ping.age, 0.5)\n")
-    other.write_text("def step(robot):\n    robot.drive(robot.ping.age, 0.5 if robot.time < 0.29 else 0.25)\n")
+    brain.write_text("def step(robot):\n    robot.drive(robot.ping.age / 3, 0.5)\n")
+    other.write_text("def step(robot):\n    robot.drive(robot.ping.age / 3, 0.5 if robot.time < 0.29 else 0.25)\n")
     result = library.run(brain, seconds=0.5)
     log = str(save_log(result, tmp_path / "can.asc"))
     assert boebot(capsys, "replay", log, "--brain", str(brain)) == (0, "all 10 commands are the same\n", "")
     code, out, err = boebot(capsys, "replay", log, "--brain", str(other))
-    index, *command = result.record.steps[6]
-    tick, left = Telemetry.unpack(result.record.telemetry[index]).tick, round(command[1], 4)
+    index, _, left, _ = result.record.steps[6]
+    tick, left = Telemetry.unpack(result.record.telemetry[index]).tick, round(left, 4)
     assert (code, err) == (1, "") and " ".join(out.split()) == (
         f"step 6 (tick {tick}, 0.30 s) differs: Command(kind='signal', left={left}, right=0.5) in the run, "
         f"Command(kind='signal', left={left}, right=0.25) in the replay"
@@ -271,6 +271,11 @@ def as_node_2(frames: list[CanFrame]) -> list[CanFrame]:
         (as_node_2, "--node 5", "{} has no hello of a board of node 5; expected 2"),
         (as_node_2, "--robot 2", "{} is a log of CAN frames; expected --node in place of --robot"),
         (
+            as_node_2,
+            "--kind arsim",
+            "robot 'arsim' has no board; expected one like that in {}, 'shieldbot'",
+        ),
+        (
             with_data(0x62B, 2, b"nobody"),
             "",
             "the board in {} says that it is 'nobodybot', which is no bundled robot; expected --kind",
@@ -302,9 +307,13 @@ def test_log_that_is_no_run_is_refused(
 
 
 def test_log_ends_with_the_first_run(capsys: pytest.CaptureFixture[str], tmp_path: Path, run: RunResult) -> None:
-    """Others may drive the robot afterwards; and another one, of a board that has been reset meanwhile, may follow."""
+    """What somebody drives after the host has left is not of it, nor what follows once the board was reset."""
+    first = frames(frames_of(run))
+    last = [frame.data for frame in first if frame.identifier == SET_POINT][-1]
+    by_hand = bytearray(last)
+    by_hand[5] += 3  # the tick that it answers
     again = frames(frames_of(library.run("wander", seconds=0.5, seed=6)))
-    log = write(tmp_path / "can.log", frames(frames_of(run)) + again)
+    log = write(tmp_path / "can.log", [*first, CanFrame(SET_POINT, bytes(by_hand)), *again])
     assert boebot(capsys, "replay", str(log), "--brain", "wander", "--seed", "5")[1] == "all 40 commands are the same\n"
 
 

@@ -209,6 +209,8 @@ def _robot(path: Path, reader: _LogReader, robot: str | None) -> RobotDescriptio
     if robot is None and name not in robot_names():
         raise BoebotError(f"the board in {path} says that it is {name!r}, which is no bundled robot; expected --kind")
     described = load_robot(robot or name)
+    if not described.has_board:
+        raise BoebotError(f"robot {described.name!r} has no board; expected one like that in {path}, {name!r}")
     other = {}
     for parameter, own in parameters_of(described).items():
         scale = messages.PARAMETERS[parameter].scale
@@ -275,9 +277,7 @@ class _LogReader:
     def _take_telemetry(self, time_s: float, came: CanMessage) -> None:
         telemetry = messages.Telemetry.unpack(came.payload)
         newest = self._telemetry[-1][1].tick if self._telemetry else -1
-        if telemetry.tick == newest:
-            return  # logged twice
-        was_reset = telemetry.tick < newest
+        was_reset = telemetry.tick <= newest
         if self.commands and (was_reset or came.session != self._session):
             self._is_over = True
             return
