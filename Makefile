@@ -34,7 +34,7 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      what takes long: all experiments, a run in the emulator (SECONDS=3600), the search for the longest tasks (SEARCH_SECONDS=60), other compilers and emulators, tests with each protection left out, error rates"
+	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the search for the longest tasks (SEARCH_SECONDS=60), other compilers and emulators, tests with each protection left out, error rates"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
@@ -72,8 +72,11 @@ experiments:
 
 SECONDS ?= 3600
 SEARCH_SECONDS ?= 60
+SEEDS ?= 2 3 4 5 6 7 8 9 10
 soak: experiments
 	@$(SIDE_BY_SIDE) ready-soak
+	@failed=0; for seed in $(SEEDS); do echo "Experiments at seed $$seed"; \
+	  $(VENV)/bin/boebot experiment --all --seed $$seed --out build/experiments/seed-$$seed || failed=1; done; exit $$failed
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
 	@$(PYTHON_VENV) -m tools.timing_search --seconds $(SEARCH_SECONDS)
 	@$(PYTHON_VENV) -m tools.compilers
