@@ -168,6 +168,17 @@ def test_node_that_sweeps_show_to_be_in_a_wall_is_left() -> None:
     assert explore.complete and sum(n.status == "unreachable" for n in explore.graph.nodes) == 1 and way <= 45
 
 
+def test_exploration_on_the_map_of_another_arena_is_lost_and_stands() -> None:
+    start = (-2.5, 0.0, 0.0)
+    due = Utility(b=-1.0, w={"due": 3.0}, tau=0.05)
+    localization = Localization(plan=LineMap.of("maze"), start=start, every=4.0, utility=due)
+    explore = Explore(localization=localization, utility=Utility(b=0.5))
+    brain = Brain([Odometry(), localization, explore], [localization.due_variable])
+    result = boebot.run(brain, robot="roller", arena="office", pose=start, seconds=15)
+    assert result.true_pose is not None and result.shown.texts["explore_state"][-1] == "lost"
+    assert np.ptp(result.true_pose.x[np.asarray(result.series.time) > 12.0]) < 0.005
+
+
 def test_nodes_are_drawn_where_the_robot_is() -> None:
     """In the frame of the start, though the odometer of roller counts from the middle of the arena."""
     result = boebot.run(Brain([Odometry(), Explore()]), robot="roller", arena="office", seconds=2)

@@ -1,6 +1,6 @@
 """The figures of docs/reference/navigation-figures.md keep their criteria: hundreds of runs, in `make soak`.
 
-A part of them is in `make test`: test_office_tasks.py, test_localization.py.
+Ten of each are in `make test`: test_office_tasks.py, test_localization.py, test_explore.py.
 """
 
 from __future__ import annotations
