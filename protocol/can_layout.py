@@ -1,6 +1,6 @@
 """How messages go over CAN: which bytes stand in which frame (PROTOCOL.md, "On CAN").
 
-A CAN frame carries at most 8 bytes. They are the payload's, in its order, without a number split between two frames, and
+A CAN frame carries at most 8 bytes: those of the payload, in its order, without a number split between two frames, and
 some that are added in place of what a frame on the serial line has around its payload:
 
     message of one frame          fields, session
