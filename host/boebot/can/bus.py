@@ -13,6 +13,7 @@ import os
 import re
 import select
 import socket
+import time
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -27,6 +28,8 @@ from boebot.link.ports.tcp import TIMEOUT_S, why_not
 _ERR_ACK = 0x20  # error frame of SocketCAN: nobody acknowledged (linux/can/error.h)
 _ERR_BUS_OFF = 0x40
 _AT_ONCE = 1000  # most frames of one look: a flood must not keep the board unheard
+_LEAVE_S = 0.2  # that the other side has to close a connection
+_READ_BYTES = 65536
 _ECHOES = 4096  # most own frames to be recognised when udp_multicast brings them back
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "udp_multicast": {"hop_limit": 0},  # they stay on this computer
@@ -168,6 +171,8 @@ class PythonCanBus:
         """See `Bus`."""
         if not self._closed:
             self._closed = True
+            if self._socket is not None:
+                _take_leave(self._socket)
             with contextlib.suppress(Exception):  # it may have gone
                 self._bus.shutdown()
 
@@ -200,6 +205,17 @@ def _has_ended(connection: socket.socket) -> bool:
         return bool(ready) and not connection.recv(1, socket.MSG_PEEK)
     except (OSError, ValueError):
         return True
+
+
+def _take_leave(connection: socket.socket) -> None:
+    """Says that no more will come, and reads until the other side closes, too: a connection that is closed with unread
+    frames is reset, and the last ones sent may be lost."""
+    until_s = time.monotonic() + _LEAVE_S
+    with contextlib.suppress(OSError, ValueError):  # it may have gone
+        connection.shutdown(socket.SHUT_WR)
+        connection.settimeout(_LEAVE_S)
+        while connection.recv(_READ_BYTES) and time.monotonic() < until_s:
+            pass
 
 
 def _check_listener(name: BusName, settings: dict[str, Any]) -> None:
