@@ -242,6 +242,8 @@ def test_ctrl_c_ends_a_run_that_stands_still() -> None:
         page.until("run")
         page.say(type="pause")
         page.state(lambda state: state["paused"])
+        with run.stream() as later:
+            assert Page(later).state()["paused"], "a page that comes later knows it at once"
         run.process.send_signal(signal.SIGINT)
         assert page.until("end")
     assert run.end()[0] == 130

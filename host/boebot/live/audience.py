@@ -52,6 +52,7 @@ class Audience:
         self._run: Message | None = None  # the present run's first message, without rows
         self._end: Message | None = None
         self._past: deque[Message] = deque()
+        self._state: Message = {}  # the newest
         self._layers: list[dict[str, Message]] = []  # of each robot the newest sketches
         self._server = PageServer(web_page.live, self, host=host, port=port)
         self.url = self._server.url
@@ -128,6 +129,7 @@ class Audience:
         with self._lock:
             for known, rows in zip(self._layers, chunk["runs"], strict=True):
                 known.update((layer["name"], layer) for layer in rows["layers"])
+            self._state = chunk["state"]
             self._past.append(chunk | {"runs": [rows | {"layers": []} for rows in chunk["runs"]], "of": 1})
             if len(self._past) > PAST:
                 self._past = thinned(self._past)
@@ -139,8 +141,9 @@ class Audience:
                     self._send(page, _as_seen_by(page, chunk))
 
     def tell(self, message: Message) -> None:
-        """A message for all pages, which none that comes later needs."""
+        """A message for all pages; of those a page that comes later gets the newest state."""
         with self._lock:
+            self._state = message.get("state", self._state)
             for page in self._pages.values():
                 self._send(page, _as_seen_by(page, message))
 
@@ -159,17 +162,17 @@ class Audience:
         self._server.close()
 
     def _begin_page(self, page: Page) -> None:
-        """The run with its first chunk, those since, and its end."""
+        """The run with its first chunk, those since, how it is now, and its end."""
         if self._run is None or not self._past:
             return
-        past = [_as_seen_by(page, chunk) for chunk in self._past]
+        past = [{name: value for name, value in chunk.items() if name != "state"} for chunk in self._past]
         newest = zip(past[-1]["runs"], self._layers, strict=True)
         past[-1] = past[-1] | {"runs": [rows | {"layers": list(layers.values())} for rows, layers in newest]}
         first, *others = past
         runs = [known | {"rows": rows} for known, rows in zip(self._run["runs"], first["runs"], strict=True)]
         begin = self._run | {"runs": runs, "moving": first["moving"]}
-        end = [] if self._end is None else [self._end]
-        page.outbox.begin(begin, [*others, {"type": "state", "state": past[-1]["state"]}, *end])
+        state = _as_seen_by(page, {"type": "state", "state": self._state})
+        page.outbox.begin(begin, [*others, state, *([] if self._end is None else [self._end])])
         self._server.wake(page)
 
     def _send(self, page: Page, message: Message) -> None:

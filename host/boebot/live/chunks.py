@@ -1,11 +1,12 @@
 """What happened to a robot since the last chunk, in the form in which the page draws it: a replay in small pieces.
 
 A chunk is made from the rows that the record has got meanwhile, by the code that makes replays: so both show the same.
-It holds few ticks: the page is for the eye, the record has all of them.
+It holds few ticks, so many in a second of the wall clock: the page is for the eye, the record has all of them.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from operator import itemgetter
@@ -32,7 +33,9 @@ from boebot.running.interventions import STREAM, Hands, in_words
 from boebot.showing import SKETCH
 from boebot.view import page_data, scene
 
-TICKS_AT_MOST = 12  # in a chunk
+TICKS_AT_MOST = 12  # in a chunk, of those that come close together
+EACH_S = 0.05  # of the wall clock, from one of them to the next one
+MORE = 6  # times as many in one that comes after a longer time
 COGNITIVE_AT_MOST = 4
 
 
@@ -89,6 +92,7 @@ class Chunks:
         self._start: tuple[float, float, float] | None = None  # where the run began
         self._offset_s = 0.0  # the transport's clock at the run's time 0
         self._counters: Mapping[str, float] = {}  # of the board, when it was last looked at
+        self._made_s = time.perf_counter()  # the last chunk, by the wall clock
 
     def gather(self) -> bool:
         """Takes what has happened since the last chunk; whether there is anything to show."""
@@ -129,8 +133,10 @@ class Chunks:
     def _stretch(self, record: Record, news: Group) -> tuple[page_data.Stretch, Series]:
         result = self._result
         series = result.series_of(record, self._directions)
+        made_s, self._made_s = self._made_s, time.perf_counter()
+        most = int(TICKS_AT_MOST * min(MORE, max(1.0, (self._made_s - made_s) / EACH_S)))
         new = np.arange(self._first, len(series))
-        kept = new[:: -(-len(new) // TICKS_AT_MOST)] if len(new) > TICKS_AT_MOST else new
+        kept = new[:: -(-len(new) // most)] if len(new) > most else new
         kept = np.unique(np.append(kept, len(series) - 1))
         few = result.series_of(_part(record, series, kept))
         track = track_of(record)

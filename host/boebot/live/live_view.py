@@ -18,7 +18,7 @@ from boebot.boards import imperfections
 from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.audience import Audience
-from boebot.live.chunks import Chunks, OfRun
+from boebot.live.chunks import EACH_S, Chunks, OfRun
 from boebot.live.controls import Controls
 from boebot.live.outbox import LETTERS, Message
 from boebot.live.pace import Pace
@@ -28,7 +28,6 @@ from boebot.running.brain_parameters import bounds, meaning, parameters
 from boebot.running.interventions import Deed, Hands
 from boebot.view import page_data, scene
 
-EACH_S = 0.05  # of the wall clock, from chunk to chunk
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
 SHARE = 60  # of the time of a run that hurries a chunk takes this part at most

@@ -125,7 +125,6 @@ def test_page_fits_and_can_be_read(url: str, size: tuple[int, int], open_page: O
     assert wide == 0 and (high == 0 or size[0] < 760)
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
-        page.wait_for_timeout(150)  # until it is drawn anew
         assert faint_texts(page) == [], scheme
 
 

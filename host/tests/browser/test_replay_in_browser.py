@@ -74,7 +74,6 @@ def test_page_fits_and_can_be_read(size: tuple[int, int], run: tuple[RunResult, 
     assert wide == 0 and (high == 0 or size[0] < 760), "only a phone scrolls"
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
-        page.wait_for_timeout(150)  # until it is drawn anew
         assert faint_texts(page) == [], scheme
     assert all(colours_of(page, canvas) > 3 for canvas in ("floor", "stage", "tracks")), "something is drawn"
     arena, panel = page.locator("#arena").bounding_box(), page.locator("#sensors").bounding_box()

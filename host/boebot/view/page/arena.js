@@ -101,10 +101,14 @@ function drawNumbers(c) {
   c.textAlign = "left";
 }
 function word(c, text, x, y) {
-  c.fillStyle = colours.ink;
   font(c, 11);
   c.textAlign = "center";
   c.textBaseline = "middle";
+  c.strokeStyle = colours.floor; // it can be read on lines, too
+  c.lineJoin = "round";
+  c.lineWidth = 3 * ratio;
+  c.strokeText(text, X(x), Y(y));
+  c.fillStyle = colours.ink;
   c.fillText(text, X(x), Y(y));
   c.textAlign = "left";
 }

@@ -45,7 +45,7 @@ const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 function makeSpeeds() {
   $("speed").replaceChildren(
     ...SPEEDS.map(v => element("option", { value: v, textContent: v + " ×" })),
-    element("option", { value: "", textContent: "as fast as possible" }),
+    element("option", { value: "", textContent: "fastest" }),
   );
   $("speed").onchange = () => send({ type: "speed", speed: $("speed").value === "" ? null : Number($("speed").value) });
 }
@@ -88,7 +88,7 @@ function askRestart() {
     dialog.close();
   };
   dialog.showModal();
-  $("seed").focus();
+  $("seed").select();
 }
 function choice(imperfection, box) {
   const text = element("span", {}, element("b", { textContent: imperfection.name }), " " + (imperfection.text || ""));

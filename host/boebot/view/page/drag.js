@@ -10,7 +10,7 @@ const things = () => [
 ];
 const placeOfThing = ({ kind, index }) => (kind === "robot" ? placeOf(runs[index]) : moving[index].at(now + run.begin));
 const nameOf = ({ kind, index }) =>
-  kind === "shape" ? "moving shape " + (index + 1) : runs.length > 1 ? "robot " + (index + 1) : "the robot";
+  kind === "shape" ? "shape " + (index + 1) : runs.length > 1 ? "robot " + (index + 1) : "the robot";
 
 function isAt(thing, x, y) {
   const place = placeOfThing(thing);

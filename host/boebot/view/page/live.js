@@ -88,11 +88,12 @@ const receive = {
       runs[k].append(rows);
     });
     message.moving.forEach((rows, k) => moving[k].append(rows));
-    arrivals.push([performance.now() / 1000, run.duration]);
-    while (arrivals.length > 2 && arrivals.at(-1)[0] - arrivals[0][0] > 1) arrivals.shift();
     growBounds();
     makeShown();
     tellPrinted(message.printed);
+    if (!message.state) return; // of the past
+    arrivals.push([performance.now() / 1000, run.duration]);
+    while (arrivals.length > 2 && arrivals.at(-1)[0] - arrivals[0][0] > 1) arrivals.shift();
     receive.state(message);
   },
   state(message) {

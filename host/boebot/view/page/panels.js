@@ -174,6 +174,7 @@ function tellMoment() {
     const on = !!(bits & Number(lamp.dataset.bit));
     lamp.classList.toggle("on", on);
     lamp.style.background = on ? colours[lamp.dataset.colour] : "";
+    lamp.ariaLabel = lamp.dataset.name + (on ? ": on" : ": off");
   });
   say("ping", pingText(i));
   run.readings.forEach((reading, k) => tellReading(reading, cells.readings[k], i));
