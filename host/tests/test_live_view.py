@@ -26,7 +26,7 @@ from boebot.record.reading import read_run
 from boebot.record.result import RunResult
 from boebot.view.page_data import FORMAT
 from boebot.view.replay import content
-from command import heed_signals
+from command import boebot, heed_signals
 
 LIMIT_S = 30.0
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")  # without them no page opens by itself
@@ -184,7 +184,7 @@ def test_two_pages_one_drives(endless: Run) -> None:
         pages[0].state(lambda state: not state["driver"])
 
 
-def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> None:
+def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "out"
     robot = ("--robot", "shieldbot-charging", "--arena", "showcase")
     run = Run("run", "demo", *robot, "--view", "--seconds", "3", "--out", str(folder), "--json")
@@ -218,8 +218,8 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path) -> N
     assert shown[:2] == ["put at 0.00, 0.00 m, 57°", "moving shape 1 put at 1.20, 0.30 m"]
     assert shown[2] == "wander.forward = 0.3" and shown[3].startswith("driven by hand")
     for command in (["run", "--again", str(folder)], ["replay", str(folder), "--brain", "demo"]):
-        again = subprocess.run([sys.executable, "-m", "boebot", *command], capture_output=True, text=True, check=False)
-        assert again.returncode == 0, again.stdout + again.stderr
+        code, out, error = boebot(capsys, *command)
+        assert code == 0, out + error
 
 
 def test_page_begins_a_run_afresh_also_after_its_end() -> None:
@@ -290,19 +290,18 @@ def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> Non
         (["--view", "--speed", "quick"], "'quick' is no speed"),
     ],
 )
-def test_wrong_options_are_one_sentence(arguments: list[str], sentence: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "boebot", "run", "wander", *arguments], capture_output=True, text=True, check=False
-    )
-    assert done.returncode != 0 and "Traceback" not in done.stderr
-    assert sentence in " ".join(done.stderr.split())
+def test_wrong_options_are_one_sentence(
+    arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, error = boebot(capsys, "run", "wander", *arguments)
+    assert code != 0 and "Traceback" not in error
+    assert sentence in " ".join(error.split())
 
 
-def test_taken_port_is_one_sentence(endless: Run) -> None:
-    arguments = ["run", "wander", "--view", "--view-port", str(endless.url.port)]
-    done = subprocess.run([sys.executable, "-m", "boebot", *arguments], capture_output=True, text=True, check=False)
-    assert done.returncode != 0 and "Traceback" not in done.stderr
-    assert "cannot be served at 127.0.0.1" in done.stderr
+def test_taken_port_is_one_sentence(endless: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, error = boebot(capsys, "run", "wander", "--view", "--view-port", str(endless.url.port))
+    assert code != 0 and "Traceback" not in error
+    assert "cannot be served at 127.0.0.1" in error
 
 
 def test_served_robot_is_shown_and_driven_only_by_who_has_its_port() -> None:
