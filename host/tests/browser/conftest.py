@@ -34,6 +34,20 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def open_page(browser: Browser) -> Iterator[OpenPage]:
     """Opens a page; at the test's end none of them may have said anything on the console."""
+    with pages(browser) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def open_shared(browser: Browser) -> Iterator[OpenPage]:
+    """The same for pages that several tests share, up to the last one of their file."""
+    with pages(browser) as opened:
+        yield opened
+
+
+@contextlib.contextmanager
+def pages(browser: Browser) -> Iterator[OpenPage]:
+    """Opens pages until the block ends."""
     from browser.looks import wait_for
 
     said: list[str] = []

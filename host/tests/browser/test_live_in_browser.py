@@ -90,14 +90,22 @@ def url(watched: Watched) -> str:
     return watched.start("demo", "--robot", "shieldbot-charging", "--arena", "showcase", "--seconds", "3600")
 
 
-@pytest.fixture
-def page(url: str, open_page: OpenPage) -> Iterator[Page]:
-    """At the end its brain drives the robot, at real time."""
-    opened = open_page(url)
+@pytest.fixture(scope="module")
+def shared(url: str, open_shared: OpenPage) -> Page:
+    opened = open_shared(url)
     wait_for(opened, "state !== null && arrivals.length > 2")
-    yield opened
-    opened.evaluate("send({ type: 'release', robot: 0 }); send({ type: 'arm', robot: 0 }); send({ type: 'resume' });")
-    opened.wait_for_timeout(150)
+    return opened
+
+
+@pytest.fixture
+def page(shared: Page) -> Iterator[Page]:
+    """At the end its brain drives the robot, at real time, and the newest moment is shown."""
+    yield shared
+    shared.evaluate(
+        "send({ type: 'release', robot: 0 }); send({ type: 'arm', robot: 0 }); send({ type: 'resume' });"
+        "send({ type: 'speed', speed: 1 }); setNewest(true); document.activeElement.blur(); $('notice').hidden = true;"
+    )
+    wait_for(shared, "!state.paused && state.speed === 1 && !robotState().latched && robotState().driver === null")
 
 
 @pytest.mark.soak

@@ -47,6 +47,23 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> tuple[TogetherResult, 
     return result, (folder / "replay.html").as_uri()
 
 
+@pytest.fixture(scope="module")
+def shared(run: tuple[RunResult, str], open_shared: OpenPage) -> Page:
+    opened: Page = open_shared(run[1])
+    return opened
+
+
+@pytest.fixture
+def page(shared: Page) -> Page:
+    """The first run's, as it has just been opened."""
+    shared.mouse.move(0, 0)
+    shared.evaluate(
+        "setPlaying(false); spanLength = null; spanBegin = 0; $('whole').checked = true; $('speed').value = '1';"
+        "$('signals').scrollTop = 0; document.activeElement.blur(); fitView(); show(page);"
+    )
+    return shared
+
+
 def at_robot(page: Page) -> tuple[float, float]:
     """Where the chosen robot is on the screen."""
     x, y = page.evaluate(
@@ -108,8 +125,7 @@ def test_every_control_has_a_name_and_is_reached_by_tab(
     assert all(reached.values()), "one sees where the focus is"
 
 
-def test_wheel_drag_and_keys_move_the_view(run: tuple[RunResult, str], open_page: OpenPage) -> None:
-    page = open_page(run[1])
+def test_wheel_drag_and_keys_move_the_view(page: Page) -> None:
     before = page.evaluate("[scale, shiftX, shiftY]")
     x, y = at_robot(page)
     page.mouse.move(x, y)
@@ -135,8 +151,7 @@ def test_wheel_drag_and_keys_move_the_view(run: tuple[RunResult, str], open_page
     assert at_robot(page) == pytest.approx((x - 60, y), abs=0.5)
 
 
-def test_view_follows_the_robot(run: tuple[RunResult, str], open_page: OpenPage) -> None:
-    page = open_page(run[1])
+def test_view_follows_the_robot(page: Page) -> None:
     page.keyboard.press("f")
     stage = page.locator("#stage").bounding_box()
     assert stage is not None
@@ -159,8 +174,7 @@ def test_two_fingers_zoom_on_a_phone(run: tuple[RunResult, str], open_page: Open
     assert page.evaluate("scale") == pytest.approx(3 * before, rel=0.05)
 
 
-def test_keys_play_and_scrub(run: tuple[RunResult, str], open_page: OpenPage) -> None:
-    page = open_page(run[1])
+def test_keys_play_and_scrub(page: Page) -> None:
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     assert page.evaluate("now") == pytest.approx(0.1)
@@ -209,9 +223,8 @@ def test_another_robot_without_loading_anew(together: tuple[TogetherResult, str]
     assert page.evaluate("now") == pytest.approx(3.21 + shift, abs=1e-6), "the same moment"
 
 
-def test_values_under_the_pointer(run: tuple[RunResult, str], open_page: OpenPage) -> None:
-    result, url = run
-    page = open_page(url)
+def test_values_under_the_pointer(run: tuple[RunResult, str], page: Page) -> None:
+    result, _ = run
     for time in (1.0, 4.0):
         page.mouse.move(*lane(page, "motors", time))
         told = float(page.inner_text("#tip").split(" s")[0])
@@ -233,10 +246,9 @@ def test_values_under_the_pointer(run: tuple[RunResult, str], open_page: OpenPag
     assert page.is_hidden("#tip")
 
 
-def test_time_axis_zooms_down_to_pulses(run: tuple[RunResult, str], open_page: OpenPage) -> None:
+def test_time_axis_zooms_down_to_pulses(run: tuple[RunResult, str], page: Page) -> None:
     """A servo's pulse on its pin is as long as telemetry says."""
-    result, url = run
-    page = open_page(url)
+    result, _ = run
     edges = result.record.table("pins", np.dtype([("pin", "u1"), ("level", "u1")]))
     times = result.record.times_of("pins") - result.clock_offset
     own = (edges["pin"] == 13) & (times > 3.0)
@@ -255,8 +267,7 @@ def test_time_axis_zooms_down_to_pulses(run: tuple[RunResult, str], open_page: O
     wait_for(page, f"span()[1] - span()[0] > {SECONDS - 0.1}")
 
 
-def test_slider_and_lanes_scrub(run: tuple[RunResult, str], open_page: OpenPage) -> None:
-    page = open_page(run[1])
+def test_slider_and_lanes_scrub(page: Page) -> None:
     page.mouse.click(*lane(page, "motors", 2.0))
     assert page.evaluate("now") == pytest.approx(2.0, abs=0.02)
     page.focus("#slider")
