@@ -75,3 +75,20 @@ def test_back_at_another_node_paths_begin_there() -> None:
     assert [node.number for node in graph.nearest_completed((0.9, 0.8))] == [2, 1, 3, 0]
     graph.retry(last, 1)
     assert (graph.target(), last.path) == (last, [3, 0, 1, 4])
+
+
+def test_bad_leg_is_tried_once_more() -> None:
+    """R14c, R14f: what lies beyond it is unreachable until then, and again when it was bad twice."""
+    graph = ExplorationGraph((0.0, 0.0), 0.75)
+    graph.place((1.0, 0.0))
+    graph.reached(1)
+    far = graph.place((2.0, 0.0))
+    assert far is not None
+    graph.came_back(0)
+    graph.bad_leg(0, 1)
+    assert (far.status, graph.way(1)) == ("unreachable", [])
+    assert graph.try_legs_again() and graph.way(1) == [0, 1]
+    graph.retry(far, 1)
+    assert far.path == [0, 1, 2]
+    graph.bad_leg(0, 1)
+    assert far.status == "unreachable" and not graph.try_legs_again()

@@ -66,6 +66,7 @@ class ExplorationGraph:
         self._least, self._beside = least_distance, beside
         self.legs: set[frozenset[int]] = set()  # along which nodes were placed
         self._bad: set[frozenset[int]] = set()
+        self._tried_again: set[frozenset[int]] = set()  # legs that were bad once
 
     def place(self, place: Point, share: float = 1.0) -> Node | None:
         """R5, R6: a new pending node there (m); None: it would be too near to another. To one that is unreachable it
@@ -130,6 +131,13 @@ class ExplorationGraph:
         for node in self.pending:
             if any({one, two} == {number, other} for one, two in itertools.pairwise(node.path)):
                 self._find_path(node)
+
+    def try_legs_again(self) -> bool:
+        """R14f: bad legs count once more; whether there were any for which that is new."""
+        again = self._bad - self._tried_again
+        self._tried_again |= again
+        self._bad -= again
+        return bool(again)
 
     def way(self, number: int) -> list[int]:
         """From the active node to a completed one, over completed ones; empty: there is none."""

@@ -8,6 +8,7 @@ Rules R1 to R15: docs/reference/navigation.md.
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -37,6 +38,7 @@ PROGRESS, PROGRESS_S = 0.02, 3.0  # less (m) within this time (s) is none
 ATTEMPTS = 5  # of coming back to its nodes
 RETRIED_FROM = 4  # completed nodes from which an unreachable one is tried again
 CLOSER = 0.5  # of the distances, where all else has failed
+IN_SIGHT = 2.5  # of D: completed nodes that are nearer may be joined by a leg, where all else has failed
 
 
 class State(enum.Enum):
@@ -203,7 +205,8 @@ class Explore(SteeredBehavior):
 
     def _retry_select(self, robot: Robot) -> State:
         """R14d, R14e: what could not be reached is tried from other nodes, where the way is shortest first, then looked
-        for in smaller steps."""
+        for in smaller steps. R14f: then legs that were blocked are tried once more, and others beside them: a door may
+        be one of them, and its node too near to a post to come back by it."""
         graph = self._graph
         unreachable = [n for n in graph.nodes if n.status == "unreachable" and n.number not in self._close]
         ways = [
@@ -227,7 +230,19 @@ class Explore(SteeredBehavior):
                 if graph.set_out(nearest):
                     self._target, self._share = nearest, CLOSER
                     return State.NEXT_LEG
+        if unreachable and graph.try_legs_again():
+            self._join_what_sees_each_other(robot)
+            return State.RETRY_SELECT
         return State.DONE
+
+    def _join_what_sees_each_other(self, robot: Robot) -> None:
+        """R14f: a leg between each two completed nodes that are near, and between which no sweep shows anything."""
+        nodes = [node for node in self._graph.nodes if node.status == "completed" and node.number in self._sweeps]
+        for one, other in itertools.combinations(nodes, 2):
+            is_near = math.dist(one.place, other.place) <= IN_SIGHT * self._placement.distance
+            ways = (one, other), (other, one)
+            if is_near and not any(self._is_obstructed(begin, end.place, robot) for begin, end in ways):
+                self._graph.legs.add(frozenset((one.number, other.number)))
 
     def _is_obstructed(self, last: Node, place: Point, robot: Robot) -> bool:
         """A sweep at a completed node showed something in the corridor from there to a place."""
