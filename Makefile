@@ -100,7 +100,7 @@ pictures:
 	@sed -n '/^# first.py/,/^```$$/{/^```$$/!p}' README.md >build/pictures/first.py
 	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot run first.py --seconds 120 --out first
 	@cp build/pictures/first/run.png docs/images/first.png
-	@$(VENV)/bin/boebot run explore --robot roller --arena office --seconds 900 --out build/pictures/explored
+	@$(VENV)/bin/boebot run explore --robot roller --arena office --seconds 1000 --out build/pictures/explored
 	@cp build/pictures/explored/run.png docs/images/explored.png
 	@$(PYTHON_VENV) -m boebot.arenas.reference --pictures
 	@$(VENV)/bin/boebot robot shieldbot --out docs/images/robot-shieldbot.svg

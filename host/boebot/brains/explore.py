@@ -1,9 +1,9 @@
 """Explore the office: drive until every place has been seen (chapter 6 of the notes).
 
-    boebot run explore --robot roller --arena office --seconds 900
+    boebot run explore --robot roller --arena office --seconds 1000
     boebot run explore --robot shieldbot-turret --arena office --seconds 5400
 
-What it finds grows as a tree of nodes; `explore_state` is "done" when none is left, after some 800 s. The turret robot
+What it finds grows as a tree of nodes; `explore_state` is "done" when none is left, after 550 to 920 s. The turret robot
 sweeps for four seconds at each of its many nodes: it takes more than an hour, and now and then it is lost on the way.
 
 The brain does not use the office's map to find its way, but to correct where it is: without localization odometry
