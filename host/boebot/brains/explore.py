@@ -3,8 +3,8 @@
     boebot run explore --robot roller --arena office --seconds 1000
     boebot run explore --robot shieldbot-turret --arena office --seconds 5400
 
-What it finds grows as a tree of nodes; `explore_state` is "done" when none is left, after 550 to 920 s. The turret robot
-sweeps for four seconds at each of its many nodes: it takes more than an hour, and now and then it is lost on the way.
+What it finds grows as a tree of nodes; `explore_state` is "done" when none is left, after 550 to 920 s. The turret
+robot sweeps for four seconds at each of its many nodes: it takes more than an hour, and now and then it is lost.
 
 The brain does not use the office's map to find its way, but to correct where it is: without localization odometry
 drifts, and with it the tree.

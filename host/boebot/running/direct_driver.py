@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from boebot.boards import VehicleSession
 from boebot.errors import BoardError
 from boebot.record.brain_record import BrainNames
+from boebot.record.record import Unrecorded
 from boebot.record.result import RunResult
 from boebot.running.direct_robot import DirectRobot
 from boebot.running.driver import PROGRESS_S, Task, step_limit, whole_ticks
@@ -46,6 +47,7 @@ class DirectDriver:
         session, robot, direct, n = self.session, self.robot, self._direct, self.period_ticks
         tick_s, progress = session.tick_s, self.task.progress
         put_aside, command_given = self.record.append_readings, self.record.append_command
+        is_recorded = not isinstance(self.record, Unrecorded)
         end_s = self.task.seconds - tick_s / 2
         paced = self.task.request.realtime
         started = next_progress = wall.perf_counter()
@@ -66,13 +68,15 @@ class DirectDriver:
                 self.late_steps += int((wall.perf_counter() - shown) / self.period_s)
             command_given(time_s, *robot.command)
             left, right = direct.signals()
-            for _ in range(n):
+            for left_over in range(n - 1, -1, -1):
                 session.step(left, right)
                 tick += 1
                 self._last_s = time_s = tick * tick_s
-                sample = direct.sample(tick, session.readings())
-                put_aside(time_s, sample, left, right)
-                if time_s >= end_s:
+                has_ended = time_s >= end_s
+                if is_recorded or not left_over or has_ended:  # else nobody looks at it
+                    sample = direct.sample(tick, session.readings())
+                    put_aside(time_s, sample, left, right)
+                if has_ended:
                     break
             if ended := session.ended:
                 raise BoardError(f"robot {robot.name!r} can go no further: {ended}")
