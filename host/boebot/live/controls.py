@@ -53,7 +53,7 @@ class Controls:
         can: what people may do, as the page has it.
         pace: how fast the run goes.
         restart: what the run is to begin afresh with; None: it goes on.
-        is_idle: nothing is to be done to any robot, and nobody drives one by hand.
+        is_idle: nothing is to be done to any robot, nobody drives one by hand, and no other run is asked for.
     """
 
     def __init__(self, robots: int, shapes: int, can: frozenset[str], pace: Pace) -> None:
@@ -110,7 +110,7 @@ class Controls:
             case messages.Speed(speed):
                 self.pace.set_speed(speed)
             case messages.Restart():
-                self.restart = asked
+                self.begin_afresh(asked)
             case messages.Place(_, pose):
                 self._put(robot, Place(*pose))
             case messages.Shape(shape, pose):
@@ -131,6 +131,10 @@ class Controls:
                 self._put(robot, Arm())
             case messages.Visible(visible):
                 (self._hidden.discard if visible else self._hidden.add)(page)
+
+    def begin_afresh(self, restart: messages.Restart) -> None:
+        """Another run is asked for."""
+        self.restart, self.is_idle = restart, False
 
     def _put(self, robot: int, deed: Deed) -> None:
         if len(self._deeds[robot]) >= WAITING:
@@ -159,7 +163,8 @@ class Controls:
         with self._lock:
             deeds = list(self._deeds[robot])
             self._deeds[robot].clear()
-            self.is_idle = not any(self._deeds) and self._wheels.count(None) == self._robots
+            by_hand = self._wheels.count(None) < self._robots
+            self.is_idle = not any(self._deeds) and not by_hand and self.restart is None
             wheel = self._wheels[robot]
             if wheel is None:
                 return deeds

@@ -113,7 +113,8 @@ class LiveView:
         with self._changing:
             for page in self._audience.pages():
                 controls.came(page)
-            controls.restart = self.restart  # asked for since the last run has ended
+            if self.restart is not None:  # asked for since the last run has ended
+                controls.begin_afresh(self.restart)
             self._controls, self._has_ended = controls, False
         self._number += 1
         self._rates.clear()
@@ -125,7 +126,7 @@ class LiveView:
         """See `Onlooker`. While time stands still, what people do is carried out at once."""
         controls = self._controls
         assert controls is not None
-        if controls.is_idle and controls.restart is None and self._pace.is_free:
+        if controls.is_idle and self._pace.is_free:
             return ()  # at each step of a run that hurries: nothing else may take time there
         return self._deeds(controls, number, time_s)
 
