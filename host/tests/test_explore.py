@@ -148,7 +148,7 @@ def test_way_and_coverage_by_an_exact_odometry_are_the_true_ones(monkeypatch: py
     run = explored("exploration", LineMap.of("exploration"), start, 1, explorer())
     explore, share, way = unrecorded("exploration", start, 1, 120.0)
     assert explore.state is run.explore.state and not run.trial.has_collided
-    assert (share, way) == (pytest.approx(run.share, abs=0.002), pytest.approx(run.trial.way, rel=0.01))
+    assert share == pytest.approx(run.share, abs=0.002) and way == pytest.approx(run.trial.way, rel=0.01)
 
 
 def test_ten_starts_come_to_see_all_in_spite_of_a_low_block() -> None:
