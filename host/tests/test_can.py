@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,12 +18,14 @@ import pytest
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.can.bus import BusName, PythonCanBus
 from boebot.can.frames import Assembler, CanFrame, ForeignFrameError, FrameMaker, whole_tick
+from boebot.can.iso_tp import LongMessages
 from boebot.can.load import BusLoad, frame_bits
 from boebot.can.transport import open_can
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.fields import text
+from boebot.link.frame import encode
 from boebot.link.link import Link
 from can_line import CanLine, Carry, after, drive
 from command import boebot
@@ -147,6 +151,37 @@ def test_part_of_another_message_completes_none() -> None:
 def test_foreign_frame_is_told(frame: CanFrame, sentence: str) -> None:
     with pytest.raises(ForeignFrameError, match=sentence):
         Assembler(False, frozenset({1})).add(frame)
+
+
+def test_set_points_are_withheld_while_the_bus_is_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that is 256 ticks old would look fresh: a tick is one byte."""
+    clock = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    transport = open_can("can:virtual:ahead")
+    wire = PythonCanBus(BusName.parse("virtual:ahead"))
+    set_point = encode(messages.SetpointCoast.ID, 0, messages.SetpointCoast(100, 1).pack(), 5)
+    stop = encode(messages.Stop.ID, 1, messages.Stop(7).pack(), 5)
+    with contextlib.closing(wire), contextlib.closing(transport):
+        transport.write(b"\0" + encode(messages.Open.ID, 0, messages.Open(messages.PROTOCOL_VERSION, 0, 5).pack()))
+        assert [frame.identifier for frame in wire.receive(0.0)] == [0x620]
+        for seconds, arriving in ((0.0, [0x124, 0x022]), (1.1, [0x022])):
+            clock[0] = seconds
+            transport.write(set_point + stop)
+            assert [frame.identifier for frame in wire.receive(0.0)] == arriving
+        assert transport.bus_figures().stale == 1
+        transport.read(0.0)
+        transport.write(set_point)
+        assert len(wire.receive(0.0)) == 1, "nothing waits any more"
+
+
+def test_broken_long_messages_are_counted_and_say_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    """What nobody reads from standard error would stop the bridge."""
+    answers: list[CanFrame] = []
+    long = LongMessages(1, answers.append, at_board=True)
+    for _ in range(3):
+        assert long.receive(CanFrame(0x53E, bytes([0x10, 20, 1, 2, 3, 4, 5, 6]))) == [], "the rest never comes"
+    assert long.failed == 2 and len(answers) == 3
+    assert capfd.readouterr() == ("", "")
 
 
 def test_load_is_the_share_of_the_last_second() -> None:

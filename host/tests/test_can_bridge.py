@@ -147,11 +147,11 @@ def test_lost_bus_stops_the_motors_and_is_told_at_both_ends() -> None:
     carrier.start()
     threading.Timer(1.0, until.set).start()
     gone = f"the CAN bus {wire.name} has gone: closed by the other side"
-    unwritable = f"the CAN bus {wire.name} takes no frames: "
+    unwritable = f"the CAN bus {wire.name} takes no frames: closed by the other side"
     with bridged(PythonCanBus(BusName.parse(wire.name))) as board:
         result = execute(Request.single(straight, on=board.url, seconds=20))
         for error in (result.error, board.ended()):
-            assert str(error) == gone or str(error).startswith(unwritable)
+            assert str(error) in (gone, unwritable)
         assert (result.odometry_distance or 0.0) > 0.01
         stopped = board.telemetry_afterwards()
         assert stopped.pulse_left == 0 and stopped.latch != messages.Latch.NONE

@@ -165,6 +165,30 @@ def test_client_that_fetches_nothing_loses_frames_and_they_are_counted(bus: Sock
         assert len(received) > QUEUE_BYTES
 
 
+def test_client_that_leaves_with_a_full_queue_harms_nobody(bus: SocketcandBus) -> None:
+    with contextlib.closing(joined(bus)):
+        while not bus.dropped:
+            bus.send([CanFrame(0x321, bytes(8))] * 1000, 1.0)
+    bus.receive(0.5)
+    assert bus.clients == 0
+
+
+def test_flood_delays_itself_and_nobody_else(bus: SocketcandBus) -> None:
+    with contextlib.closing(joined(bus)) as flooding, contextlib.closing(joined(bus)) as quiet:
+        flooding.sendall(b"< send 123 8 1 2 3 4 5 6 7 8 >" * 2000)
+        began, taken = time.monotonic(), 0
+        while time.monotonic() < began + 0.1:
+            taken += len(bus.receive(0.0))
+        assert 0 < taken < 1000, "no more than 5,000 a second for long"
+        quiet.sendall(b"< send 7 0 >")
+        while CanFrame(7, b"") not in (now := bus.receive(0.0)):
+            assert time.monotonic() < began + 0.3, "before the flood has passed"
+            taken += len(now)
+        while taken + len(now) - 1 < 2000 and time.monotonic() < began + 2.0:
+            now += bus.receive(0.001)
+        assert taken + len(now) - 1 == 2000, "none is lost"
+
+
 def test_as_many_clients_as_it_takes_and_no_more(bus: SocketcandBus) -> None:
     with contextlib.ExitStack() as stack:
         clients = []

@@ -13,7 +13,6 @@ from boebot.can.bus import Bus
 from boebot.can.frames import NODE_MASK, PARTS, CanFrame, ForeignFrameError
 from boebot.can.iso_tp import LongMessages
 from boebot.can.layout import ISO_TP_TO_HOST, NODE_SHIFT
-from boebot.can.load import BusLoad
 from boebot.can.translator import BoardEnd
 from boebot.errors import BoardError
 from boebot.link.transport import Transport
@@ -34,7 +33,7 @@ class BridgeCounters:
     lost: int = 0
     """messages to the board of which a frame was missing"""
     stale: int = 0
-    """messages to the board that were of another session"""
+    """messages to the board of another session, and set-points while the bridge was behind the bus"""
     broken_off: int = 0
     """long messages that were not completed"""
 
@@ -42,12 +41,11 @@ class BridgeCounters:
 class Bridge:
     """A board's line on a bus."""
 
-    def __init__(self, transport: Transport, bus: Bus, node: int, load: BusLoad | None = None) -> None:
+    def __init__(self, transport: Transport, bus: Bus, node: int) -> None:
         """Neither is closed by the bridge. `node`: the board's number on the bus, 1 to 7."""
         self.transport = transport
         self.bus = bus
         self.node = node
-        self.load = load or BusLoad()
         self._long = LongMessages(node, self._send, at_board=True)
         self._end = BoardEnd(node, self._long.send)
         self._heard = False
@@ -85,7 +83,6 @@ class Bridge:
             for frame in frames:
                 self._send(frame)
         for frame in self.bus.receive(0.0):
-            self.load.add(self.transport.now(), frame)
             self._take(frame)
         self._write_long(self._long.service())
 
@@ -107,9 +104,7 @@ class Bridge:
         return counters
 
     def _send(self, frame: CanFrame) -> None:
-        now = self.transport.now()
-        self.bus.send([frame], now)
-        self.load.add(now, frame)
+        self.bus.send([frame], self.transport.now())
         self._counters.from_board += 1
 
     def _take(self, frame: CanFrame) -> None:
@@ -122,6 +117,8 @@ class Bridge:
                 )
             return
         self._counters.to_board += 1
+        if self.bus.is_behind and not self._end.fresh([frame]):
+            return
         if frame.identifier == self._long.listens_to:
             self._write_long(self._long.receive(frame))
             return

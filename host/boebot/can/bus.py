@@ -28,6 +28,7 @@ from boebot.link.ports.tcp import TIMEOUT_S, why_not
 _ERR_ACK = 0x20  # error frame of SocketCAN: nobody acknowledged (linux/can/error.h)
 _ERR_BUS_OFF = 0x40
 _AT_ONCE = 1000  # most frames of one look: a flood must not keep the board unheard
+BEHIND_S = 1.0
 _LEAVE_S = 0.2  # that the other side has to close a connection
 _READ_BYTES = 65536
 _ECHOES = 4096  # most own frames to be recognised when udp_multicast brings them back
@@ -47,6 +48,10 @@ class Bus(Protocol):
     @property
     def errors(self) -> int:
         """Error frames seen."""
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether frames wait faster than `receive` fetches them: the next one may be older than `BEHIND_S`."""
 
     def send(self, frames: Iterable[CanFrame], stamp_s: float) -> None:
         """Puts frames on the bus; `stamp_s`: since when they were there, where the bus keeps stamps.
@@ -134,6 +139,12 @@ class PythonCanBus:
         # python-can's client of socketcand takes the end of the connection for silence
         self._socket: socket.socket | None = getattr(self._bus, "_SocketCanDaemonBus__socket", None)
         self._closed = False
+        self._emptied_s = time.monotonic()
+
+    @property
+    def is_behind(self) -> bool:
+        """See `Bus`."""
+        return time.monotonic() > self._emptied_s + BEHIND_S
 
     def send(self, frames: Iterable[CanFrame], stamp_s: float) -> None:
         """See `Bus`."""
@@ -156,6 +167,7 @@ class PythonCanBus:
             for _ in range(_AT_ONCE):
                 message = self._bus.recv(wait_s)
                 if message is None:
+                    self._emptied_s = time.monotonic()
                     break
                 wait_s = 0.0
                 frame = self._frame(message)
@@ -233,7 +245,10 @@ def _check_listener(name: BusName, settings: dict[str, Any]) -> None:
 
 def _reason(error: Exception) -> str:
     """An exception in one line."""
-    if isinstance(error, OSError) and error.errno and not str(error).count("\n"):
-        return os.strerror(error.errno).lower()
+    cause = error if isinstance(error, OSError) else error.__cause__
+    if isinstance(cause, (ConnectionResetError, BrokenPipeError)):
+        return "closed by the other side"
+    if isinstance(cause, OSError) and cause.errno:
+        return os.strerror(cause.errno).lower()
     text = str(error).partition("Traceback")[0].strip().splitlines()  # of socketcand's client
     return text[0].strip() if text else type(error).__name__

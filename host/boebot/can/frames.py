@@ -114,6 +114,7 @@ def _parts() -> dict[int, _Part]:
 
 
 PARTS = _parts()
+SET_POINTS = frozenset(identifier for identifier, part in PARTS.items() if part.layout.is_set_point)
 (_STOP,) = LAYOUTS[messages.Stop.ID].identifiers  # the one message that may go to all nodes
 
 

@@ -5,6 +5,7 @@ The identity goes this way. The protocol itself is can-isotp's.
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -61,6 +62,7 @@ class LongMessages:
     def _opened(self) -> Any:
         if self._layer is None:
             isotp = import_extra("isotp")
+            logging.getLogger("isotp").addHandler(logging.NullHandler())  # else its remarks go to standard error
 
             def take(_: float) -> Any:
                 if not self._received:

@@ -9,7 +9,8 @@ The protocol is socketcand's raw mode (its doc/protocol.md): lines of text betwe
     server  < frame 321 23.424242 1122334455667788 >
 
 Every frame goes to all clients but its sender. It has no thread: `receive` and `send` do the work. What a client does
-not fetch is dropped and counted once its queue is full.
+not fetch is dropped and counted once its queue is full. What a client sends faster than a real bus carries waits in its
+connection: a flood delays itself, not the others.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import os
 import re
 import selectors
 import socket
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -28,7 +30,9 @@ CHANNEL = "can0"
 MOST_CLIENTS = 32
 QUEUE_BYTES = 4_000_000  # some 80,000 frames for each client
 _LINE_BYTES = 1000  # of text without an end
-_READ_BYTES = 65536
+_READ_BYTES = 4096
+_FRAMES_HZ = 5000  # most of one client for long; 500 kbit/s are 4000 full ones
+_BURST_S = 0.02  # by which a client may be ahead of that
 _QUIET_S = 0.1  # after rawmode: python-can reads "< ok >" and whatever follows as one piece
 _SEND = re.compile(rb"send ([0-9A-Fa-f]{1,8}) ([0-8])((?: +[0-9A-Fa-f]{1,2})*) *")
 
@@ -38,6 +42,7 @@ class _Client:
     connection: socket.socket
     received: bytearray = field(default_factory=bytearray)
     queue: bytearray = field(default_factory=bytearray)
+    paid_until_s: float = 0.0  # the time that its frames would take
     is_open: bool = False
     raw_from_s: float | None = None  # gets frames from then on
     watched: int = selectors.EVENT_READ
@@ -50,6 +55,7 @@ class SocketcandBus:
         name: how people call it.
         port: TCP port.
         errors: 0; there is no wire.
+        is_behind: False: clients wait, frames do not.
         dropped: frames that a client did not get, since its queue was full.
         rubbish: lines of clients that are no commands.
     """
@@ -78,6 +84,7 @@ class SocketcandBus:
         self.port: int = self._listener.getsockname()[1]
         self.name = f"socketcand:{CHANNEL}?port={self.port}"
         self.errors = 0
+        self.is_behind = False
         self.dropped = 0
         self.rubbish = 0
         self._clock = clock
@@ -100,15 +107,14 @@ class SocketcandBus:
 
     def receive(self, wait_s: float) -> list[CanFrame]:
         """The frames of clients; those with identifiers of 29 bits go to the other clients alone."""
+        now = time.monotonic()
         for key, events in self._selector.select(wait_s):
             if key.fileobj is self._listener:
                 self._accept()
                 continue
-            client = self._clients.get(key.fileobj)  # type: ignore[call-overload]
-            if client is not None and events & selectors.EVENT_READ:
+            client = self._clients[key.fileobj]  # type: ignore[index]
+            if events & selectors.EVENT_READ and client.paid_until_s <= now + _BURST_S:
                 self._read(client)
-            if client is not None and events & selectors.EVENT_WRITE:
-                self._flush(client)
         self._flush_all()
         taken, self._taken = self._taken, []
         return taken
@@ -147,6 +153,7 @@ class SocketcandBus:
         client.received += data
         *lines, rest = bytes(client.received).split(b">")
         client.received = bytearray(rest)
+        client.paid_until_s = max(client.paid_until_s, time.monotonic()) + len(lines) / _FRAMES_HZ
         for line in lines:
             self._obey(client, line.partition(b"<")[2].strip())
         if len(rest) > _LINE_BYTES:

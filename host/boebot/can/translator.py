@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from boebot.can.frames import ALL_NODES, Assembler, CanFrame, FrameMaker, whole_tick
+from boebot.can.frames import ALL_NODES, NODE_MASK, SET_POINTS, Assembler, CanFrame, FrameMaker, whole_tick
 from boebot.link import messages
 from boebot.link.fields import reader
 from boebot.link.frame import NO_SESSION, Decoder, encode
@@ -30,7 +30,7 @@ class _End:
 
     Attributes:
         session: number of the one that is open; 0: none.
-        stale: messages dropped for the session that they name.
+        stale: messages dropped: of another session, or set-points while the bus is behind.
         assembler: of the frames that come; it counts the lost ones.
     """
 
@@ -47,6 +47,12 @@ class _End:
     def _use_session(self, session: int) -> None:
         self.session = session
         self._decoder.seed = session or NO_SESSION
+
+    def fresh(self, frames: list[CanFrame]) -> list[CanFrame]:
+        """Those that may go on while the bus is behind: no set-points. One that is 2.56 s old would look fresh."""
+        kept = [frame for frame in frames if frame.identifier & ~NODE_MASK not in SET_POINTS]
+        self.stale += len(frames) - len(kept)
+        return kept
 
     def _frames(self, data: bytes) -> list[CanFrame]:
         """The messages in some bytes as CAN frames."""

@@ -76,7 +76,8 @@ class CanTransport:
         """Sends bytes of the link, as frames."""
         if self._closed:
             raise BoardError(f"{self.name} is closed")
-        self._send(self._end.from_link(data))
+        frames = self._end.from_link(data)
+        self._send(self._end.fresh(frames) if self._bus.is_behind else frames)
 
     def now(self) -> float:
         """The monotonic clock (s)."""

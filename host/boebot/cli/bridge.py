@@ -39,9 +39,6 @@ def bridge(
         ),
     ] = None,
     node: Annotated[int, typer.Option("--node", metavar="N", min=1, max=7, help="The board's number on the bus.")] = 1,
-    bitrate: Annotated[
-        int, typer.Option("--bitrate", metavar="N", min=1, help="Of the bus (bit/s), for its load.")
-    ] = 500_000,
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
@@ -52,7 +49,6 @@ def bridge(
     from boebot.can.bridge import Bridge
     from boebot.can.bus import Bus, BusName, PythonCanBus
     from boebot.can.extra import import_extra
-    from boebot.can.load import BusLoad
     from boebot.can.socketcand_server import SocketcandBus
 
     if (can is None) == (socketcand is None):
@@ -69,7 +65,7 @@ def bridge(
         transport = session.transport
         bus: Bus = PythonCanBus(name) if name is not None else SocketcandBus(socketcand or 0, transport.now)
         stack.callback(bus.close)
-        made = Bridge(transport, bus, node, BusLoad(bitrate))
+        made = Bridge(transport, bus, node)
         made.wait_for_board()
         url = f"can:{bus.name}" + ("" if node == 1 else f"{'&' if '?' in bus.name else '?'}node={node}")
         if json:
