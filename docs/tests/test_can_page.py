@@ -114,7 +114,7 @@ def wait_for_port(port: int) -> None:
 def test_ten_commands(tmp_path: Path) -> None:
     with socket.create_server(("localhost", 0)) as free:
         port = free.getsockname()[1]
-    text = PAGE.read_text().replace(PORT, str(port)).replace(SECONDS, "--seconds 4")
+    text = PAGE.read_text().replace(PORT, str(port)).replace(SECONDS, "--seconds 2")
     blocks = BLOCK.findall(text)
     lines = [line for language, block in blocks if language == "sh" for line in block.splitlines()]
     bridge, database, setting, viewer, monitor, logger, drive, plot, replay, report, by_hand = lines
@@ -134,4 +134,4 @@ def test_ten_commands(tmp_path: Path) -> None:
     assert Image.open(tmp_path / "ping.png").size[0] > 300
     assert "commands are the same" in compared
     with can.LogReader(tmp_path / "driven" / "can.blf") as log:
-        assert sum(message.arbitration_id == 0x321 for message in log) > 380
+        assert sum(message.arbitration_id == 0x321 for message in log) > 180
