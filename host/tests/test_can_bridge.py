@@ -186,6 +186,15 @@ def test_others_with_our_identifiers_stop_the_motors(frame: CanFrame, sentence: 
         assert stopped.pulse_left == 0 and stopped.latch != messages.Latch.NONE
 
 
+def test_board_with_a_number_that_is_taken_does_not_join() -> None:
+    name = BusName.parse("virtual:twins")
+    with bridged(PythonCanBus(name)) as first, contextlib.closing(PythonCanBus(name)) as bus:
+        with pytest.raises(BoardError, match="another board on virtual:twins sends as node 1, too"):
+            Bridge(first.session.transport, bus, 1).listen()
+        Bridge(first.session.transport, bus, 2).listen()
+        assert first.error is None, "nothing was sent"
+
+
 def test_bus_without_acknowledgement_stops_the_motors() -> None:
     with (
         bridged(PythonCanBus(BusName.parse("virtual:silent"))) as board,

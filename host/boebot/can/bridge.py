@@ -6,6 +6,7 @@ uses the board's identifiers, it stops the motors and ends.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ from boebot.link.transport import Transport
 STEP_S = 0.0004  # wait for the board between two looks at the bus: a frame to it is late by as much at most
 _HELLO_LIMIT_S = 4.0  # a boot loader may wait first
 _LAST_WORDS_S = 0.02
+_LISTEN_S = 0.3  # a board says something every 0.2 s
 
 
 @dataclass
@@ -50,6 +52,17 @@ class Bridge:
         self._end = BoardEnd(node, self._long.send)
         self._heard = False
         self._counters = BridgeCounters()
+
+    def listen(self) -> None:
+        """Says nothing yet: the board that has this number already is heard, and goes on undisturbed.
+
+        Raises:
+            BoardError: there is one, or the bus has gone.
+        """
+        end_s = time.monotonic() + _LISTEN_S
+        while (left_s := end_s - time.monotonic()) > 0:
+            for frame in self.bus.receive(left_s):
+                self._take(frame)
 
     def wait_for_board(self, limit_s: float = _HELLO_LIMIT_S) -> None:
         """Waits until the board has spoken.

@@ -66,6 +66,8 @@ def bridge(
         bus: Bus = PythonCanBus(name) if name is not None else SocketcandBus(socketcand or 0, transport.now)
         stack.callback(bus.close)
         made = Bridge(transport, bus, node)
+        if name is not None:
+            made.listen()
         made.wait_for_board()
         url = f"can:{bus.name}" + ("" if node == 1 else f"{'&' if '?' in bus.name else '?'}node={node}")
         if json:
