@@ -20,7 +20,7 @@ from boebot.running.together import execute_together
 from boebot.view.page_data import FORMAT
 from tools.bench.figures import figure
 
-SECONDS = 200.0
+SECONDS = 400.0
 SECONDS_IN_REAL_TIME = 10.0
 
 
