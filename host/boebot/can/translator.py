@@ -9,6 +9,7 @@ checksums of the bytes and for the byte in the CAN frames that tells sessions ap
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from boebot.can.frames import ALL_NODES, NODE_MASK, SET_POINTS, Assembler, CanFrame, FrameMaker, whole_tick
@@ -25,7 +26,7 @@ SendLong = Callable[[bytes], None]
 """Sends a message that has no CAN frames: its id and its payload, by ISO-TP"""
 
 
-class _End:
+class _End(ABC):
     """What both ends have in common: a decoder of the line's bytes, and the frames of a node.
 
     Attributes:
@@ -66,9 +67,9 @@ class _End:
                     self._send_long(bytes((message_id,)) + payload)
         return found
 
+    @abstractmethod
     def _follow(self, message_id: int, payload: bytes) -> None:
         """Learns from a message of the line."""
-        raise NotImplementedError
 
     def _is_of_session(self, message_id: int, session: int | None) -> bool:
         if messages.MESSAGES[message_id].DELIVERY in _WITHOUT_SESSION:
