@@ -103,6 +103,17 @@ def test_formats_hold_the_same_frames(run: RunResult, logs: dict[str, list[can.M
         assert times == sorted(times) and times == pytest.approx([time_s for time_s, _ in frames_of(run)], abs=2e-6)
 
 
+def test_telemetry_has_the_time_of_its_tick(logs: dict[str, list[can.Message]]) -> None:
+    """Though the host has read five ticks at once."""
+    messages = logs["blf"]
+    driven = [place for place, message in enumerate(messages) if message.arbitration_id == 0x120]
+    begun = [m for m in messages[driven[0] : driven[-1]] if m.arbitration_id == 0x321]
+    ticks = [int.from_bytes(m.data[:4], "little") for m in begun]
+    assert len(ticks) > 180 and ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+    since = [m.timestamp - begun[0].timestamp for m in begun]
+    assert since == pytest.approx([0.01 * (tick - ticks[0]) for tick in ticks], abs=0.001)
+
+
 def test_identity_goes_by_iso_tp_with_its_flow_control(run: RunResult, logs: dict[str, list[can.Message]]) -> None:
     assert run.identity is not None
     asked, first, go_on, *further = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 import logging
 import re
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from boebot.can.extra import import_extra
 from boebot.can.frames import NODE_MASK, NODES, PARTS, Assembler, CanFrame, CanMessage, ForeignFrameError
 from boebot.can.iso_tp import LongMessages
-from boebot.can.layout import NODE_SHIFT
+from boebot.can.layout import LAYOUTS, NODE_SHIFT
 from boebot.can.translator import BoardEnd, HostEnd
 from boebot.description.board_parameters import adapted, parameters_of
 from boebot.description.robots import RobotDescription, load_robot, robot_names
@@ -35,6 +35,7 @@ KINDS = ("blf", "asc", "log")
 
 _PER_UNIT = 10_000  # counts of a set-point per unit
 _SET_POINTS = {messages.SetpointSignal.ID: "signal", messages.SetpointSpeed.ID: "speed"}
+_TELEMETRY_BEGINS = LAYOUTS[messages.Telemetry.ID].identifiers[0]  # with `tick` and `time`
 _PARAMETER = {spec.id: name for name, spec in messages.PARAMETERS.items()}
 
 
@@ -51,31 +52,69 @@ class Sent(NamedTuple):
 def frames_of(result: RunResult, node: int = 1) -> Iterator[Sent]:
     """The CAN frames of a run on a board, oldest first; times from the first byte on.
 
+    Telemetry has the time of its tick, also where the host has read that of several ticks at once.
+
     Raises:
         BoebotError: the robot has no board.
     """
     record = result.record
     if not record.count("to_host"):
         raise BoebotError(f"robot {result.robot.name!r} has no line in this run, so no CAN frames")
-    pending: list[CanFrame] = []
-    long_from_board = LongMessages(node, pending.append, at_board=True)
-    long_from_host = LongMessages(node, pending.append, at_board=False)
+    waiting: list[CanFrame] = []  # of long messages
+    long_from_board = LongMessages(node, waiting.append, at_board=True)
+    long_from_host = LongMessages(node, waiting.append, at_board=False)
     board = BoardEnd(node, long_from_board.send)
     host = HostEnd(node, long_from_host.send)
     rows = heapq.merge(
         ((time_s, 0, data) for time_s, data in record.each_row("to_host")),
         ((time_s, 1, data) for time_s, data in record.each_row("to_board")),
     )
-    begin_s = None
-    for time_s, to_board, data in rows:
-        begin_s = time_s if begin_s is None else begin_s
-        pending += host.from_link(data) if to_board else board.from_board(data)
-        while pending:
-            frame = pending.pop(0)
-            yield Sent(time_s - begin_s, frame)
+    sending = _Sending()
+    begin_s = last_s = None
+    for read_s, to_board, data in rows:
+        if to_board:
+            pending = deque(Sent(read_s, frame) for frame in host.from_link(data))
+        else:
+            pending = deque(sending.stamped(board.from_board(data), read_s))
+        while pending or waiting:
+            pending.extend(Sent(read_s, frame) for frame in waiting)
+            waiting.clear()
+            time_s, frame = pending.popleft()
+            begin_s = time_s if begin_s is None else begin_s
+            last_s = time_s if last_s is None else max(last_s, time_s)
+            yield Sent(last_s - begin_s, frame)
             for end in (long_from_board, long_from_host):
                 if frame.identifier == end.listens_to:
                     end.receive(frame)  # it answers by flow control
+
+
+class _Sending:
+    """When the board sent what the host has read: the time that its telemetry names, and the shortest lag of the last
+    reads behind that time."""
+
+    def __init__(self) -> None:
+        self._lags: deque[float] = deque(maxlen=100)
+        self._newest_s = 0.0  # by the board's clock
+
+    def stamped(self, frames: list[CanFrame], read_s: float) -> list[Sent]:
+        """The frames of one read."""
+        board_s = [
+            int.from_bytes(frame.data[4:8], "little") * 1e-6
+            for frame in frames
+            if frame.identifier & ~NODE_MASK == _TELEMETRY_BEGINS
+        ]
+        if not board_s:
+            return [Sent(read_s, frame) for frame in frames]
+        if board_s[-1] < self._newest_s:  # the board's clock has begun anew
+            self._lags.clear()
+        self._newest_s = board_s[-1]
+        self._lags.append(read_s - board_s[-1])
+        lag_s = min(self._lags)
+        sent, place = [], -1
+        for frame in frames:
+            place += frame.identifier & ~NODE_MASK == _TELEMETRY_BEGINS
+            sent.append(Sent(min(board_s[max(place, 0)] + lag_s, read_s), frame))
+        return sent
 
 
 def save_log(result: RunResult, path: Path, node: int = 1) -> Path:
