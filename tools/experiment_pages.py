@@ -75,7 +75,7 @@ def listing(experiments: Iterable[Experiment]) -> str:
         "Each shows something that the lecture notes say, and is run by one command: `boebot experiment NAME` prints\n"
         "what was measured against what was expected, and writes the figure and its data; `make experiments` runs all\n"
         "and leaves one page of them, build/experiments/index.html. `make pictures` renews these pages. Seed is 1\n"
-        "here; `make soak` runs all at seeds 1 to 10. What is met at most seeds only has its rate on its page.\n\n"
+        "here; `make soak` runs all at seeds 1 to 10. One that misses at some seeds states its rate on its page.\n\n"
         "A run leaves, in the folder experiments or where `--out` says, NAME.png and NAME.svg, the figure; NAME.csv,\n"
         "its data, with units in the columns' names and an empty cell where there is no number; NAME.json, the\n"
         "verdict. The same seed gives the same bytes, however many processes `--jobs` allows. The exit code is 0 when\n"
