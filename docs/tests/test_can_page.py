@@ -1,4 +1,4 @@
-"""The page of the CAN tools: each of its commands is run as it stands, in order, with a robot of its own."""
+"""Runs each command of the page of the CAN tools as it stands, in order, on an emulated robot."""
 
 from __future__ import annotations
 
