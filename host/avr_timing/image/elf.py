@@ -7,7 +7,7 @@ which a firmware may say how often its loops run. The file need not have the las
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +18,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from avr_timing.errors import AnalysisError
+from avr_timing.image.chip import assumed_chip
 from avr_timing.image.source_lines import source_lines
 from avr_timing.program import LoopBound
 
@@ -26,7 +27,6 @@ FLASH_SIZE = 0x8000  # bytes
 RAM_START = 0x800100  # avr-gcc gives data memory the addresses from 0x800000
 RAM_END = 0x800900
 DATA_SPACE = 0x800000
-EM_AVR = "EM_AVR"
 PT_LOAD, EXECUTABLE, ALLOCATED = "PT_LOAD", 0x4, 0x2
 NOT_SAID = 0xFFFFFFFF
 # What pyelftools raises on a damaged file.
@@ -62,10 +62,11 @@ class Image:
     stack_start: int  # first value of the stack pointer
     lines: dict[int, str] = field(default_factory=dict)
     bounds: tuple[LoopBound, ...] = ()
+    assumed_chip: str = ""  # for people, where the file does not say for which chip it is
 
 
 def read_image(path: Path) -> Image:
-    """Reads an ELF file. Raises AnalysisError when it is not a linked program for an AVR, or is damaged."""
+    """Reads an ELF file. Raises AnalysisError when it is not a linked program for the ATmega328P, or is damaged."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -76,18 +77,15 @@ def read_image(path: Path) -> Image:
 @lru_cache(maxsize=4)
 def _read(path: Path, data: bytes) -> Image:
     """Read once for the same bytes."""
+    assumed = assumed_chip(path, data)
     try:
-        return _image(path, ELFFile(BytesIO(data)))
+        return replace(_image(path, ELFFile(BytesIO(data))), assumed_chip=assumed)
     except DAMAGE as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise AnalysisError(f"{path} is not an ELF file, or is damaged: {reason}") from error
 
 
 def _image(path: Path, elf: ELFFile) -> Image:
-    if elf["e_machine"] != EM_AVR:
-        raise AnalysisError(
-            f"{path} is for another processor ({elf['e_machine']}): an image for the ATmega328P is expected"
-        )
     if elf["e_type"] != "ET_EXEC":
         raise AnalysisError(f"{path} is not linked ({elf['e_type']}): an image as it is written to flash is expected")
     code, written = _flash(path, elf)
