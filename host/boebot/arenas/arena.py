@@ -85,6 +85,10 @@ class Arena:
         """A number that two arenas share only if their descriptions are equal."""
         return hashlib.sha256(repr(self.description).encode()).hexdigest()
 
+    def __reduce__(self) -> tuple[type[Arena], tuple[ArenaDescription]]:
+        """To copy and pickle it: made anew of its description."""
+        return Arena, (self.description,)
+
     def _add_polygon(self, polygon: Polygon, kind: int) -> None:
         corners = np.array(polygon.corners_m, dtype=np.float64)
         self._added(lib.arena_add_polygon(self.handle, _doubles(corners), len(corners), kind, _surface(polygon)))

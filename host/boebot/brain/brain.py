@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from boebot.brain.process import CognitiveProcess, MotorBehavior, Process
 from boebot.brain.utility import Utilities
@@ -114,6 +114,10 @@ class Brain:
         variables = ", ".join(variable.name for variable in self.variables)
         made_of = ", ".join(process.name for process in self.processes)
         return f"<Brain: {made_of}{f'; by {variables}' if variables else ''}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """To copy and pickle it: without the robot, so that the copy begins a run of its own."""
+        return {**vars(self), "_robot": None}
 
     def _check(self) -> None:
         if not self.processes or not any(isinstance(each, MotorBehavior) for each in self.processes):

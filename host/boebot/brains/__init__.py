@@ -206,7 +206,8 @@ def _find(source: str | Path) -> Path:
 
 def _execute(path: Path) -> ModuleType:
     """Runs the brain's file as a new module."""
-    name = f"boebot_brain_{path.stem}"
+    bundled = path.parent == FOLDER
+    name = f"{__name__}.{path.stem}" if bundled else f"boebot_brain_{path.stem}"  # pickles name a class by its module
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise BrainError(f"{path} is no brain file; a brain's file ends in .py or .toml")

@@ -105,16 +105,18 @@ class BatteryLevel(CognitiveProcess):
 
     def variable(self) -> StateVariable:
         """State variable "low": 1 - level, as of the last step; 0 before the first reading."""
+        return StateVariable("low", self._low, self.NEEDS)
 
-        def low(robot: Robot) -> float | None:
-            level = self.level
-            return None if level is None else 1 - level
-
-        return StateVariable("low", low, self.NEEDS)
+    def _low(self, robot: Robot) -> float | None:
+        level = self.level
+        return None if level is None else 1 - level
 
     def charging_variable(self) -> StateVariable:
         """State variable "charging": 1 on a charger, as of the last step, else 0."""
-        return StateVariable("charging", lambda robot: float(self.charging), self.NEEDS)
+        return StateVariable("charging", self._is_charging, self.NEEDS)
+
+    def _is_charging(self, robot: Robot) -> float:
+        return float(self.charging)
 
 
 def _effort(robot: Robot) -> float:

@@ -46,10 +46,10 @@ class Contact(CognitiveProcess):
 
 def contact() -> StateVariable:
     """State variable "contact": 1 while a whisker is touched; 0 on a robot without whiskers."""
+    return StateVariable("contact", _touched)
 
-    def read(robot: Robot) -> float:
-        if not robot.has("whiskers"):
-            return 0.0
-        return float(robot.whisker_left.pressed or robot.whisker_right.pressed)
 
-    return StateVariable("contact", read)
+def _touched(robot: Robot) -> float:
+    if not robot.has("whiskers"):
+        return 0.0
+    return float(robot.whisker_left.pressed or robot.whisker_right.pressed)

@@ -50,4 +50,7 @@ class Drift(CognitiveProcess):
 
     def variable(self) -> StateVariable:
         """State variable "drift": `value` as of the last step."""
-        return StateVariable("drift", lambda robot: self.value)
+        return StateVariable("drift", self._drifted)
+
+    def _drifted(self, robot: Robot) -> float:
+        return self.value

@@ -53,9 +53,8 @@ class LightSense(CognitiveProcess):
 
     def variable(self) -> StateVariable:
         """State variable "light": I / (I + scale) of the brighter side, as of the last step."""
+        return StateVariable("light", self._light, self.NEEDS)
 
-        def read(robot: Robot) -> float:
-            brighter = max(self.left or 0.0, self.right or 0.0)
-            return brighter / (brighter + self.scale)
-
-        return StateVariable("light", read, self.NEEDS)
+    def _light(self, robot: Robot) -> float:
+        brighter = max(self.left or 0.0, self.right or 0.0)
+        return brighter / (brighter + self.scale)

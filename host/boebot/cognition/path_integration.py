@@ -115,4 +115,7 @@ class PathIntegration(CognitiveProcess):
 
     def variable(self) -> StateVariable:
         """State variable "away": 1 - e^(-|h| / scale), as of the last step."""
-        return StateVariable("away", lambda robot: 1 - math.exp(-self.distance / self.scale), self.NEEDS)
+        return StateVariable("away", self._away, self.NEEDS)
+
+    def _away(self, robot: Robot) -> float:
+        return 1 - math.exp(-self.distance / self.scale)

@@ -95,9 +95,11 @@ def _looks_aside(robot: Robot) -> bool:
 
 def near() -> StateVariable:
     """State variable "near": the nearest of all that is seen (8.3)."""
-    return StateVariable(
-        "near", lambda robot: maximum((left_nearness(robot), right_nearness(robot), nearness_ahead(robot)))
-    )
+    return StateVariable("near", _nearest)
+
+
+def _nearest(robot: Robot) -> float | None:
+    return maximum((left_nearness(robot), right_nearness(robot), nearness_ahead(robot)))
 
 
 def _nearness(robot: Robot, name: str) -> float | None:

@@ -70,4 +70,7 @@ class StuckDetector(CognitiveProcess):
 
     def variable(self) -> StateVariable:
         """State variable "stuck": `share` as of the last step."""
-        return StateVariable("stuck", lambda robot: self.share)
+        return StateVariable("stuck", self._missing)
+
+    def _missing(self, robot: Robot) -> float:
+        return self.share

@@ -72,6 +72,10 @@ class LineMap:
         except (TypeError, ValueError, ArenaError) as error:
             raise BrainError(f"a map of lines expects segments, shape (n, 2, 2), in m: {error}") from None
 
+    def __reduce__(self) -> tuple[type[LineMap], tuple[Arena]]:
+        """To copy and pickle it: made anew of its arena."""
+        return LineMap, (self._arena,)
+
     def __repr__(self) -> str:
         """How much there is."""
         return f"<LineMap of {self.name}: {len(self.segments)} lines>"

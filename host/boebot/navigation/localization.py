@@ -97,7 +97,10 @@ class Localization(MotorBehavior):
     @property
     def due_variable(self) -> StateVariable:
         """ "due": 1 when the last scan is `every` seconds old, else 0."""
-        return StateVariable("due", lambda robot: float(robot.time - self._last_s >= self.every))
+        return StateVariable("due", self._is_due)
+
+    def _is_due(self, robot: Robot) -> float:
+        return float(robot.time - self._last_s >= self.every)
 
     def ask(self) -> None:
         """A scan is due at once."""
