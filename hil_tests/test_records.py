@@ -53,7 +53,7 @@ def test_killed_run_leaves_all_but_its_last_second(tmp_path: Path) -> None:
     whole = read(run / "record-mended.mcap")
     assert whole.record.rows("to_host") == cut.record.rows("to_host") and whole.table() == cut.table()
     rows = (run / "run.csv").read_text().splitlines()
-    assert len(rows) == 1 + cut.ticks
+    assert len(rows) == 1 + cut.record.ticks
 
 
 def reported(run: Path) -> RunResult | TogetherResult:
@@ -117,7 +117,7 @@ def test_record_goes_on_while_a_step_lasts(tmp_path: Path) -> None:
             time.sleep(0.05)
             with contextlib.suppress(library.BoebotError):  # it has hardly begun
                 cut = read(tmp_path)
-                kept.extend([(float(cut.shown.time[-1]), cut.steps)] if cut.ticks else [])
+                kept.extend([(float(cut.shown.time[-1]), cut.steps)] if cut.record.ticks else [])
 
     whole = library.run(step, robot="arsim", seconds=2, out=tmp_path)
     ((shown_s, steps),) = kept
@@ -153,5 +153,5 @@ def test_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path: Path) -> None:
 
 def test_run_without_a_record_has_none() -> None:
     result = library.run("wander", seconds=1, record=False)
-    assert (result.ticks, result.truth, result.odometry_distance) == (0, None, None)
+    assert (result.ticks, result.steps, result.truth, result.odometry_distance) == (None, 20, None, None)
     assert result.run_time == pytest.approx(1.0)

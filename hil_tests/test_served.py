@@ -152,7 +152,7 @@ def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp
     assert client.returncode == 1
     assert "has gone" in errors and "Traceback" not in errors
     result = read_run(tmp_path)
-    assert isinstance(result, RunResult) and result.ticks > 20
+    assert isinstance(result, RunResult) and result.record.ticks > 20
     assert (tmp_path / "replay.html").is_file()
 
 

@@ -174,7 +174,7 @@ def points(result: RunResult, folder: Path) -> list[str]:
 
         cost = timed(draw)
         size = (folder / "replay.html").stat().st_size
-        shown = min(count, result.ticks)
+        shown = min(count, result.record.ticks)
         name = f"{shown:,}" + (" (chosen)" if count == 20_000 else " (all)" if shown < count else "")
         rows.append([name, f"{cost:.2f}", f"{size / 1e6:.1f}"])
     return table(["points", "s for figures, picture and page", "MB of the page"], rows)

@@ -14,7 +14,10 @@ FIGURES: Mapping[str, str] = {
     "contact": "true_contact, which only a simulator knows",
     "odometry": "odometry_source",
     "period_ms": "period_s",
-    "longest_step_ms": "longest_step_s",
+    "longest_step_ms": "longest_step_s of wall_clock()",
+    "longest_step_s": "longest_step_s of wall_clock()",
+    "long_steps": "long_steps of wall_clock()",
+    "real_time_factor": "real_time_factor of wall_clock()",
     "slow_reading_age_ms": "slow_reading_age_s",
 }
 """Figures of a run and columns of run.csv."""

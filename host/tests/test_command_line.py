@@ -549,7 +549,7 @@ def ticks_in(folder: Path) -> int:
     """Of the run whose record is there."""
     result = read_run(folder)
     assert isinstance(result, RunResult)
-    return result.ticks
+    return result.record.ticks
 
 
 @pytest.mark.wall_clock

@@ -138,7 +138,7 @@ def test_columns_are_those_of_the_file(result: RunResult, tmp_path: Path) -> Non
     result.save(tmp_path, csv=True)
     heading, *rows = (tmp_path / "run.csv").read_text().splitlines()
     frame = result.to_pandas()
-    assert [frame.index.name, *frame.columns] == heading.split(",") and len(frame) == len(rows) == result.ticks
+    assert [frame.index.name, *frame.columns] == heading.split(",") and len(frame) == len(rows) == result.record.ticks
     assert list(frame.index) == pytest.approx(result.series.time, abs=1e-4)
     assert frame["tick"].dtype == "int64" and list(frame["tick"]) == list(result.series.raw["tick"])
     assert result.true_pose is not None
@@ -152,7 +152,7 @@ def test_columns_are_those_of_the_file(result: RunResult, tmp_path: Path) -> Non
 def test_robots_stand_below_each_other(together: TogetherResult) -> None:
     frame = together.to_pandas()
     assert frame.index.names == ["robot", "time_s"]
-    assert len(frame) == sum(robot.ticks for robot in together.robots)
+    assert len(frame) == sum(robot.record.ticks for robot in together.robots)
     assert list(frame.loc[2]["true_x_m"]) == list(together.robots[1].to_pandas()["true_x_m"])
 
 

@@ -60,7 +60,7 @@ def test_run_csv_by_windows_is_the_same(robot: str, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(windows, "TICKS", 130)
     tables.write_run(whole, by_windows)
     expected = tables.columns(whole)
-    assert columns_of(at_once) == expected and len(expected["tick"]) == whole.ticks
+    assert columns_of(at_once) == expected and len(expected["tick"]) == whole.record.ticks
     found = columns_of(by_windows)
     assert list(found) == list(expected)
     for name, cells in found.items():
@@ -88,8 +88,8 @@ def test_few_ticks_stand_for_many(robot: str, monkeypatch: pytest.MonkeyPatch) -
     few = dataclasses.replace(whole)
     monkeypatch.setattr("boebot.record.overview.POINTS", 300)
     monkeypatch.setattr(windows, "TICKS", 900)
-    stride = -(-whole.ticks // 300)
-    kept = np.unique(np.append(np.arange(0, whole.ticks, stride), whole.ticks - 1))
+    stride = -(-whole.record.ticks // 300)
+    kept = np.unique(np.append(np.arange(0, whole.record.ticks, stride), whole.record.ticks - 1))
     thin, every = few.overview.series, whole.series
     assert len(thin) == len(kept) <= 301 and few.table() == pytest.approx(whole.table(), nan_ok=True)
     assert np.array_equal(thin.time, every.time[kept]) and np.array_equal(thin.raw["tick"], every.raw["tick"][kept])

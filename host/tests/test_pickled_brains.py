@@ -6,6 +6,7 @@ import inspect
 import pickle
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
@@ -21,7 +22,10 @@ PLACES = {  # of the bundled brains of processes: robot, arena
     "explore": ("roller", "office"),
     "rounds": ("roller-charging", "office"),
 }
-NEEDED = {"BatteryLevel": {"empty": 5.0, "full": 7.8}, "Localization": {"plan": LineMap.of("room")}}
+NEEDED: dict[str, dict[str, Any]] = {
+    "BatteryLevel": {"empty": 5.0, "full": 7.8},
+    "Localization": {"plan": LineMap.of("room")},
+}
 
 
 def test_all_bundled_brains_of_processes_are_here() -> None:

@@ -55,7 +55,7 @@ def test_port_that_vanishes_in_mid_run() -> None:
     result = execute(Request.single(straight, on=served.path, seconds=20))
     assert isinstance(result.error, BoardError)
     assert str(result.error) == f"{served.path} has gone: unplugged, or closed by the other side"
-    assert result.ticks > 10 and len(result.series.time) == result.ticks
+    assert result.record.ticks > 10 and len(result.series.time) == result.record.ticks
 
 
 def test_late_brain_skips_steps_and_says_so() -> None:

@@ -103,7 +103,7 @@ def test_former_names_are_refused_with_the_new_ones(result: RunResult, former: s
 def test_csv_has_a_row_for_each_tick(result: RunResult, folder: Path) -> None:
     with (folder / "run.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == result.ticks
+    assert len(rows) == result.record.ticks
     middle = rows[1500]
     assert float(middle["time_s"]) == 15.0
     assert int(middle["tick"]) == result.series.raw["tick"][1500]
@@ -119,7 +119,7 @@ def test_raw_bytes_and_their_stamps_agree(result: RunResult, folder: Path) -> No
     hellos = [messages.Hello.unpack(payload) for number, _, payload in greeting.feed(received) if number == 0x80]
     decoder = frame.Decoder(next(hello.session for hello in hellos if hello.session))
     telemetry = [payload for message_id, _, payload in decoder.feed(received) if message_id == 0x90]
-    assert telemetry[-result.ticks - 5 :][: len(result.record.telemetry)][-1] in result.record.telemetry
+    assert telemetry[-result.record.ticks - 5 :][: len(result.record.telemetry)][-1] in result.record.telemetry
     assert (decoder.bad, decoder.lost) == (0, 0)
     with (folder / "wire.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -133,8 +133,8 @@ def test_raw_bytes_and_their_stamps_agree(result: RunResult, folder: Path) -> No
 
 
 def test_summary_is_the_table(result: RunResult, folder: Path) -> None:
-    beside: dict[str, object] = {"counters": {}, "watchdog_resets": []}
-    assert json.loads((folder / "summary.json").read_text()) == {"format": 3} | result.table() | beside
+    beside: dict[str, object] = {"counters": {}, "watchdog_resets": [], "wall_clock": result.wall_clock()}
+    assert json.loads((folder / "summary.json").read_text()) == {"format": 4} | result.table() | beside
 
 
 def test_picture_shows_something(folder: Path) -> None:
@@ -188,7 +188,7 @@ def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
     data = data_of((folder / "replay.html").read_text())
     time, x = (np.frombuffer(base64.b64decode(text), "<f4") for text in (data["rows"]["time"], data["rows"]["path"][0]))
     flags = np.frombuffer(base64.b64decode(data["rows"]["flags"]), np.uint8)
-    assert len(time) == len(x) == len(flags) == result.ticks
+    assert len(time) == len(x) == len(flags) == result.record.ticks
     assert time[-1] == 30.0
     assert np.allclose(x, result.true_pose.x, atol=1e-6)  # type: ignore[union-attr]
     assert np.array_equal(flags & page_data.LEFT_WHISKER != 0, result.series.flag("whisker_left", "pressed"))
@@ -234,7 +234,7 @@ def test_run_that_never_heard_of_its_board_still_leaves_files(tmp_path: Path, mo
     with pytest.raises(KeyboardInterrupt):
         boebot.run("wander", seconds=5, out=tmp_path)
     unheard = read_run(tmp_path)
-    assert isinstance(unheard, RunResult) and unheard.ticks == 0
+    assert isinstance(unheard, RunResult) and unheard.record.ticks == 0
     assert json.loads((tmp_path / "summary.json").read_text())["ended"] == "interrupted"
 
 

@@ -46,7 +46,7 @@ def test_brain_steps_at_every_multiple_of_its_period(session: InProcess, ticks: 
     assert len(seen) == math.ceil(100 / ticks) == result.steps
     assert all(tick % ticks == 0 for tick, _ in seen)
     assert [time for _, time in seen] == pytest.approx([ticks / 100 * n for n in range(len(seen))])
-    assert np.array_equal(np.diff(result.series.raw["tick"]), np.ones(result.ticks - 1))
+    assert np.array_equal(np.diff(result.series.raw["tick"]), np.ones(result.record.ticks - 1))
     assert result.run_time == pytest.approx(1.0)
     assert result.late_steps == 0
 

@@ -296,5 +296,5 @@ def test_steps_longer_than_the_period_are_counted(monkeypatch: pytest.MonkeyPatc
 
     result = boebot.run(step, robot="arsim", period=0.02, seconds=0.6)
     assert (result.steps, result.long_steps) == (30, 10) and result.longest_step == pytest.approx(0.03)
-    table = result.table()
-    assert (table["long_steps"], table["longest_step_s"]) == (10, 0.03)
+    figures = result.wall_clock()
+    assert (figures["long_steps"], figures["longest_step_s"], figures["wall_time_s"]) == (10, 0.03, 0.4)

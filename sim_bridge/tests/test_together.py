@@ -112,7 +112,7 @@ def test_two_that_drive_head_on_bump_and_go_on() -> None:
     first, second = one.robots
     assert (first.true_contacts or 0) >= 1 and (second.true_contacts or 0) >= 1
     assert first.true_pose is not None and second.true_pose is not None
-    count = min(first.ticks, second.ticks)
+    count = min(first.record.ticks, second.record.ticks)
     apart = [
         math.hypot(a - c, b - d)
         for a, b, c, d in zip(

@@ -36,7 +36,9 @@ def end(result: RunResult | TogetherResult, out: Path | None, wanted: Detail) ->
                     unsaved = error
                     files = [out / RECORD, *error.files] if isinstance(error, IncompleteError) else []
         if wanted is Detail.JSON:
-            output.print_json(result.table() | {"files": [str(path) for path in files]})
+            output.print_json(
+                result.table() | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]}
+            )
         elif files and wanted is not Detail.NOTHING:
             assert out is not None
             output.line(files_in(out, files))

@@ -66,7 +66,7 @@ def report(
     if isinstance(result.error, CutError):
         output.say(str(result.error))
     if wanted is Detail.JSON:
-        output.print_json(result.table() | {"files": [str(path) for path in files]})
+        output.print_json(result.table() | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]})
     elif wanted is not Detail.NOTHING:
         print_run(result, wanted)
         if files:

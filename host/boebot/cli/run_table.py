@@ -55,6 +55,8 @@ def print_run(result: RunResult | TogetherResult, wanted: Detail) -> None:
             if several:
                 output.line(f"robot {number}")
             output.print_table(robot.table())
+            output.line("by this computer's clock:")
+            output.print_table(robot.wall_clock())
     elif wanted is Detail.FEW:
         if several:
             output.print_rows(HEADER, [_row(number, robot) for number, robot in enumerate(robots, 1)])
@@ -75,7 +77,7 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
     table = result.table()
     where = f" in {table['arena']}" if table["arena"] else ""
     without = f", without {table['without']}" if table["without"] else ""
-    faster = f", {result.real_time_factor:.3g} times real time" if result.wall_time > 0 else ""  # of a cut record: none
+    faster = f", {result.real_time_factor:.3g} times real time" if result.real_time_factor else ""
     way = result.way_in_words()
     if (error_m := result.odometry_error) is not None:
         way.append(f"odometry off by {error_m:.2f} m at the end")
@@ -95,7 +97,7 @@ def _touched(result: RunResult) -> str:
 
 def not_zero(result: RunResult) -> list[str]:
     """What should be zero and is not, in words."""
-    table = result.table()
+    table = result.table() | result.wall_clock()
     wrong = {name: table[name] for name in ZERO if table[name]}
     return [f"{name} {value}" for name, value, _ in figures.rows(wrong)]
 

@@ -27,6 +27,7 @@ vehicle, movers     the run's, of the step      of a vehicle stepped by hand (si
 from __future__ import annotations
 
 import bisect
+import hashlib
 import time as wall
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
@@ -196,6 +197,17 @@ class Record:
         blocks = [block.times for block in self.blocks(stream)]
         return np.concatenate(blocks) if blocks else np.empty(0)
 
+    def digest(self, *streams: str) -> str:
+        """SHA-256 of these streams, whose rows have a fixed size, in hexadecimal digits: that of the digests of each
+        one's times (doubles) and of its rows' bytes. However the rows came in groups, it is the same."""
+        sums = [(stream, hashlib.sha256(), hashlib.sha256()) for stream in streams]
+        for group in self.groups():
+            for stream, times, rows in sums:
+                if stream in group:
+                    times.update(group[stream].times.astype("<f8").tobytes())
+                    rows.update(group[stream].data)
+        return hashlib.sha256(b"".join(times.digest() + rows.digest() for _, times, rows in sums)).hexdigest()
+
     def span(self, stream: str) -> tuple[float, float]:
         """Times of the first and the last row of a stream (s); 0 where it has none."""
         begin_s = end_s = None
@@ -277,7 +289,17 @@ class Record:
 
 
 class Unrecorded(Record):
-    """The record of a run that is not recorded: it stays empty."""
+    """The record of a run that is not recorded: it stays empty, and counts the steps of the brain."""
+
+    _steps = 0
+
+    def append_command(self, time_s: float, kind: str, left: float, right: float) -> None:
+        """It is counted."""
+        self._steps += 1
+
+    def count(self, stream: str) -> int:
+        """Of commands, how many there were; of other streams 0: nobody has counted."""
+        return self._steps if stream == "command" else 0
 
     def append(self, stream: str, time_s: float, data: bytes) -> None:
         """Nothing is kept."""

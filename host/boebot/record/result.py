@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +25,8 @@ from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
 from boebot.record.figures import counted
 from boebot.record.overview import Overview, overview
 from boebot.record.readings_series import ReadingsSeries
-from boebot.record.record import Record
+from boebot.record.record import Record, Unrecorded
+from boebot.record.record_file import RecordError
 from boebot.record.series import Pose, Series, truth_at
 from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions, TelemetrySeries
@@ -109,7 +110,7 @@ class RunResult(FormerNames):
 
     def _repr_html_(self) -> str:
         """The figures as a table and the picture below it, for notebooks."""
-        table = figures.html_table(self.table())
+        table = figures.html_table(self.table() | self.wall_clock())
         if not self.ticks:
             return table
         from boebot.view import on_screen
@@ -191,8 +192,9 @@ class RunResult(FormerNames):
 
     @cached_property
     def brain_record(self) -> BrainRecord | None:
-        """Steps and switches of a brain of processes; None: a brain of another kind."""
-        return None if self.brain_names is None else read_brain(self.record, self.brain_names)
+        """Steps and switches of a brain of processes; None: a brain of another kind, or not recorded."""
+        names = self.brain_names if self.is_recorded else None
+        return None if names is None else read_brain(self.record, names)
 
     @cached_property
     def shown(self) -> Shown:
@@ -227,7 +229,7 @@ class RunResult(FormerNames):
             slow=[name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)],
             has_odometry=self.has_odometry,
             has_truth=self.has_truth,
-            brain_names=self.brain_names,
+            brain_names=self.brain_names if self.is_recorded else None,
         )
 
     @property
@@ -254,23 +256,36 @@ class RunResult(FormerNames):
         return self.overview.whisker_touches
 
     @property
-    def ticks(self) -> int:
-        """Control ticks whose telemetry was received, or steps of a robot without a board."""
-        return self.record.ticks
+    def is_recorded(self) -> bool:
+        """Else few figures are known: those that need the record are None."""
+        return not isinstance(self.record, Unrecorded)
+
+    @cached_property
+    def hash(self) -> str | None:
+        """SHA-256 of what really happened and of what the brain commanded, step by step, in hexadecimal digits; of a
+        real robot of the commands. Runs that are equal have the same (docs/reference/run-files.md). None: the run was
+        not recorded, or not to its end."""
+        is_whole = self.is_recorded and not isinstance(self.error, RecordError)
+        return self.record.digest("truth", "command") if is_whole else None
 
     @property
-    def overruns(self) -> int:
-        """Control ticks whose work did not end in time."""
+    def ticks(self) -> int | None:
+        """Control ticks whose telemetry was received, or steps of a robot without a board; None: not recorded."""
+        return self.record.ticks if self.is_recorded else None
+
+    @property
+    def overruns(self) -> int | None:
+        """Control ticks whose work did not end in time; None: not recorded."""
         return self.overview.overruns
 
     @property
-    def dead_man_stops(self) -> int:
-        """Times the motors stopped because no fresh set-point came."""
+    def dead_man_stops(self) -> int | None:
+        """Times the motors stopped because no fresh set-point came; None: not recorded."""
         return self.overview.dead_man_stops
 
     @property
-    def fallback_takeovers(self) -> int:
-        """Times the board's own brain took over because the host was silent."""
+    def fallback_takeovers(self) -> int | None:
+        """Times the board's own brain took over because the host was silent; None: not recorded."""
         return self.overview.fallback_takeovers
 
     @property
@@ -299,9 +314,9 @@ class RunResult(FormerNames):
         return None if pose is None or placed is None else math.dist(placed.at(-1)[:2], pose.at(-1)[:2])
 
     @property
-    def real_time_factor(self) -> float:
-        """How many times faster than the wall clock the run was."""
-        return self.run_time / self.wall_time if self.wall_time > 0 else 0.0
+    def real_time_factor(self) -> float | None:
+        """How many times faster than the wall clock the run was; None: not known, as of a record that is cut."""
+        return self.run_time / self.wall_time if self.wall_time > 0 else None
 
     @property
     def slow_reading_age(self) -> float | None:
@@ -311,10 +326,11 @@ class RunResult(FormerNames):
 
     def table(self) -> Figures:
         """The run's figures by name: numbers and texts, units in the names; None: not known, or nothing that this robot
-        has."""
+        has. Runs that are equal have equal ones: what depends on this computer's speed is in `wall_clock`."""
         on_board = self.layout is None
         slow_age, identity, brain = self.slow_reading_age, self.identity, self.overview.brain
-        shares = {} if brain is None else brain.shares(self.run_time)
+        unknown = dict.fromkeys(() if self.brain_names is None else self.brain_names.behaviors)
+        shares: Mapping[str, float | None] = unknown if brain is None else brain.shares(self.run_time)
         return Figures(
             {
                 "brain": self.brain,
@@ -333,11 +349,9 @@ class RunResult(FormerNames):
                 "period_s": round(self.period, 6),
                 "steps": self.steps,
                 "late_steps": self.late_steps,
-                "long_steps": self.long_steps,
-                "longest_step_s": round(self.longest_step, 6),
                 "unrealisable": self.unrealisable,
                 "behavior_switches": None if brain is None else brain.behavior_switches,
-                **{f"{name}_share": round(share, 4) for name, share in shares.items()},
+                **{f"{name}_share": _rounded(share, 4) for name, share in shares.items()},
                 "ticks": self.ticks,
                 "slow_readings": None if slow_age is None else self.record.count(DevicesTelemetry.NAME),
                 "slow_reading_age_s": _rounded(slow_age, 6),
@@ -350,11 +364,23 @@ class RunResult(FormerNames):
                 "sessions_lost": self.sessions_lost if on_board else None,
                 "touched": self.touched,
                 "hung_at": hangs.places(self.watchdog_resets),
-                "real_time_factor": round(self.real_time_factor, 2),
                 "firmware": None if identity is None else text(identity.firmware_version),
                 "compiler": None if identity is None else text(identity.compiler),
                 "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
+                "hash": self.hash,
                 "ended": "complete" if self.error is None else why(self.error),
+            }
+        )
+
+    def wall_clock(self) -> Figures:
+        """Figures by the wall clock of the computer, in which runs that are equal differ; None: not known."""
+        is_known = self.wall_time > 0
+        return Figures(
+            {
+                "wall_time_s": round(self.wall_time, 3) if is_known else None,
+                "real_time_factor": _rounded(self.real_time_factor, 2),
+                "long_steps": self.long_steps if is_known else None,
+                "longest_step_s": round(self.longest_step, 6) if is_known else None,
             }
         )
 
@@ -428,7 +454,8 @@ class TogetherResult:
     def _repr_html_(self) -> str:
         """A table for each robot and the picture of them all, for notebooks."""
         tables = "".join(
-            f"<h4>robot {n}</h4>{figures.html_table(robot.table())}" for n, robot in enumerate(self.robots, 1)
+            f"<h4>robot {n}</h4>{figures.html_table(robot.table() | robot.wall_clock())}"
+            for n, robot in enumerate(self.robots, 1)
         )
         if not any(robot.ticks for robot in self.robots):
             return tables
@@ -440,6 +467,10 @@ class TogetherResult:
         """The figures by name: of each robot, and how the run ended."""
         ended = "complete" if self.error is None else why(self.error)
         return {"robots": [result.table() for result in self.robots], "ended": ended}
+
+    def wall_clock(self) -> dict[str, Any]:
+        """Of each robot. See `RunResult.wall_clock`."""
+        return {"robots": [result.wall_clock() for result in self.robots]}
 
     def plot(self) -> Figure:
         """All robots from above, as in run.png. See `RunResult.plot`."""

@@ -18,7 +18,7 @@ from typing import IO
 from boebot.errors import BoebotError
 
 RECORD, MENDED = "record.mcap", "record-mended.mcap"
-FORMAT = 3  # of a record and of the files made from it; CHANGELOG.md says what is new in each
+FORMAT = 4  # of a record and of the files made from it; CHANGELOG.md says what is new in each
 FILES = (
     "summary.json",
     "run.png",

@@ -118,6 +118,7 @@ def write_summary(result: RunResult, path: Path) -> None:
     summary["watchdog_resets"] = [
         asdict(reset) | {"time_s": round(reset.time_s - result.clock_offset, 6)} for reset in result.watchdog_resets
     ]
+    summary["wall_clock"] = result.wall_clock()
     path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 
 

@@ -1,0 +1,93 @@
+"""Runs that are equal have equal figures and one hash, however they were recorded and watched; of a run that is not
+recorded each figure is right, or None."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import struct
+from functools import cached_property
+from pathlib import Path
+
+import pytest
+
+import boebot
+from boebot.behaviors import Avoid, Wander
+from boebot.brain import Brain, Utility
+from boebot.cognition import near
+from boebot.live.live_view import LiveView
+from boebot.record import record
+from boebot.record.reading import read_run
+from boebot.record.result import RunResult
+from boebot.record.run_folder import RunFolder
+from boebot.running.runner import execute
+from boebot.running.tasks import Request
+from boebot.view.tables import write_summary
+
+ROBOTS = ("arsim", "shieldbot-charging")  # without a board, and with one that has slow devices
+FIGURES = (cached_property, property)
+
+
+def mind() -> Brain:
+    return Brain([Wander(utility=Utility(b=0.5)), Avoid(utility=Utility(b=-1.0, w={"near": 3.0}))], [near()])
+
+
+def digest(run: RunResult) -> str:
+    """As docs/reference/run-files.md defines it."""
+    parts = b""
+    for stream in ("truth", "command"):
+        rows = run.record.rows(stream)
+        parts += hashlib.sha256(b"".join(struct.pack("<d", time_s) for time_s, _ in rows)).digest()
+        parts += hashlib.sha256(b"".join(data for _, data in rows)).digest()
+    return hashlib.sha256(parts).hexdigest()
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_equal_runs_have_equal_tables_and_one_hash(robot: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In memory and on disk, in whichever groups rows came, watched or not."""
+    request = Request.single(mind(), robot, seconds=1, seed=2)
+    plain = execute(request)
+    assert plain.hash == digest(plain)
+    monkeypatch.setattr(record, "EACH_S", 0.0)  # each step is a group
+    with RunFolder(tmp_path) as folder:
+        grouped = execute(request, folder=folder)
+    read = read_run(tmp_path)
+    assert isinstance(read, RunResult) and len(list(read.record.groups())) >= 20
+    view = LiveView(lambda url: None, speed=None)
+    watched = execute(request, onlooker=view)
+    view.close()
+    summaries = []
+    for run in (plain, grouped, read, watched):
+        assert run.table() == plain.table()
+        write_summary(run, tmp_path / "summary.json")
+        summaries.append(json.loads((tmp_path / "summary.json").read_text()))
+        assert summaries[-1].pop("wall_clock").keys() == run.wall_clock().keys()
+    assert summaries == [summaries[0]] * 4 and summaries[0]["hash"] == plain.hash
+    assert boebot.run(mind(), robot, seconds=1, seed=3).hash != plain.hash
+
+
+def test_each_robot_of_a_run_has_its_hash() -> None:
+    members = [boebot.Member(brain=mind(), robot="arsim") for _ in range(2)]
+    one, other = boebot.run_together(members, seconds=2).robots
+    assert one.hash == digest(one) and other.hash == digest(other) != one.hash
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_of_an_unrecorded_run_each_figure_is_right_or_none(robot: str) -> None:
+    recorded, unrecorded = (boebot.run(mind(), robot, seconds=3, record=kept) for kept in (True, False))
+    expected, found = recorded.table(), unrecorded.table()
+    assert found.keys() == expected.keys()
+    assert {name: value for name, value in found.items() if value not in (None, expected[name])} == {}
+    assert (found["steps"], found["run_time_s"], found["ticks"], found["wander_share"]) == (60, 3.0, None, None)
+    assert unrecorded.summary() == f"brain on {robot} ({recorded.board}), 3.0 s, distance unknown, seed 1, complete"
+    for name, kind in inspect.getmembers_static(RunResult, lambda member: isinstance(member, FIGURES)):
+        value = getattr(unrecorded, name)
+        if isinstance(value, int | float) and name not in ("is_recorded", "has_truth", "real_time_factor"):
+            assert value == getattr(recorded, name), (name, kind)
+
+
+def test_a_former_figure_names_where_it_is_now() -> None:
+    run = boebot.run("wander", seconds=0.1)
+    with pytest.raises(KeyError, match=r"'long_steps' was renamed; expected long_steps of wall_clock\(\)"):
+        run.table()["long_steps"]
