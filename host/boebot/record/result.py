@@ -26,7 +26,6 @@ from boebot.record.figures import counted
 from boebot.record.overview import Overview, overview
 from boebot.record.readings_series import ReadingsSeries
 from boebot.record.record import Record, Unrecorded
-from boebot.record.record_file import RecordError
 from boebot.record.series import Pose, Series, truth_at
 from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions, TelemetrySeries
@@ -263,10 +262,9 @@ class RunResult(FormerNames):
     @cached_property
     def hash(self) -> str | None:
         """SHA-256 of what really happened and of what the brain commanded, step by step, in hexadecimal digits; of a
-        real robot of the commands. Runs that are equal have the same (docs/reference/run-files.md). None: the run was
-        not recorded, or not to its end."""
-        is_whole = self.is_recorded and not isinstance(self.error, RecordError)
-        return self.record.digest("truth", "command") if is_whole else None
+        real robot of the commands. Runs that are equal have the same (docs/reference/run-files.md). Of a record that
+        is cut: of what it holds. None: the run was not recorded."""
+        return self.record.digest("truth", "command") if self.is_recorded else None
 
     @property
     def ticks(self) -> int | None:
