@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,37 +13,52 @@ from avr_timing.bounds.wcet import WorstCase
 from avr_timing.bounds.worst_path import worst_path
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.graph import program_of
-from avr_timing.image.elf import read_image
+from avr_timing.image.elf import Image, read_image
+from avr_timing.program import Program
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Prints a row for each function. Exit code: 0, or 2 where the image or a function is refused."""
+    """Prints a row for each function. Exit code: 0; 1 where a function that is named has no bound, or any could not be
+    followed, or where the output is not read to its end; 2 where the image is refused."""
     parser = argparse.ArgumentParser("python -m avr_timing", description="Worst case of functions of an AVR image.")
     parser.add_argument("image", type=Path, help="ELF file for the ATmega328P, with symbols")
     parser.add_argument("function", nargs="*", help="names; else all functions of the image")
     parser.add_argument("--path", action="store_true", help="the worst path of the functions that are named, by line")
     given = parser.parse_args(arguments)
     try:
-        (_show_paths if given.path else _show_bounds)(given.image, given.function)
+        image = read_image(given.image)
+        if image.assumed_chip:
+            print(image.assumed_chip, file=sys.stderr)
+        program = program_of(image)
+        entries = {name: program.entry(name) for name in given.function}
+        judged = _show_paths(program, entries) if given.path else _show_bounds(image, program, entries)
+        sys.stdout.flush()
     except AnalysisError as error:
         print(error, file=sys.stderr)
         return 2
-    return 0
+    except BrokenPipeError:  # as behind `| head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return 0 if judged else 1
 
 
-def _show_bounds(path: Path, names: list[str]) -> None:
-    image = read_image(path)
-    program = program_of(image)
+def _show_bounds(image: Image, program: Program, asked: dict[str, int]) -> bool:
+    """Whether all functions have bounds that were asked for; of a whole image, whether all could be followed."""
     worst, stack = WorstCase(program), Stack(program)
-    names = names or sorted(name for name, entry in program.by_name.items() if entry)  # without the reset
-    entries = {name: program.entry(name) for name in names}
-    print(f"{path.name}: {image.flash_bytes:,} bytes of flash, {image.ram_bytes:,} of RAM without the stack")
+    unnamed = program.functions if not program.by_name else program.unproven
+    found = program.by_name | {program.functions[entry].name: entry for entry in unnamed}
+    # Without the reset, where that can be followed.
+    entries = asked or {name: entry for name, entry in sorted(found.items()) if entry or entry in program.unproven}
+    judged, name = bool(asked) or not program.unproven, Path(image.path).name
+    print(f"{name}: {image.flash_bytes:,} bytes of flash, {image.ram_bytes:,} of RAM without the stack")
     print(f"{'cycles':>10} {'stack':>6}  function")
     for name, entry in entries.items():
         cycles, no_cycles = _text(lambda entry: worst.of(entry).cycles, entry)
         depth, no_depth = _text(lambda entry: stack.of(entry).bytes, entry)
         reasons = "; ".join(dict.fromkeys(reason for reason in (no_cycles, no_depth) if reason))
+        judged = judged and not (asked and reasons)
         print(f"{cycles:>10} {depth:>6}  {name}{reasons and f': {reasons}'}")
+    return judged
 
 
 def _text(bound: Callable[[int], int], entry: int) -> tuple[str, str]:
@@ -53,13 +69,20 @@ def _text(bound: Callable[[int], int], entry: int) -> tuple[str, str]:
         return "-", str(error)
 
 
-def _show_paths(path: Path, names: list[str]) -> None:
-    program = program_of(read_image(path))
-    for name in names:
-        rows = worst_path(WorstCase(program), program.entry(name))
+def _show_paths(program: Program, asked: dict[str, int]) -> bool:
+    """Whether all functions have bounds that were asked for."""
+    judged = True
+    for name, entry in asked.items():
+        try:
+            rows = worst_path(WorstCase(program), entry)
+        except AnalysisError as error:
+            print(f"{'-':>10}  {name}: {error}")
+            judged = False
+            continue
         print(f"{sum(row.cycles for row in rows):>10,}  {name}")
         for row in rows:
             print(f"{row.cycles:>10,}  {row.function} {row.line or '-'}, {row.runs:,} times")
+    return judged
 
 
 if __name__ == "__main__":

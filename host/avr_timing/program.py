@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 
 from avr_timing.errors import AnalysisError
 
+REFUSED = "?"  # in place of an instruction at which a function could not be followed any further
+
 
 @dataclass(frozen=True, slots=True)
 class Instruction:
@@ -88,7 +90,7 @@ class Program:
     by_name: dict[str, int]  # entry of each named function
     bounds: tuple[LoopBound, ...] = ()
     lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" of an instruction's address, where known
-    unproven: dict[int, str] = field(default_factory=dict)  # why it is not known where a function leads, by its entry
+    unproven: dict[int, str] = field(default_factory=dict)  # why a function could not be followed, by its entry
 
     def entry(self, function: str | int) -> int:
         """Of a function by name, or by the entry itself. Raises AnalysisError where there is none of that name."""

@@ -91,9 +91,10 @@ def test_refused_in_a_sentence(tmp_path: Path, head: str, body: str, words: str)
         (NUMBER, GOTO, r"\(program\.c:\d+\): where `ijmp` leads cannot be proven", True),
         ("", "while (PINB != 0) {}", NO_BOUND, False),
         (PRINTED, 'sprintf(text, "%d", number);', r"0x[0-9A-F]{4} .*: where `icall` leads cannot be proven", True),
+        ("", '__asm__("sleep");', r"first_task waits asleep at 0x[0-9A-F]{4} \(program\.c:\d+\)", False),
         (ROOTS, "root = sqrt(root);", r"the loop at 0x[0-9A-F]{4} .* has no bound", False),
     ],
-    ids=["recursion", "pointer", "computed goto", "waits", "printf", "square root"],
+    ids=["recursion", "pointer", "computed goto", "waits", "printf", "waits asleep", "square root"],
 )
 def test_task_without_a_bound_is_named_and_counts_with_its_budget(
     tmp_path: Path, head: str, body: str, words: str, is_deep: bool

@@ -6,6 +6,8 @@ of the source, and rows at one address are of different loops, the outer one fir
 outer loop's body before the inner loop, both bodies begin at the inner loop's header. Copies of one row that run one
 after the other in one pass are of a loop within, which the compiler unrolled, and bound nothing around it.
 
+A loop that waits asleep is counted by its time alone: what wakes it comes from outside.
+
 A loop whose body is empty may have its row at its test, which runs once more than the body; count it there.
 """
 
@@ -14,10 +16,11 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from avr_timing.bounds import loop_counts
+from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Known
 from avr_timing.flow.loops import IrreducibleError, Loop, loops_of
 from avr_timing.flow.paths import Mark
-from avr_timing.program import Function, Program
+from avr_timing.program import Block, Function, Program
 
 _Marks = dict[int, list[Mark]]
 _Found = list[tuple[Loop[int], Loop[int] | None]]
@@ -38,11 +41,32 @@ def marks_of(program: Program, function: Function, known: Known) -> _Marks:
         shown = loop_counts.by_counter(loop, known, program)
         if shown is None:
             shown = loop_counts.by_execution(loop, known)
-        if shown is not None:
+        if shown is not None and not any(sleeps(function.blocks[node]) for node in _own(loop)):
             for node in _own(loop):
                 result.pop(node, None)
             result[loop.header] = [Mark(loop.header, shown, None)]
     return result
+
+
+def sleeps(block: Block) -> bool:
+    """Whether the CPU waits asleep in it, until an interrupt wakes it."""
+    return any(instruction.mnemonic == "sleep" for instruction in block.instructions)
+
+
+def check_sleep(program: Program, function: Function, marks: _Marks) -> None:
+    """Raises AnalysisError where a function waits asleep, which takes no time that its instructions show, but for a
+    loop of which the source says the time."""
+    timed: set[int] = set()
+    for loop, _ in _with_parents(function):
+        rows = [mark for node in _own(loop) for mark in marks.get(node, ())]
+        if rows and all(mark.passes is None for mark in rows):
+            timed |= _own(loop)
+    for block in function.blocks.values():
+        if block.start not in timed and sleeps(block):
+            raise AnalysisError(
+                f"{function.name} waits asleep at {program.where(block.start)}, so it has no bound; "
+                "expected a loop around it with its time in the source (LOOP_CYCLES)"
+            )
 
 
 def _drop_unrolled(marks: _Marks, loop: Loop[int], function: Function) -> None:

@@ -13,9 +13,9 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from avr_timing.errors import AnalysisError
-from avr_timing.flow.constants import Part, State, step
+from avr_timing.flow.constants import Context, Known, Part, State, known, root, step
 from avr_timing.image.registers import ZERO, is_call, pushes_only
-from avr_timing.program import Block, Function, Instruction, Program
+from avr_timing.program import Block, Instruction, Program
 
 ADDRESS = 2  # bytes that a call or an interrupt puts on the stack
 SPL, SPH = 0x3D, 0x3E  # I/O addresses
@@ -57,7 +57,8 @@ class Stack:
     def __init__(self, program: Program, left_out: Collection[int] = ()) -> None:
         """`left_out`: entries of functions that count as if they needed nothing but their return address."""
         self.program = program
-        self._depths = {entry: Depth(0, (program.functions[entry].name,)) for entry in left_out}
+        self._left_out = left_out
+        self._depths: dict[tuple[int, Context], Depth] = {}
         self._under_way: list[int] = []
 
     def of(self, function: str | int) -> Depth:
@@ -66,21 +67,28 @@ class Stack:
         Raises:
             AnalysisError: no such function; recursion; a depth that is not the same on all ways or depends on data.
         """
-        function = self.program.entry(function)
-        if function not in self._depths:
-            if function in self.program.unproven:
-                raise AnalysisError(self.program.unproven[function])
-            name = self.program.functions[function].name
-            if function in self._under_way:
+        entry = self.program.entry(function)
+        return self._of(entry, root(self.program.functions[entry]))
+
+    def _of(self, entry: int, context: Context) -> Depth:
+        """Of a function that is entered with these registers: ways that they close do not count (wcet.py)."""
+        key, function = (entry, context), self.program.functions[entry]
+        if entry in self._left_out:
+            return Depth(0, (function.name,))
+        if entry in self.program.unproven:
+            raise AnalysisError(self.program.unproven[entry])
+        if key not in self._depths:
+            if entry in self._under_way:
                 raise AnalysisError(
-                    f"recursion at {self.program.where(function)}: {name} calls itself; expected functions that do not"
+                    f"recursion at {self.program.where(entry)}: {function.name} calls itself; "
+                    "expected functions that do not"
                 )
-            self._under_way.append(function)
+            self._under_way.append(entry)
             try:
-                self._depths[function] = self._depth(self.program.functions[function])
+                self._depths[key] = self._depth(known(function, context))
             finally:
                 self._under_way.pop()
-        return self._depths[function]
+        return self._depths[key]
 
     def image(self) -> ImageDepth:
         """Of the whole image: `main`, and the worst nesting of interrupts on top of it.
@@ -97,31 +105,33 @@ class Stack:
         others.sort(key=lambda depth: -depth.bytes)
         return ImageDepth(self.of("main"), (*nesting, *others[:1]))
 
-    def _depth(self, function: Function) -> Depth:
+    def _depth(self, inside: Known) -> Depth:
+        function = inside.function
         begin = _State(0, State({ZERO: 0}))
         states = {function.entry: begin}
         work = [function.entry]
         deepest = Depth(0, (function.name,))
         while work:
             block = function.blocks[work.pop()]
-            state, found = self._run(block, states[block.start], function)
+            state, found = self._run(block, states[block.start], inside)
             if found.bytes > deepest.bytes:
                 deepest = found
             for edge in block.edges:
-                known = states.get(edge.to)
-                if known is not None and (known.depth, known.high) != (state.depth, state.high):
+                before = states.get(edge.to)
+                if before is not None and (before.depth, before.high) != (state.depth, state.high):
                     raise AnalysisError(
-                        f"{function.name} reaches {self.program.where(edge.to)} with {known.depth} and with "
+                        f"{function.name} reaches {self.program.where(edge.to)} with {before.depth} and with "
                         f"{state.depth} bytes on the stack; expected one depth at each place"
                     )
-                merged = state if known is None else replace(state, known=known.known.merge(state.known))
-                if known is None or merged != known:
+                merged = state if before is None else replace(state, known=before.known.merge(state.known))
+                if before is None or merged != before:
                     states[edge.to] = merged
                     work.append(edge.to)
         return deepest
 
-    def _run(self, block: Block, state: _State, function: Function) -> tuple[_State, Depth]:
+    def _run(self, block: Block, state: _State, inside: Known) -> tuple[_State, Depth]:
         """The state at the end of a block, and the greatest depth within it."""
+        function = inside.function
         deepest = Depth(state.depth, (function.name,))
         for instruction in block.instructions:
             state = self._step(instruction, state)
@@ -130,7 +140,7 @@ class Stack:
         last = block.instructions[-1]
         own = ADDRESS if is_call(last) else 0
         for callee in block.calls:
-            called = self.of(callee)
+            called = self._of(callee, inside.handed(block))
             if state.depth + own + called.bytes > deepest.bytes:
                 deepest = Depth(state.depth + own + called.bytes, (function.name, *called.chain))
         if last.mnemonic in ("ret", "reti") and state.depth != 0:
@@ -153,11 +163,11 @@ class Stack:
             depth, high = self._written(instruction, state)
         if depth < 0:
             raise AnalysisError(f"more is popped than was pushed at {self.program.where(instruction.address)}")
-        known = step(instruction, state.known)
+        after = step(instruction, state.known)
         if name == "in" and operands[1] in (SPL, SPH):
             read = Part(AT_ENTRY, -depth & 0xFFFF, operands[1] == SPH)
-            known = replace(known, parts=known.parts | {operands[0]: read})
-        return _State(depth, known, high)
+            after = replace(after, parts=after.parts | {operands[0]: read})
+        return _State(depth, after, high)
 
     def _written(self, instruction: Instruction, state: _State) -> tuple[int, int | None]:
         """Depth, and SPH's where SPL is still to come, behind a write to one of the two."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from avr_timing.bounds.loop_bounds import marks_of
+from avr_timing.bounds.loop_bounds import check_sleep, marks_of
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Context, Known, known, root
 from avr_timing.flow.paths import Graph, Mark, Walk, Way, longest
@@ -53,7 +53,7 @@ class WorstCase:
         """The bound of a function, by name or entry.
 
         Raises:
-            AnalysisError: no such function; a loop without a bound; recursion; it never returns.
+            AnalysisError: no such function; a loop without a bound; recursion; it never returns, or waits asleep.
         """
         return self.bound(self.program.entry(function))
 
@@ -94,7 +94,9 @@ class WorstCase:
     def _bound(self, function: Function, context: Context) -> Bound:
         inside = known(function, context)
         ways = {start: self.ways(block, inside) for start, block in inside.function.blocks.items()}
-        graph = Graph(function.entry, ways, self.program.where, marks_of(self.program, function, inside))
+        marks = marks_of(self.program, function, inside)
+        check_sleep(self.program, inside.function, marks)
+        graph = Graph(function.entry, ways, self.program.where, marks)
         walk = longest(graph)
         if walk is None:
             raise AnalysisError(f"{function.name} at {self.program.where(function.entry)} never returns; no bound")

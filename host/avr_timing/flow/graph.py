@@ -9,8 +9,9 @@ instructions say, so nothing depends on the compiler:
 * Behind a call of a function that never returns nothing is followed: the block of such a call has no edge.
 * What writes registers, the stack pointer or SREG by their data addresses is refused.
 * Where `ijmp` and `icall` lead is found by `jumps`. A function for which it is not found (Program.unproven) has no
-bound:
-  what is known of it is followed, as if its `icall` returned and its `ijmp` left it.
+  bound: what is known of it is followed, as if its `icall` returned and its `ijmp` left it.
+* Neither has a function with an instruction that is refused, or that leads out of the code, and it is followed up to
+  there, as if it returned there; one whose calls go too deep has none either. All others are judged.
 
 The vectors are functions too: that of interrupt N is at address 4·N, with the jump to `__vector_N` as its tail call, so
 that its time is that of the interrupt from the end of the entry's four cycles.
@@ -25,10 +26,11 @@ from pathlib import Path
 
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.jumps import NotProvenError, Step, targets_of
+from avr_timing.flow.loops import reverse_postorder
 from avr_timing.image.elf import Image, Symbol, read_image
 from avr_timing.image.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
 from avr_timing.image.registers import CALL_CLOBBERED, REGISTERS, is_call, written
-from avr_timing.program import Block, Edge, Function, Instruction, Program
+from avr_timing.program import REFUSED, Block, Edge, Function, Instruction, Program
 
 VECTORS = 26  # the reset's and 25 interrupts'
 VECTOR_SIZE = 4  # bytes
@@ -49,9 +51,7 @@ def program_of(image: Image) -> Program:
     explorer.follow()
     for entry, draft in sorted(explorer.drafts.items()):
         program.functions[entry] = Function(names.of(entry), entry, _blocks(draft))
-    depths: dict[int, int] = {}
-    for entry in list(program.functions):
-        _check_depth(program, entry, 1, depths)
+    _check_depths(program)
     for entry, function in program.functions.items():
         program.functions[entry] = replace(function, clobbers=_clobbers(program, entry))
     # Of several functions with one name, those of no file's own come first, then the first in flash.
@@ -61,18 +61,23 @@ def program_of(image: Image) -> Program:
     return program
 
 
-def _check_depth(program: Program, entry: int, above: int, depths: dict[int, int]) -> int:
-    """The calls below a function, with itself, the deepest; one that calls itself counts once."""
-    if entry not in depths:
-        depths[entry] = 0  # while it is worked out
-        callees = {callee for block in program.functions[entry].blocks.values() for callee in block.calls}
-        below = (_check_depth(program, callee, above + 1, depths) for callee in callees if above < CALLS_MAXIMUM)
-        depths[entry] = 1 + max(below, default=len(callees) and CALLS_MAXIMUM)
-    if above + depths[entry] - 1 > CALLS_MAXIMUM:
-        raise AnalysisError(
+def _check_depths(program: Program) -> None:
+    """Refuses functions below which calls go too deep; what calls itself counts once."""
+    callees = {
+        entry: sorted({callee for block in function.blocks.values() for callee in block.calls})
+        for entry, function in program.functions.items()
+    }
+    depths: dict[int, int] = {}
+    for start in callees:
+        for entry in reversed(reverse_postorder(start, callees.__getitem__)):
+            if entry not in depths:
+                depths[entry] = 1 + max((depths.get(callee, 0) for callee in callees[entry]), default=0)
+    for entry in (entry for entry, depth in depths.items() if depth > CALLS_MAXIMUM):
+        program.unproven[entry] = (
             f"{program.where(entry)}: calls go deeper than {CALLS_MAXIMUM} functions; expected no deeper call"
         )
-    return depths[entry]
+        refused = Block(entry, (_refused(entry),), ())
+        program.functions[entry] = replace(program.functions[entry], blocks={entry: refused})
 
 
 def _clobbers(program: Program, entry: int) -> frozenset[int]:
@@ -162,12 +167,14 @@ class _Explorer:
         while self.work:
             draft, address = self.work.pop()
             while address not in draft.flows:
-                flow = self._flow(draft, address)
-                draft.flows[address] = flow
-                if flow.ends:
-                    self._leave(draft, flow)
-                    break
-                address = flow.edges[0].to
+                try:
+                    flow = draft.flows[address] = self._flow(draft, address)
+                    if flow.ends:
+                        self._leave(draft, flow)
+                        break
+                    address = flow.edges[0].to
+                except AnalysisError as error:
+                    self._give_up(draft, address, error)
 
     def _begin(self, entry: int) -> None:
         if entry not in self.drafts:
@@ -290,7 +297,17 @@ class _Explorer:
         if flow.instruction.mnemonic == "ijmp":
             known = self._jump(draft, flow.instruction, sorted(targets))
         draft.flows[address] = known
-        self._leave(draft, known)
+        try:
+            self._leave(draft, known)
+        except AnalysisError as error:
+            self._give_up(draft, address, error)
+
+    def _give_up(self, draft: _Draft, address: int, why: AnalysisError) -> None:
+        """Ends a function in front of an instruction that is refused, and notes it."""
+        self.unproven.setdefault(draft.entry, str(why))
+        draft.flows[address] = _Flow(_refused(address), [])
+        draft.computed.pop(address, None)
+        self._returns(draft.entry)
 
     def _leads_anywhere(self, draft: _Draft, flow: _Flow, why: str) -> None:
         """Goes on behind a computed call of which it is not known where it leads, and notes it."""
@@ -342,6 +359,10 @@ class _Explorer:
         known = address in self.image.lines
         place = self.where(address) if known else f"0x{address:04X} (in {self.names.of(address)})"
         return AnalysisError(f"{self.image.path}: {place}: {text}")
+
+
+def _refused(address: int) -> Instruction:
+    return Instruction(address, 2, REFUSED, (), 0)
 
 
 def _blocks(draft: _Draft) -> dict[int, Block]:

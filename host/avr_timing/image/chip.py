@@ -14,10 +14,9 @@ from avr_timing.errors import AnalysisError
 
 CHIP = "ATmega328P"
 SAME_PROGRAM = (CHIP, "ATmega328")  # one data sheet; they differ in the signature and the brown-out detector's switch
-MEMORIES = (0x0, 0x8000, 0x100, 0x800)  # begin and size of flash, begin and size of RAM, in bytes
-NOTE = b".note.gnu.avr.deviceinfo"
-EM_AVR, HEADER, SECTION = 83, "<16sHHIIIIIHHHHHH", "<IIIIII"
-CORE_BITS, CORE, AVRTINY = 0x7F, 5, 100  # e_flags; avr5 is 5, avrxmega1 is 101
+NOTE = b".note.gnu.avr.deviceinfo\0"
+EM_AVR, HEADER, SECTION = 83, struct.Struct("<16sHHIIIIIHHHHHH"), "<IIIIII"
+CORE_BITS, CORE = 0x7F, 5
 
 
 def assumed_chip(path: object, data: bytes) -> str:
@@ -27,50 +26,32 @@ def assumed_chip(path: object, data: bytes) -> str:
     Raises:
         AnalysisError: it is no ELF file for an AVR, or is for another chip than the ATmega328P.
     """
-    header = data[: struct.calcsize(HEADER)].ljust(struct.calcsize(HEADER), b"\0")
-    _, _, machine, _, _, _, sections, flags, *_, size, count, names = struct.unpack(HEADER, header)
-    if data[:6] != b"\x7fELF\1\1" or machine != EM_AVR:
+    header = HEADER.unpack(data[: HEADER.size].ljust(HEADER.size, b"\0"))
+    if data[:6] != b"\x7fELF\1\1" or header[2] != EM_AVR:
         raise AnalysisError(f"{path} is not an ELF file for an AVR; expected an image for the {CHIP}")
-    note = _note(data, sections, size, count, names)
-    name, memories = ("", MEMORIES) if note is None else _said(path, note)
+    core, name = header[7] & CORE_BITS, _name(data, *header[-3:], sections=header[6])
     if name not in ("", *SAME_PROGRAM):
         raise AnalysisError(f"{path} is for the {name}; expected an image for the {CHIP}")
-    if flags & CORE_BITS != CORE:
-        raise AnalysisError(f"{path} is for the core {_core(flags & CORE_BITS)}; expected {_core(CORE)}, the {CHIP}'s")
-    if memories != MEMORIES:
-        raise AnalysisError(f"{path}: its note gives the {name} memories {memories}; expected {MEMORIES}")
+    if core != CORE:
+        raise AnalysisError(f"{path} is for the core avr:{core} (avr-readelf -h); expected avr:{CORE}, the {CHIP}'s")
     return "" if name else f"{path} does not say which chip it is for: it is taken for an {CHIP}"
 
 
-def _core(number: int) -> str:
-    """As avr-gcc calls it: avr6 is that of the ATmega2560."""
-    if number <= AVRTINY:
-        return "avrtiny" if number == AVRTINY else f"avr{number}"
-    return f"avrxmega{number - AVRTINY}"
+def _name(data: bytes, size: int, count: int, names: int, *, sections: int) -> str:
+    """The chip's name in the note, by the table of sections; empty where no note can be found.
 
-
-def _note(data: bytes, sections: int, size: int, count: int, names: int) -> bytes | None:
-    """The bytes of the chip's note; None where the file has none that can be found."""
+    Behind the note's header (16 bytes) are six words of memories, the size of a table of offsets, that table, the
+    name's offset first, and strings.
+    """
     try:
         strings = struct.unpack_from(SECTION, data, sections + names * size)[4]
-        for number in range(count):
-            name, _, _, _, begin, length = struct.unpack_from(SECTION, data, sections + number * size)
-            if data.startswith(NOTE + b"\0", strings + name):
-                return data[begin : begin + length]
-    except struct.error:
+        for place in range(sections, sections + count * size, size or 1):
+            name, _, _, _, begin, length = struct.unpack_from(SECTION, data, place)
+            if data.startswith(NOTE, strings + name):
+                table, offset = struct.unpack_from("<II", data, begin + 40)
+                text = data[begin + 40 + table + offset : begin + length].split(b"\0")[0]
+                name = ascii(text.decode("latin-1"))[1:-1]  # a damaged one may hold orders to the terminal
+                return re.sub(r"^at(\D+)(.*)", lambda m: f"AT{m[1]}{m[2].upper()}", name) or "chip without a name"
+    except struct.error:  # the file ends before
         pass
-    return None
-
-
-def _said(path: object, note: bytes) -> tuple[str, tuple[int, ...]]:
-    """The chip's name and memories: behind the note's header six words of memories, the size of a table of offsets
-    with the name's offset first, and strings."""
-    try:
-        memories = struct.unpack_from("<4I", note, 16)
-        table, offset = struct.unpack_from("<II", note, 40)
-        name = note[40 + table + offset :].split(b"\0")[0].decode("ascii")
-    except (struct.error, ValueError):
-        name = ""
-    if not re.fullmatch(r"[a-z0-9_]+", name):
-        raise AnalysisError(f"{path}: its note {NOTE.decode()} names no chip; expected the {CHIP}")
-    return re.sub(r"^at(\D+)(.*)", lambda m: f"AT{m[1]}{m[2].upper()}", name), memories
+    return ""

@@ -193,5 +193,6 @@ def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:
                 f"{path}: a loop's bound names address 0x{address:X}, which is not one of an instruction"
             )
         most, longest = (None if number == NOT_SAID else number for number in (passes, cycles))
-        bounds.append(LoopBound(address, most, longest))
+        if (most, longest) != (None, None):
+            bounds.append(LoopBound(address, most, longest))
     return tuple(bounds)

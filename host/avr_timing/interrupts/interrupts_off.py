@@ -20,7 +20,7 @@ from avr_timing.errors import AnalysisError
 from avr_timing.flow.flag import SREG, Flag, State, after
 from avr_timing.flow.loops import IrreducibleError, loops_of
 from avr_timing.flow.paths import Graph, Way, longest
-from avr_timing.program import Block, Function, Instruction, Program
+from avr_timing.program import REFUSED, Block, Function, Instruction, Program
 
 ENTRY = 4  # cycles from acceptance to the vector's jump
 STATES_MAXIMUM = 100_000  # of a function: (block, instruction, state); the kit's have 1,284 at most
@@ -112,7 +112,7 @@ class InterruptsOff:
         """The longest stretch that a function makes when it is called with interrupts on.
 
         Raises:
-            AnalysisError: no such function; a loop without a bound while interrupts are off.
+            AnalysisError: no such function; a loop without a bound, or sleep, while interrupts are off.
         """
         function = self.program.entry(function)
         effect = self.effect(function, on=True)
@@ -160,10 +160,10 @@ class InterruptsOff:
         return Effect(on=True, plain=True) if on else Effect(through=self.worst_case.bound(entry).cycles)
 
     def _is_plain(self, entry: int) -> bool:
-        """Nothing in it or below it writes the flag."""
+        """Nothing in it or below it writes the flag, or depends on it."""
         if entry not in self._plain:
             code = self.program.instructions(self.program.below(entry))
-            self._plain[entry] = not any(map(_writes_flag, code))
+            self._plain[entry] = not any(map(_is_about_flag, code))
         return self._plain[entry]
 
     def _effect(self, function: Function, on: bool) -> Effect:
@@ -262,6 +262,13 @@ class InterruptsOff:
         start, number, state = node
         block = function.blocks[start]
         instruction = block.instructions[number]
+        if instruction.mnemonic == REFUSED:
+            raise AnalysisError(self.program.unproven[function.entry])
+        if instruction.mnemonic == "sleep" and state.flag is Flag.OFF:
+            raise AnalysisError(
+                f"{function.name} sleeps with interrupts off at {self.program.where(instruction.address)}; "
+                "expected `sei` right in front of it, else nothing wakes the CPU"
+            )
         clobbered = None
         if block.calls and number + 1 == len(block.instructions):
             clobbered = self.program.clobbered(block)
@@ -366,9 +373,9 @@ def _returned(flow: Flow, node: Node) -> Iterable[int]:
     return [cycles for off, cycles in flow.returned.get(node, ()) if off]
 
 
-def _writes_flag(instruction: Instruction) -> bool:
+def _is_about_flag(instruction: Instruction) -> bool:
     name = instruction.mnemonic
-    return name in ("cli", "sei", "reti") or (name == "out" and instruction.operands[0] == SREG)
+    return name in ("cli", "sei", "reti", "sleep", REFUSED) or (name == "out" and instruction.operands[0] == SREG)
 
 
 def _leaving(block: Block) -> list[tuple[int | None, int, int | None]]:

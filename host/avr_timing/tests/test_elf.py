@@ -125,6 +125,7 @@ def loops(folder: Path, records: bytes) -> Image:
 
 def test_bounds_of_loops_are_read(tmp_path: Path) -> None:
     records = struct.pack("<6I", 0x6A, 12, 0xFFFFFFFF, 0x70, 0xFFFFFFFF, 4000)
+    records += struct.pack("<3I", 0x6A, 0xFFFFFFFF, 0xFFFFFFFF)  # says neither
     assert loops(tmp_path, records).bounds == (LoopBound(0x6A, 12, None), LoopBound(0x70, None, 4000))
 
 

@@ -62,6 +62,24 @@ def test_loop_without_a_bound_counts_only_where_interrupts_are_off(tmp_path: Pat
         InterruptsOff(assembled(tmp_path, f"main: cli\n {loop} sei\n nop\n ret")).of("main")
 
 
+ASLEEP = (
+    '1: .pushsection .boebot.loops, "", @progbits\n .long 1b, 0xFFFFFFFF, 9\n .popsection\n sleep\n sbis 5, 0\n rjmp 1b'
+)
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("main: cli\n sleep\n sei\n nop\n ret", "main sleeps with interrupts off at 0x"),
+        (f"main: cli\n rcall f\n sei\n nop\n ret\n f: {ASLEEP}\n ret", "f sleeps with interrupts off at 0x"),
+        ("main: cli\n rcall f\n sei\n nop\n ret\n f: jmp 0x7000", "leads out of the code"),
+    ],
+)
+def test_a_stretch_that_may_never_end_is_refused(tmp_path: Path, source: str, words: str) -> None:
+    with pytest.raises(AnalysisError, match=words):
+        InterruptsOff(assembled(tmp_path, source)).of("main")
+
+
 def test_stretch_begins_in_the_midst_of_a_loop(tmp_path: Path) -> None:
     """Interrupts go off in one of two ways through a loop, and stay off: the rest of that pass, 5 more, and the end."""
     row = '3: .pushsection .boebot.loops, "", @progbits\n .long 3b, 5, 0xFFFFFFFF\n .popsection\n'

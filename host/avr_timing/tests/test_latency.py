@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from avr_image import assembled
+from avr_timing.bounds.wcet import WorstCase
 from avr_timing.errors import AnalysisError
 from avr_timing.interrupts import interrupts_off
 from avr_timing.interrupts.interrupts_off import ENTRY, WAKE, InterruptsOff
@@ -120,8 +121,11 @@ def test_calls_that_are_too_deep_are_refused(tmp_path: Path) -> None:
 
     assert InterruptsOff(assembled(tmp_path, chained(50))).image().cycles > 0
     for count in (60, 1500):
-        with pytest.raises(AnalysisError, match="calls go deeper than 60 functions; expected no deeper call"):
-            assembled(tmp_path, chained(count))
+        program = assembled(tmp_path, chained(count))
+        for judge in (WorstCase(program), InterruptsOff(program)):
+            with pytest.raises(AnalysisError, match="calls go deeper than 60 functions; expected no deeper call"):
+                judge.of("main")
+        assert WorstCase(program).of(f"f{count - 1}").cycles == 3 + (1 + 1 + 4) + 4  # judged all the same
 
 
 def test_stretch_that_ends_in_another_function_makes_every_step_the_longest(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from avr_image import assembled, compiled
 from avr_timing.bounds.stack import Stack
+from avr_timing.bounds.wcet import WorstCase
 from avr_timing.errors import AnalysisError
 
 FRAME = "in r28, SPL\n in r29, SPH\n {take}\n in r0, SREG\n cli\n out SPH, r29\n out SREG, r0\n out SPL, r28\n"
@@ -75,6 +76,24 @@ def test_refused_with_the_place(tmp_path: Path, source: str, words: str) -> None
     with pytest.raises(AnalysisError, match=words) as caught:
         Stack(assembled(tmp_path, source)).of("main")
     assert "0x" in str(caught.value)
+
+
+def test_ways_that_cannot_be_gone_count_neither_for_cycles_nor_for_the_stack(tmp_path: Path) -> None:
+    """Of a weak function that nobody defines the call is there, to address 0, and the test in front of it fails."""
+    source = (
+        "extern void hook(void) __attribute__((weak));\nvolatile unsigned char n;\n"
+        "__attribute__((noinline)) void tick(void) { if (hook) hook(); n++; }\nint main(void) { tick(); return 0; }\n"
+    )
+    program = compiled(tmp_path, source)
+    assert 0 in program.below(program.by_name["tick"])
+    assert (Stack(program).of("tick").bytes, Stack(program).of("main").bytes) == (0, 2)
+    assert WorstCase(program).of("tick").cycles == 3 * 1 + 2 + (2 + 1 + 2) + 4  # ldi ldi or breq, lds subi sts, ret
+
+
+@pytest.mark.parametrize(("argument", "depth"), [("ldi r24, 0", 2), ("ldi r24, 1", 2 + 1), ("in r24, 5", 2 + 1)])
+def test_depth_by_what_a_function_is_called_with(tmp_path: Path, argument: str, depth: int) -> None:
+    source = f"main: {argument}\n rcall f\n ret\n f: tst r24\n breq 1f\n push r2\n pop r2\n 1: ret"
+    assert Stack(assembled(tmp_path, source)).of("main").bytes == depth
 
 
 def test_arrays_of_variable_length_are_refused(tmp_path: Path) -> None:

@@ -89,10 +89,15 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         (STEPPED.replace("add r24, r26\n adc r25, r27", "movw r24, r26\n adiw r24, 3"),
          2 + 1 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
         ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n rjmp 1b", 1000 + (1 + 2 + 2) + 2 + 4),
+        ("main: 1: sbis 5, 0\n rjmp 2f\n ret\n 2: bounded 0xFFFFFFFF, 1000\n sleep\n rjmp 1b",
+         1000 + (1 + 2 + 1 + 2) + 2 + 4),
+        ("main: ldi r24, 7\n 1: bounded 0xFFFFFFFF, 1000\n sleep\n dec r24\n brne 1b\n ret",
+         1 + 1000 + (1 + 1 + 2) + (1 + 1 + 1) + 4),
     ],
     ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "EEPROM halts", "tail call", "while",
          "nested", "counted", "counted below zero", "two bytes", "256 times", "three bytes", "up to 1000", "shifted",
-         "flag", "bit of another", "up to a pointer", "up to a known one", "stored", "from a copy", "waits"],
+         "flag", "bit of another", "up to a pointer", "up to a known one", "stored", "from a copy", "waits",
+         "waits asleep", "counts naps"],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
     assert cycles_of(tmp_path, source) == cycles
@@ -127,6 +132,10 @@ def test_planted_change_raises_the_bound_by_what_it_takes(tmp_path: Path, old: s
         ("main: rcall f\n ret\n f: rcall main\n ret", "recursion at .*: main calls f calls main"),
         ("main: rjmp main", "has no bound"),
         (TWO_ENTRIES, "can be entered at two places"),
+        ("main: sleep\n ret", "main waits asleep at"),
+        ("main: 1: bounded 5\n sleep\n sbis 5, 0\n rjmp 1b\n ret", "main waits asleep at"),  # passes are no time
+        ("main: ldi r24, 7\n 1: sleep\n dec r24\n brne 1b\n ret", "main waits asleep at"),
+        ("main: 1: bounded 0xFFFFFFFF, 9\n rcall f\n sbis 5, 0\n rjmp 1b\n ret\n f: sleep\n ret", "f waits asleep at"),
         (STEPPED.replace("cp r26, r24", "cp r30, r24"), "has no bound"),
     ],
 )  # fmt: skip

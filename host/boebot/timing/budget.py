@@ -105,6 +105,7 @@ class Report:
     frames: Source  # that the host sends
     memory: Memory
     measured: Measurement | None = None
+    assumed_chip: str = ""  # a sentence, where the image does not say for which chip it is
 
     @property
     def tick_work(self) -> int:
@@ -175,7 +176,8 @@ class Report:
     @property
     def notes(self) -> list[str]:
         """What is not broken, and not known."""
-        found = [
+        found = [self.assumed_chip] if self.assumed_chip else []
+        found += [
             f"task {row.name} is not bounded ({row.unbounded}): its budget of {row.budget} cycles counts, "
             + ("and nothing was measured" if row.emulator is None else f"{row.emulator} were measured")
             for row in self.rows
@@ -289,6 +291,7 @@ def prove(
         frames=found.of_frames(asked),
         memory=_memory(firmware, found, measured),
         measured=measured,
+        assumed_chip=firmware.image.assumed_chip,
     )
 
 

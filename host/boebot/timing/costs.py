@@ -21,6 +21,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 
+from avr_timing.bounds.loop_bounds import sleeps
 from avr_timing.bounds.wcet import Bound, WorstCase
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Context, Known
@@ -30,7 +31,7 @@ from avr_timing.interrupts.byte_reads import RECEIVE, ByteReads
 from avr_timing.interrupts.interrupts_off import ENTRY, InterruptsOff
 from avr_timing.interrupts.latency import Latencies
 from avr_timing.interrupts.response import Piece, Schedule, Source
-from avr_timing.program import Block, Program
+from avr_timing.program import Program
 from boebot.errors import TimingError
 from boebot.timing.firmware import Firmware
 from boebot.timing.loads import APART, ENCODERS, NEVER_NEAR, SEND, SENT_WHILE_BUSY, Load
@@ -298,7 +299,7 @@ def _once(loop: Loop[int], given: Given, known: Known) -> int:
     ways = {node: given.ways(known.function.blocks[node], known) for node in loop.nodes}
     cycles = 0
     for inner in loop.inner:
-        if any(_sleeps(known.function.blocks[node]) for node in inner.nodes):
+        if any(sleeps(known.function.blocks[node]) for node in inner.nodes):
             cycles += _once(inner, given, known)
         else:
             inside = {node: [_within(way, inner.nodes) for way in ways[node]] for node in inner.nodes}
@@ -313,10 +314,6 @@ def _once(loop: Loop[int], given: Given, known: Known) -> int:
 def _within(way: Way[int], nodes: Collection[int]) -> Way[int]:
     """A way that leaves the graph where it leaves these nodes."""
     return way if way.to in nodes else replace(way, to=None)
-
-
-def _sleeps(block: Block) -> bool:
-    return any(instruction.mnemonic == "sleep" for instruction in block.instructions)
 
 
 def _passed(program: Program, entry: int, passes: int) -> Program:
