@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from boebot.arguments import shown, whole
 from boebot.errors import RobotError
+from boebot.files import regular
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicles.checked_structs import number
 
@@ -70,7 +71,7 @@ class ReadingTable:
             raise RobotError(f"table is {shown(path)}; expected the path of a CSV file")
         name = Path(path).name
         try:
-            with Path(path).open(newline="", encoding="utf-8") as file:
+            with regular(Path(path)).open(newline="", encoding="utf-8") as file:
                 rows = [(index, row) for index, row in enumerate(csv.reader(file), start=1) if row]
         except (OSError, UnicodeDecodeError, csv.Error, ValueError) as cause:
             raise RobotError(f"table {name} cannot be read: {cause}") from None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from boebot.navigation.lattice import Lattice
+from boebot.navigation.lattice import Lattice, cells_of
 
 if TYPE_CHECKING:
     from boebot.navigation.line_map import LineMap
@@ -26,17 +26,17 @@ class Coverage:
     """What was seen of a map.
 
     Attributes:
-        lattice: the cells; those that are not free need not be seen.
+        lattice: the cells of the floor, for no robot to drive on; those that are not free need not be seen.
         seen: which cells were seen, shape (rows, columns).
     """
 
     def __init__(self, plan: LineMap, cell: float = 0.05) -> None:
         """Nothing was seen yet. `cell`: side of a cell (m)."""
         self._plan = plan
-        self.lattice = Lattice.of(plan, 0.0, 0.0, cell)
+        shape, self._centres = cells_of(plan, cell)
+        self.lattice = Lattice(~plan.is_solid(self._centres).reshape(shape), cell, *plan.bounds[0].tolist())
         self.seen: NDArray[np.bool_] = np.zeros_like(self.lattice.free)
-        self._cells = np.argwhere(self.lattice.free)
-        self._centres = np.array([self.lattice.centre((row, column)) for row, column in self._cells.tolist()])
+        self._cells, self._centres = np.argwhere(self.lattice.free), self._centres[self.lattice.free.ravel()]
 
     def add(self, pose: Sequence[float], bearings: tuple[float, float], rays: int, reach: float) -> None:
         """A sweep was taken at a pose (m, m, rad); terms as of `LineMap.scans`."""

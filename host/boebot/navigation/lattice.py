@@ -1,7 +1,8 @@
 """A regular grid of free and forbidden cells over a map: where a robot's centre may be (section 6.2 of the notes).
 
 A cell is forbidden if its centre is nearer to a line than the robot's radius and a margin, or inside something solid,
-or if no way leads there from the start.
+or if no way leads there from the start. Of large cells those are forbidden, too, from whose centre a step to the next
+one could bring the robot to a line.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from boebot.navigation.frames import Point
 from boebot.showing import Grid
 
 if TYPE_CHECKING:
-    from boebot.navigation.line_map import LineMap
+    from boebot.navigation.line_map import Floats, LineMap
 
 Cell = tuple[int, int]
 
@@ -60,13 +61,13 @@ class Lattice:
         """
         if not (0 <= radius < math.inf and 0 <= margin < math.inf):
             raise BrainError(f"a lattice for a radius of {radius!r} m and a margin of {margin!r} m; expected lengths")
-        low, _ = plan.bounds
-        rows, columns = cells_of(plan, cell)
-        made = cls(np.ones((rows, columns), dtype=np.bool_), cell, float(low[0]), float(low[1]), diagonal)
-        row, column = np.indices((rows, columns)).reshape(2, -1)
-        centres = np.column_stack((made.x + (column + 0.5) * cell, made.y + (row + 0.5) * cell))
-        free = (plan.distance(centres) >= radius + margin) & ~plan.is_solid(centres)
-        return cls(free.reshape(rows, columns), cell, made.x, made.y, diagonal)
+        shape, centres = cells_of(plan, cell)
+        # No place of a step is farther from a centre than half of a cell's diagonal. By Pythagoras the step keeps the
+        # radius where both of its ends keep this; and then no line is in a free cell at all.
+        step = math.hypot(radius, cell * math.sqrt(0.5)) + 1e-9
+        free = (plan.distance(centres) >= max(radius + margin, step)) & ~plan.is_solid(centres)
+        x, y = plan.bounds[0].tolist()
+        return cls(free.reshape(shape), cell, x, y, diagonal)
 
     @property
     def rows(self) -> int:
@@ -137,8 +138,9 @@ class Lattice:
         return self.cell * math.hypot(cell[0] - other[0], cell[1] - other[1])
 
 
-def cells_of(plan: LineMap, cell: float) -> tuple[int, int]:
-    """How many rows and columns of cells of that side (m) a map has, one of each at least.
+def cells_of(plan: LineMap, cell: float) -> tuple[tuple[int, int], Floats]:
+    """How many rows and columns of cells of that side (m) a map has, one of each at least, and their centres (m), row
+    by row, shape (cells, 2).
 
     Raises:
         BrainError: it is no length, or there are too many.
@@ -150,4 +152,5 @@ def cells_of(plan: LineMap, cell: float) -> tuple[int, int]:
     if rows * columns > MOST_CELLS:
         counts = f"{rows:,} x {columns:,} of them; expected {MOST_CELLS:,} at most"
         raise BrainError(f"cells of {cell!r} m: {plan.name} has {counts}")
-    return rows, columns
+    row, column = np.indices((rows, columns)).reshape(2, -1)
+    return (rows, columns), low + np.column_stack((column + 0.5, row + 0.5)) * cell

@@ -1,33 +1,39 @@
 """Maps of cells, free, occupied or unknown, as ROS keeps them: a picture and a YAML file beside it (`map_server`).
 
 Row 0 of the table is that of the smallest y; in the picture it is the last one. A pixel of 0 (black) is occupied, one
-of 254 free, one of 205 unknown.
+of 254 free, one of 205 unknown. Keys, modes and pixels are read as by nav2's `map_server`.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from boebot.arguments import number, shown
 from boebot.errors import BrainError
+from boebot.files import regular
 from boebot.navigation.lattice import Lattice, cells_of
 from boebot.navigation.line_map import LineMap
 from boebot.showing import Grid
 
 if TYPE_CHECKING:
-    from PIL import Image
-
     from boebot.navigation.line_map import Floats
+
+    Said = dict[str, str | list[str]]
 
 FREE, UNKNOWN, OCCUPIED = 0.0, math.nan, 1.0
 FREE_BELOW, OCCUPIED_ABOVE = 0.196, 0.65  # map_server's own thresholds
 PIXELS = {"free": 254, "unknown": 205, "occupied": 0}
 LARGEST = 50_000_000  # pixels
-MODES = ("trinary", "scale")  # of map_server; what "scale" has between free and occupied is unknown here
+LONGEST = 10_000  # bytes of a YAML file, and of a picture's header
+SWITCH = {text: index for index, two in enumerate(("0 false no off n", "1 true yes on y")) for text in two.split()}
+MODES = ("trinary", "scale", "raw")
+FORMATS = ("BMP", "GIF", "JPEG", "PNG", "PPM")
 
 
 @dataclass(frozen=True)
@@ -38,12 +44,25 @@ class OccupancyMap:
         values: 0 (free) to 1 (occupied), NaN where nothing is known, shape (rows, columns).
         cell: side of a cell (m).
         x, y: lower left corner (m).
+
+    Raises:
+        BrainError: one of them is something else.
     """
 
     values: Floats
     cell: float
     x: float = 0.0
     y: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Numbers become Python's, which YAML knows."""
+        for name, least in (("cell", 1e-6), ("x", -math.inf), ("y", -math.inf)):
+            value = number(f"a map of cells: {name}", getattr(self, name), BrainError, least=least)
+            object.__setattr__(self, name, value)
+        values = np.asarray(self.values, dtype=float)
+        if values.ndim != 2 or not values.size or not (np.isnan(values) | (values >= 0) & (values <= 1)).all():
+            raise BrainError(f"a map of cells: values are {shown(self.values)}; expected rows of 0 to 1, NaN: unknown")
+        object.__setattr__(self, "values", values)
 
     @classmethod
     def of(cls, plan: LineMap, cell: float = 0.05) -> OccupancyMap:
@@ -52,12 +71,9 @@ class OccupancyMap:
         Raises:
             BrainError: `cell` is no length, or the map has too many cells of it.
         """
-        low, _ = plan.bounds
-        rows, columns = cells_of(plan, cell)
-        row, column = np.indices((rows, columns)).reshape(2, -1)
-        centres = np.column_stack((low[0] + (column + 0.5) * cell, low[1] + (row + 0.5) * cell))
+        shape, centres = cells_of(plan, cell)
         occupied = (plan.distance(centres) <= cell * math.sqrt(0.5)) | plan.is_solid(centres)
-        return cls(occupied.reshape(rows, columns).astype(float), cell, float(low[0]), float(low[1]))
+        return cls(occupied.reshape(shape).astype(float), cell, *plan.bounds[0])
 
     def grid(self) -> Grid:
         """To draw it: `robot.sketch("map", grid=drawn.grid(), frame="arena")`."""
@@ -72,13 +88,19 @@ class OccupancyMap:
         if not (0 <= radius < math.inf and 0 <= margin < math.inf):
             raise BrainError(f"a lattice for a radius of {radius!r} m and a margin of {margin!r} m; expected lengths")
         blocked = ~(self.values < FREE_BELOW)
-        reach = math.ceil((radius + margin) / self.cell)
+        # To the nearest point of a blocked cell. Halfway along a diagonal step that point may be nearer than from both
+        # ends, by Pythagoras up to this; within sqrt(2) cells it is not, as no diagonal cuts a corner.
+        least = radius + margin
+        if radius > self.cell * math.sqrt(2.0):
+            least = max(least, math.hypot(radius, self.cell * math.sqrt(0.5)))
+        reach = math.ceil(least / self.cell + 0.5)
         padded = np.pad(blocked, reach)
-        near = np.zeros_like(blocked)
+        near = blocked.copy()
         rows, columns = blocked.shape
         for down in range(-reach, reach + 1):
             for right in range(-reach, reach + 1):
-                if math.hypot(down, right) * self.cell < radius + margin:
+                gap = math.hypot(max(abs(down) - 0.5, 0.0), max(abs(right) - 0.5, 0.0)) * self.cell
+                if gap < least - 1e-9:
                     near |= padded[reach + down : reach + down + rows, reach + right : reach + right + columns]
         return Lattice(~near, self.cell, self.x, self.y, diagonal)
 
@@ -131,53 +153,93 @@ class OccupancyMap:
         Raises:
             BrainError: file, key or value is wrong; it says which.
         """
-        import yaml
-        from PIL import Image
-
         file = Path(path)
-        try:
-            said = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise BrainError(
-                f"{file} is no map: {str(error).splitlines()[0]}; expected a YAML file of map_server"
-            ) from None
-        if not isinstance(said, dict):
-            raise BrainError(f"{file} is no map; expected keys image, resolution and origin")
-        cell = _number(file, said, "resolution", 1e-6)
-        origin: Any = said.get("origin")
-        is_pose = isinstance(origin, list) and len(origin) == 3 and all(isinstance(one, int | float) for one in origin)
-        if not (is_pose and all(map(math.isfinite, origin))):
-            raise BrainError(f"{file}: origin is {origin!r}; expected [x, y, yaw] in m and rad")
-        if origin[2]:
-            raise BrainError(f"{file}: origin is turned by {origin[2]} rad; expected a yaw of 0")
-        if said.get("mode", "trinary") not in MODES:
-            raise BrainError(f"{file}: mode is {said['mode']!r}; expected {' or '.join(MODES)}")
-        try:
-            with Image.open(file.parent / str(said.get("image"))) as picture:
-                if picture.width * picture.height > LARGEST:
-                    raise BrainError(f"{file}: {said['image']} has more than {LARGEST:,} cells")
-                light = _light(picture)[::-1]
-        except (OSError, ValueError, Image.DecompressionBombError) as error:
-            raise BrainError(f"{file}: image {said.get('image')!r} cannot be read: {error}") from None
-        dark = light if said.get("negate") else 1.0 - light
-        above = _number(file, said, "occupied_thresh", 0.0, OCCUPIED_ABOVE)
-        below = _number(file, said, "free_thresh", 0.0, FREE_BELOW)
-        values = np.where(dark > above, OCCUPIED, np.where(dark < below, FREE, UNKNOWN))
-        return cls(values, cell, float(origin[0]), float(origin[1]))
+        said = _said(file)
+        cell = _number(file, "resolution", said.get("resolution"), 1e-6)
+        origin = said.get("origin")
+        if not isinstance(origin, list) or len(origin) != 3:
+            raise BrainError(f"{file}: origin is {shown(origin)}; expected [x, y, yaw] in m and rad")
+        x, y, yaw = (_number(file, "origin", text, -math.inf) for text in origin)
+        if yaw:
+            raise BrainError(f"{file}: origin is turned by {yaw} rad; expected a yaw of 0")
+        mode, negate = said.get("mode", "trinary"), str(said.get("negate", "0"))
+        if mode not in MODES:
+            raise BrainError(f"{file}: mode is {shown(mode)}; expected {', '.join(MODES)}")
+        if negate.lower() not in SWITCH:
+            raise BrainError(f"{file}: negate is {shown(negate)}; expected 0 or 1, false or true")
+        above = _number(file, "occupied_thresh", said.get("occupied_thresh", str(OCCUPIED_ABOVE)), 0.0, 1.0)
+        below = _number(file, "free_thresh", said.get("free_thresh", str(FREE_BELOW)), 0.0, 1.0)
+        if below >= above:
+            raise BrainError(f"{file}: free_thresh is {below:g}; expected less than occupied_thresh, {above:g}")
+        sums, most, opaque = _picture(file, said.get("image"), mode)
+        shade = np.arange(most + 1) / most  # of each sum that a pixel can have; 1: white
+        dark = shade if SWITCH[negate.lower()] else 1.0 - shade
+        between = np.rint((dark - below) / (above - below) * 100) / 100 if mode == "scale" else UNKNOWN
+        values = np.where(dark > above, OCCUPIED, np.where(dark < below, FREE, between))
+        if mode == "raw":  # pixels of 0 to 100 are per cent
+            level = np.rint(shade * 255)
+            values = np.where(level <= 100, level / 100, UNKNOWN)
+        return cls(np.where(opaque, values[sums], UNKNOWN)[::-1], cell, x, y)
 
 
-def _light(picture: Image.Image) -> Floats:
-    """How bright each pixel is, 0 to 1; pictures with 16 bits as well."""
-    if picture.mode.startswith("I"):
-        return np.asarray(picture, dtype=float) / 65535.0
-    return np.asarray(picture.convert("L"), dtype=float) / 255.0
+def _said(file: Path) -> Said:
+    """What a YAML file says by key, in the texts that are there: '0', "0" and 0 are the same to map_server."""
+    import yaml
+
+    try:
+        root = yaml.compose(regular(file, LONGEST).read_text(encoding="utf-8"), yaml.SafeLoader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        deep = "it is nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
+        what = getattr(error, "strerror", None) or deep
+        raise BrainError(f"{file} is no map: {what}; expected a YAML file of map_server") from None
+    if not isinstance(root, yaml.MappingNode):
+        raise BrainError(f"{file} is no map; expected keys image, resolution and origin")
+
+    def text(node: yaml.Node) -> str:
+        return str(node.value) if isinstance(node, yaml.ScalarNode) else "..."
+
+    said: Said = {}
+    for key, node in root.value:
+        if text(key) in said:
+            raise BrainError(f"{file}: {shown(text(key))} is given twice; expected each key once")
+        said[text(key)] = list(map(text, node.value)) if isinstance(node, yaml.SequenceNode) else text(node)
+    return said
 
 
-def _number(file: Path, said: dict[str, Any], key: str, least: float, usual: float | None = None) -> float:
-    value = said.get(key, usual)
-    if not isinstance(value, int | float) or isinstance(value, bool) or not least <= value < math.inf:
-        raise BrainError(f"{file}: {key} is {value!r}; expected a number from {least:g}")
-    return float(value)
+def _picture(file: Path, name: object, mode: object) -> tuple[Any, int, Any]:
+    """Of the picture that a map's file names: sums of each pixel's channels, the largest that there can be, and
+    whether the pixel counts. Trinary maps have alpha among the channels; in maps of scale it makes a pixel unknown."""
+    from PIL import Image
+
+    try:
+        path = regular(file.parent / str(name), LARGEST * 8)
+        with path.open("rb") as opened:
+            head = opened.read(LONGEST)
+        if len(head) == LONGEST and head[:1] == b"P" and len(re.sub(rb"#[^\r\n]*", b"", head).split(maxsplit=4)) < 4:
+            raise ValueError(f"its header has more than {LONGEST:,} bytes")
+        with Image.open(path, formats=FORMATS) as picture:
+            if picture.width * picture.height > LARGEST:
+                raise ValueError(f"it has more than {LARGEST:,} cells")
+            if picture.mode == "F":
+                raise ValueError("its pixels are floating-point numbers")
+            if picture.mode.startswith("I"):
+                return np.clip(np.asarray(picture).astype(int), 0, 65535), 65535, True
+            has_alpha = picture.has_transparency_data
+            pixels = np.asarray(picture.convert("RGBA" if has_alpha else "RGB"))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        what = getattr(error, "strerror", None) or error
+        raise BrainError(f"{file}: image {shown(name)} cannot be read: {what}") from None
+    opaque = pixels[..., 3] == 255 if has_alpha and mode == "scale" else True
+    counted = pixels if mode == "trinary" else pixels[..., :3]
+    return counted.sum(axis=2, dtype=np.uint16), 255 * counted.shape[2], opaque
+
+
+def _number(file: Path, key: str, text: object, least: float, most: float = math.inf) -> float:
+    try:
+        value: object = float(str(text))
+    except ValueError:
+        value = text
+    return number(f"{file}: {key}", value, BrainError, least=least, most=most)
 
 
 def _joined(lines: list[tuple[float, float, float, float]]) -> list[tuple[float, float, float, float]]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from boebot.errors import TimingError
+from boebot.files import regular
 
 SECTION = ".boebot.timing"
 MAGIC = b"\x7fELF\x01\x01"  # 32 bits, little-endian
@@ -121,7 +122,7 @@ def read_table(path: Path) -> Table:
         TimingError: it cannot be read, is no ELF file of 32 bits, or is damaged.
     """
     try:
-        data = path.read_bytes()
+        data = regular(path).read_bytes()
     except OSError as error:
         raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
     if not data.startswith(MAGIC):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from boebot import resources
 from boebot.errors import BoardError
+from boebot.files import regular
 from sim_bridge.boards.board import BoardAccess
 
 ERROR_SIZE = 200
@@ -163,7 +164,7 @@ class AvrBoard:
 def create(elf: Path) -> AvrBoard:
     """A board, powered on, with the program of an ELF file in flash."""
     try:
-        image = elf.read_bytes()
+        image = regular(elf).read_bytes()
     except OSError as error:
         raise BoardError(f"the firmware image {elf} cannot be read: {error.strerror}") from error
     return AvrBoard(image, elf)
