@@ -7,6 +7,7 @@ cores with a 16-bit program counter.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from avr_timing.errors import AnalysisError
@@ -99,6 +100,22 @@ class Program:
         if function not in self.by_name:
             raise AnalysisError(f"{self.path} has no function {function}")
         return self.by_name[function]
+
+    @contextmanager
+    def entered(self, entry: int, under_way: list[int]) -> Iterator[None]:
+        """While a function is worked out, with all that it calls; `under_way`: those above it. Raises AnalysisError
+        where it is one of them."""
+        if entry in under_way:
+            around = [self.functions[each].name for each in under_way[under_way.index(entry) :]]
+            chain = " calls ".join([*around, around[0] if around[1:] else "itself"])
+            raise AnalysisError(
+                f"recursion at {self.where(entry)}: {chain}; expected functions that do not call themselves"
+            )
+        under_way.append(entry)
+        try:
+            yield
+        finally:
+            under_way.pop()
 
     def below(self, entry: int) -> set[int]:
         """A function with all that it calls, and so on."""

@@ -78,16 +78,8 @@ class Stack:
         if entry in self.program.unproven:
             raise AnalysisError(self.program.unproven[entry])
         if key not in self._depths:
-            if entry in self._under_way:
-                raise AnalysisError(
-                    f"recursion at {self.program.where(entry)}: {function.name} calls itself; "
-                    "expected functions that do not"
-                )
-            self._under_way.append(entry)
-            try:
+            with self.program.entered(entry, self._under_way):
                 self._depths[key] = self._depth(known(function, context))
-            finally:
-                self._under_way.pop()
         return self._depths[key]
 
     def image(self) -> ImageDepth:

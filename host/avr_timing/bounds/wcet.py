@@ -64,18 +64,8 @@ class WorstCase:
             raise AnalysisError(self.program.unproven[entry])
         key = (entry, root(function) if context is None else context)
         if key not in self._bounds:
-            if entry in self._under_way:
-                names = [self.program.functions[each].name for each in self._under_way]
-                around = names[self._under_way.index(entry) :]
-                chain = " calls ".join([*around, around[0] if around[1:] else "itself"])
-                raise AnalysisError(
-                    f"recursion at {self.program.where(entry)}: {chain}; expected functions that do not call themselves"
-                )
-            self._under_way.append(entry)
-            try:
+            with self.program.entered(entry, self._under_way):
                 self._bounds[key] = self._bound(function, key[1])
-            finally:
-                self._under_way.pop()
         return self._bounds[key]
 
     def inside(self, entry: int) -> Known:

@@ -106,7 +106,7 @@ class InterruptsOff:
         self._effects: dict[tuple[int, bool], Effect] = {}
         self._flows: dict[tuple[int, bool], Flow] = {}
         self._plain: dict[int, bool] = {}
-        self._under_way: set[tuple[int, bool]] = set()
+        self._under_way: list[int] = []
 
     def of(self, function: str | int) -> Stretch:
         """The longest stretch that a function makes when it is called with interrupts on.
@@ -142,16 +142,8 @@ class InterruptsOff:
     def effect(self, entry: int, on: bool) -> Effect:
         """What a function does to the flag, called with interrupts on or off."""
         if (entry, on) not in self._effects:
-            if (entry, on) in self._under_way:
-                raise AnalysisError(
-                    f"recursion at {self.program.where(entry)}: {self.program.functions[entry].name} calls itself; "
-                    "expected functions that do not"
-                )
-            self._under_way.add((entry, on))
-            try:
+            with self.program.entered(entry, self._under_way):
                 self._effects[entry, on] = self._worked_out(entry, on)
-            finally:
-                self._under_way.discard((entry, on))
         return self._effects[entry, on]
 
     def _worked_out(self, entry: int, on: bool) -> Effect:
