@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from types import TracebackType
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,7 +52,7 @@ class Batch(FormerNames):
         self,
         model: VehicleModel,
         arenas: Arena | Sequence[Arena],
-        poses: ArrayLike,
+        poses: ArrayLike | Literal["random"],
         seeds: ArrayLike,
         *,
         threads: int = 1,
@@ -60,12 +60,16 @@ class Batch(FormerNames):
     ) -> None:
         """N worlds at `poses`, shape (N, 3): x, y (m), heading (rad), with `seeds`, shape (N,); one arena or N of them.
 
+        With "random" in place of poses each world starts anywhere that is free, by its seed (`Arena.free_start`).
+
         Raises:
-            ArenaError: a start is not free space.
+            ArenaError: a start is not free space, or there is none.
             RobotError: shapes do not fit, or something is no number, seed, model or arena.
         """
-        starts = _floats("batch: poses", poses, RobotError, "(N, 3)")
         keys = _array("batch: seeds", seeds, RobotError, "(N,)")
+        is_random = isinstance(poses, str) and poses == "random"
+        given = np.zeros((keys.size, 3)) if is_random else poses
+        starts = _floats("batch: poses", given, RobotError, '(N, 3), or "random"')
         if starts.ndim != 2 or starts.shape[1] != 3 or keys.shape != starts.shape[:1]:
             raise RobotError(f"batch: poses {starts.shape}, seeds {keys.shape}; expected shapes (N, 3) and (N,)")
         self.model, self.count = model, len(starts)
@@ -74,6 +78,7 @@ class Batch(FormerNames):
         self.handle = worlds.make_worlds("batch", model, self.count, state_bytes)
         self.state_bytes = int(state_bytes)
         for index, (arena, pose, seed) in enumerate(zip(self.arenas, starts.tolist(), keys.tolist(), strict=True)):
+            pose = arena.free_start(model.radius, seed) if is_random else pose
             worlds.place(f"batch, world {index}", self.handle, index, model, arena, seed, 1, pose)
         columns = lib.vehicles_reading_count(self.handle)
         size = 8 * self.count * columns

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 import boebot
-from boebot.arenas import load_arena
+from boebot.arenas import Arena, load_arena
 from boebot.behaviors import Avoid, Wander
 from boebot.brain import Brain
 from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
@@ -179,6 +180,52 @@ def test_bad_input_is_refused_and_moves_nothing(threads: int) -> None:
         Batch(model(), load_arena("arsim"), [[0, 0, 0]], [1, 2])
     with pytest.raises(RobotError, match="arenas"):
         Batch(model(), [load_arena("arsim")] * 2, [[0, 0, 0]], [1])
+
+
+def free_by_shapely(arena: Arena, radius: float) -> shapely.Geometry:
+    """Where the middle of a disc may be: within the outlines, off what stands there, by the radius."""
+    shapes, count = arena.outlines, len(arena.description.outline)
+    solid = shapely.union_all(
+        [shapely.Polygon(one) if len(one) > 2 else shapely.LineString(one) for one in shapes[count:]]
+    )
+    return (
+        shapely.union_all([shapely.Polygon(one) for one in shapes[:count]])
+        .buffer(-radius)
+        .difference(solid.buffer(radius))
+    )
+
+
+def test_random_starts_are_free_even_and_those_of_the_seed() -> None:
+    arena, seeds = load_arena("arsim"), np.arange(600)
+    poses = Batch(arsim(), arena, "random", seeds).true_poses
+    free = free_by_shapely(arena, arsim().radius - 1e-9)
+    assert shapely.contains_xy(free, poses[:, :2]).all()
+    assert np.array_equal(Batch(arsim(), arena, "random", seeds[::-7]).true_poses, poses[::-7]), "by its seed alone"
+    assert len(np.unique(poses, axis=0)) == 600 and arena.free_start(arsim().radius, 5) == tuple(poses[5])
+    # Four quarters of the arena, which looks the same turned by half a turn: binomial, within 4.4 sigma of equal shares
+    for side in (poses[:, 0] > 0, poses[:, 1] > 0, poses[:, 2] > 0):
+        assert abs(np.count_nonzero(side) - 300) < 4.4 * math.sqrt(600) / 2
+
+
+def test_random_starts_of_an_outline_in_an_open_field() -> None:
+    """A long body, of which all fits; up to 1 m beside the one obstacle, from 1 to 2 m."""
+    long = VehicleModel({**ARSIM_BODY, "outline_m": [(0.5, -0.1), (0.5, 0.1), (-0.1, 0.1), (-0.1, -0.1)]})
+    long.dc_motors()
+    assert long.radius == pytest.approx(math.hypot(0.5, 0.1))
+    field = arena_of(square(1.5, 1.5, 1.0))
+    poses = Batch(long, field, "random", range(-50, 50)).true_poses
+    assert shapely.distance(shapely.box(1, 1, 2, 2), shapely.points(poses[:, :2])).min() >= long.radius - 1e-9
+    assert 0 <= poses[:, :2].min() < 0.5 and 2.5 < poses[:, :2].max() <= 3
+
+
+def test_where_no_start_is_free_or_poses_are_none_is_one_sentence() -> None:
+    arena = load_arena("arsim")
+    with pytest.raises(ArenaError, match=r"arena arsim: of 10,000 places none is free for a robot of 5 m of radius"):
+        arena.free_start(5.0, 1)
+    with pytest.raises(ArenaError, match=r"seed is 1\.5; expected a whole number"):
+        arena.free_start(0.1, 1.5)  # type: ignore[arg-type]
+    with pytest.raises(RobotError, match=r"poses are 'free'; expected numbers of shape \(N, 3\), or \"random\""):
+        Batch(arsim(), arena, "free", [1])
 
 
 def test_an_empty_batch() -> None:

@@ -7,6 +7,7 @@ angles in rad, SI units; motor signals in [-1, 1], left and right.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
@@ -99,6 +100,12 @@ class VehicleModel:
     def readings(self) -> int:
         """How many readings it gives."""
         return int(lib.vehicle_model_readings(self.handle))
+
+    @property
+    def radius(self) -> float:
+        """Of the disc about its axle's middle in which the body fits (m)."""
+        corners = self.body.get("outline_m")
+        return float(self.body["radius"]) if corners is None else max(math.hypot(*corner) for corner in corners)
 
     @property
     def fingerprint(self) -> str:

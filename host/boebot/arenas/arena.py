@@ -37,6 +37,7 @@ __all__ = ["Arena", "ArenaDescription", "Floats", "Point", "Polygon", "Start", "
 Floats = NDArray[np.float64]
 REPEATS = {"loop": lib.PATH_LOOP, "back_and_forth": lib.PATH_BACK_AND_FORTH, "once": lib.PATH_ONCE}
 DISC_CORNERS = 48  # of a disc as it is drawn
+START_TRIES = 10_000  # places that are tried for a start by chance
 REACH_MAXIMUM_M = 1e7  # that may be asked for
 
 
@@ -174,6 +175,31 @@ class Arena:
         movers = self.movers(0.0)
         scene = ffi.new("scene *", {"arena": self.handle, "movers": movers, "movers_count": len(movers)})
         return bool(lib.scene_is_free(scene, x, y, radius, 0))
+
+    def free_start(self, radius: float, seed: int) -> tuple[float, float, float]:
+        """A free place by chance, and any heading: x (m), y (m), heading (rad); the same for the same seed.
+
+        Equally likely anywhere within the outlines or, in an open field, up to 1 m beside what stands there. That a way
+        leads there is not looked at.
+
+        Args:
+            radius: of a disc in which the robot fits (m).
+
+        Raises:
+            ArenaError: no free place is found, or a number is not finite, negative or too large.
+        """
+        key = arguments.whole("arena: seed", seed, ArenaError, least=-(2**63), most=2**64 - 1) % 2**64
+        chance = np.random.default_rng((key, 1))  # 1: not what others draw by this seed
+        points = np.vstack(self._polygons[: len(self.description.outline) or None])
+        edge = 0.0 if self.description.outline else 1.0
+        for _ in range(START_TRIES):
+            x, y = chance.uniform(points.min(axis=0) - edge, points.max(axis=0) + edge).tolist()
+            if self.is_free(x, y, radius):
+                return x, y, float(chance.uniform(-math.pi, math.pi))
+        raise ArenaError(
+            f"arena {self.name}: of {START_TRIES:,} places none is free for a robot of {radius:g} m of radius; "
+            "expected a smaller robot or more room"
+        )
 
     def grip(self, x: float, y: float, otherwise: float) -> float:
         """Friction coefficient of the floor at (x, y); `otherwise` outside of all patches.
