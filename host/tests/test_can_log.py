@@ -20,17 +20,18 @@ from test_can_bridge import bridged
 
 import boebot as library
 from boebot.can.frames import CanFrame
-from boebot.can.log import KINDS, Sent, frames_of, save_log
+from boebot.can.log import KINDS, Sent, frames_of, read_log, save_log
 from boebot.can.socketcand_server import SocketcandBus
 from boebot.errors import BoebotError
 from boebot.link.messages import Telemetry
 from boebot.record.result import RunResult
+from boebot.running.board_driver import BoardDriver
 from command import boebot, heed_signals
 
 DATABASE: Any = cantools.database.load_file(Path(__file__).resolve().parents[2] / "protocol" / "boebot.dbc")
 HELLO = range(0x621, 0x631, 2)
 NODE = 0xE0  # bits of an identifier
-OPEN, SET_POINT, TELEMETRY = 0x620, 0x120, 0x321
+OPEN, SET_POINT, TELEMETRY, CLOCK_PROBE = 0x620, 0x120, 0x321, 0x224
 ISO_TP_TO_BOARD, ISO_TP_TO_HOST = 0x53E, 0x53F
 
 
@@ -270,6 +271,30 @@ def with_data(identifier: int, place: int, data: bytes) -> Change:
     ]
 
 
+def set_points(frames: list[CanFrame]) -> list[int]:
+    """The places of set-points."""
+    return [place for place, frame in enumerate(frames) if frame.identifier == SET_POINT]
+
+
+def missing(frames: list[CanFrame], begin: int, end: int) -> list[CanFrame]:
+    """Without the frames from one place up to another."""
+    return frames[:begin] + frames[end:]
+
+
+def twice_as_node_1(frames: list[CanFrame]) -> list[CanFrame]:
+    """Another robot's bridge has the same node: telemetry of two sessions, in turn."""
+    found, parts = [], []
+    for frame in frames:
+        found.append(frame)
+        if frame.identifier in range(0x321, 0x32F, 2):
+            parts.append(frame)
+            if frame.identifier == 0x32D:
+                *first, last = parts
+                found += [*first, last._replace(data=last.data[:-1] + bytes((last.data[-1] ^ 1,)))]
+                parts = []
+    return found
+
+
 def as_node_2(frames: list[CanFrame]) -> list[CanFrame]:
     return [frame._replace(identifier=frame.identifier + 0x20) for frame in frames]
 
@@ -304,10 +329,16 @@ def as_node_2(frames: list[CanFrame]) -> list[CanFrame]:
             "the board at {} says that it makes 0 control ticks in a second; expected more",
         ),
         (
-            lambda frames: [frame for frame in frames if (frame.identifier, frame.data[0]) != (0x323, 30)],
+            lambda frames: [frame for frame in frames if (frame.identifier, frame.data[0]) != (0x323, 5)],
             "",
-            "{} lacks the telemetry of tick 30, which a set-point answers",
+            "{} begins with a gap: it lacks the telemetry of tick 5, which a set-point answers",
         ),
+        (
+            lambda frames: missing(frames, (at := set_points(frames)[0]), at + 1),
+            "",
+            "{} begins with a gap: it lacks set-points",
+        ),
+        (twice_as_node_1, "", "{} has two boards of node 1 on one bus; expected each to have another"),
     ],
 )
 def test_log_that_is_no_run_is_refused(
@@ -327,6 +358,97 @@ def test_log_ends_with_the_first_run(capsys: pytest.CaptureFixture[str], tmp_pat
     again = frames(frames_of(library.run("wander", seconds=0.5, seed=6)))
     log = write(tmp_path / "can.log", [*first, CanFrame(SET_POINT, bytes(by_hand)), *again])
     assert boebot(capsys, "replay", str(log), "--brain", "wander", "--seed", "5")[1] == "all 40 commands are the same\n"
+
+
+@pytest.mark.parametrize(
+    ("lost", "compared", "lacks"),
+    [
+        (lambda at: (at[20] - 10, at[20] + 40), 20, "set-points"),
+        (lambda at: (at[39] - 10, at[39] - 9), 40, ""),
+        (lambda at: (at[7], at[7] + 1), 7, "set-points"),
+        (lambda at: (at[30] - 2, at[30] - 1), 30, "the telemetry of tick 155, which a set-point answers"),
+    ],
+    ids=["50 frames", "what no brain sees", "one set-point", "a part of telemetry"],
+)
+def test_gap_is_no_fault_of_the_brain(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    run: RunResult,
+    lost: Callable[[list[int]], tuple[int, int]],
+    compared: int,
+    lacks: str,
+) -> None:
+    whole = [frame for frame in frames(frames_of(run)) if frame.identifier != CLOCK_PROBE]
+    assert len(whole) < len(frames(frames_of(run)))
+    log = write(tmp_path / "can.log", missing(whole, *lost(set_points(whole))))
+    code, out, err = boebot(capsys, "replay", str(log), "--brain", "wander", "--seed", "5")
+    if not lacks:
+        assert (code, out, err) == (0, "all 40 commands are the same\n", "")
+        return
+    assert (code, out) == (
+        1,
+        f"the {compared} commands before the gap are the same; what is behind it was not compared\n",
+    )
+    pattern = rf"boebot: {re.escape(str(log))} has a gap after tick \d+ \(\d\.\d\d s\): it lacks {lacks}; \d+ of \d+ "
+    assert re.match(pattern, err)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_boards_on_two_buses_are_two_boards(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, run: RunResult, kind: str
+) -> None:
+    """Both are node 1, and their frames are mixed in the log."""
+    other = library.run("wander", seconds=2, seed=6)
+    log = tmp_path / f"can.{kind}"
+    names = ["can0", "can1"] if kind == "log" else ["1", "2"]
+    with can.Logger(log) as writer:
+        both = ((*sent, channel) for channel, result in enumerate((run, other)) for sent in frames_of(result))
+        for time_s, frame, channel in sorted(both, key=lambda sent: sent[0]):
+            message = can.Message(time_s, arbitration_id=frame.identifier, data=frame.data, is_extended_id=False)
+            message.channel = names[channel] if kind == "log" else channel
+            writer.on_message_received(message)
+    for name, seed in zip(names, "56", strict=True):
+        replay = "replay", str(log), "--brain", "wander", "--seed", seed
+        assert boebot(capsys, *replay, "--bus", name) == (0, "all 40 commands are the same\n", "")
+    several, none = "boards on several buses", "no hello of a board on bus can7"
+    for options, which in (((), several), (("--bus", "can7"), none)):
+        expected = "--bus " * (not options) + " or ".join(names)
+        code, out, err = boebot(capsys, "replay", str(log), "--brain", "wander", *options)
+        assert (code, out, err) == (2, "", f"boebot: {log} has {which}; expected {expected}\n")
+
+
+def late_begin(driver: BoardDriver) -> None:
+    """The first look at the line is late by 13.7 ticks."""
+    driver.link.open()
+    driver._make_ready()
+    driver._first_session = driver._session
+    driver.link.telemetry.fetch()
+    sim = driver.session.sim  # type: ignore[attr-defined]
+    sim.run(137 * 16_000)
+
+
+def test_log_has_the_times_and_slow_readings_that_the_brain_saw(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """To the last bit, on a host that begins late and reads so late that messages of one tick come together."""
+    monkeypatch.setattr(BoardDriver, "begin", late_begin)
+    monkeypatch.setattr("boebot.running.board_driver._LOOK_EARLY_BYTES", -45)
+    brain = tmp_path / "brain.py"
+    brain.write_text(
+        "def step(robot):\n"
+        "    passed = [robot.time >= first + n * 0.05 for first in (0.0, 0.02, 0.03) for n in range(20)]\n"
+        "    robot.drive(sum(passed) / 100, robot.line_left.age)\n"
+    )
+    result = library.run(brain, robot="shieldbot-line", seconds=1)
+    steps = [result.record.times[index] for index, *_ in result.record.steps]
+    assert 0.0 < steps[0] < 0.05, "the brain's period has begun before"
+    log = save_log(result, tmp_path / "can.log")
+    read = read_log(log)
+    assert [read.record.times[index] for index, *_ in read.record.steps] == steps
+    assert boebot(capsys, "replay", str(log), "--brain", str(brain))[:2] == (
+        0,
+        f"all {len(steps)} commands are the same\n",
+    )
 
 
 @pytest.mark.parametrize("kind", ["blf", "log"])

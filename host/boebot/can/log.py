@@ -11,11 +11,12 @@ import logging
 import re
 from collections import Counter, deque
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from boebot.can.extra import import_extra
-from boebot.can.frames import NODE_MASK, NODES, PARTS, Assembler, CanFrame, CanMessage, ForeignFrameError
+from boebot.can.frames import NODE_MASK, PARTS, Assembler, CanFrame, CanMessage, ForeignFrameError
 from boebot.can.iso_tp import LongMessages
 from boebot.can.layout import LAYOUTS, NODE_SHIFT
 from boebot.can.translator import BoardEnd, HostEnd
@@ -35,8 +36,13 @@ KINDS = ("blf", "asc", "log")
 
 _PER_UNIT = 10_000  # counts of a set-point per unit
 _SET_POINTS = {messages.SetpointSignal.ID: "signal", messages.SetpointSpeed.ID: "speed"}
+_SILENCE_TICKS = 100  # end a session
 _TELEMETRY_BEGINS = LAYOUTS[messages.Telemetry.ID].identifiers[0]  # with `tick` and `time`
 _PARAMETER = {spec.id: name for name, spec in messages.PARAMETERS.items()}
+
+
+class GapError(CutError):
+    """Frames are missing in the middle of a log."""
 
 
 class Sent(NamedTuple):
@@ -157,7 +163,9 @@ def is_log(path: Path) -> bool:
     return path.suffix[1:].lower() in KINDS and not path.is_dir()
 
 
-def read_log(path: Path, robot: str | None = None, node: int | None = None, seed: int = 1) -> RunResult:
+def read_log(
+    path: Path, robot: str | None = None, node: int | None = None, seed: int = 1, bus: str | None = None
+) -> RunResult:
     """The run in a log of CAN frames, as far as it shows there: the first session in which somebody drove the robot.
 
     Args:
@@ -165,24 +173,28 @@ def read_log(path: Path, robot: str | None = None, node: int | None = None, seed
         robot: its name or file; None: as the board's hello says.
         node: the board's; None: the only one of the log.
         seed: of the brain's chance, which no log shows.
+        bus: the board's, as the log names it, in Vector's formats by a number from 1 on; None: the only one of the log.
 
     Returns:
-        The run. Of a log that breaks off it has ended there, with a `CutError` that says so.
+        The run. Of a log that breaks off it has ended there, with a `CutError` that says so; of one that lacks frames
+        before the last set-point it has ended at that gap, with a `GapError`.
 
     Raises:
         BoebotError: it cannot be read, has no hello of a board or no set-points, or several boards and no `node`.
     """
-    readers = {number: _LogReader(number) for number in NODES}
+    readers: dict[tuple[str, int], _LogReader] = {}
     cut: CutError | None = None
     try:
-        for sent in _sent(path):
-            if reader := readers.get((sent.frame.identifier & NODE_MASK) >> NODE_SHIFT):
-                reader.take(sent)
+        for name, sent in _sent(path):
+            board = name, (sent.frame.identifier & NODE_MASK) >> NODE_SHIFT
+            if board not in readers:
+                readers[board] = _LogReader(board[1])
+            readers[board].take(sent)
     except CutError as error:
         cut = error
-    reader = _chosen(path, readers, node)
+    reader = _chosen(path, readers, bus, node)
     result = reader.result(path, _robot(path, reader, robot), seed)
-    result.error = cut
+    result.error = result.error or cut
     return result
 
 
@@ -191,8 +203,8 @@ def as_on_the_wire(command: Command) -> Command:
     return Command(command.kind, *(round(value * _PER_UNIT) / _PER_UNIT for value in command[1:]))
 
 
-def _sent(path: Path) -> Iterator[Sent]:
-    """The frames of a log.
+def _sent(path: Path) -> Iterator[tuple[str, Sent]]:
+    """The frames of a log, each with the name of its bus. Their order is the log's: a clock may have been set.
 
     Raises:
         BoebotError: it cannot be read.
@@ -200,13 +212,15 @@ def _sent(path: Path) -> Iterator[Sent]:
     """
     can = import_extra("can")
     logging.getLogger("can").addHandler(logging.NullHandler())  # else its remarks go to standard error
+    numbered = path.suffix.lower() != ".log"  # from 1 on; python-can counts from 0
     count = 0
     try:
         with can.LogReader(str(path)) as log:
             for message in log:
                 count += 1
                 if not (message.is_error_frame or message.is_extended_id or message.is_remote_frame or message.is_fd):
-                    yield Sent(message.timestamp, CanFrame(message.arbitration_id, bytes(message.data)))
+                    bus = message.channel + 1 if numbered and message.channel is not None else message.channel
+                    yield str(bus), Sent(message.timestamp, CanFrame(message.arbitration_id, bytes(message.data)))
             if getattr(log, "file_size", 0) > path.stat().st_size:  # of a BLF: as its header says
                 raise EOFError("it is shorter than it says")
     except OSError as error:
@@ -218,23 +232,30 @@ def _sent(path: Path) -> Iterator[Sent]:
         raise BoebotError(f"{path} is no log of CAN frames: {reason}") from None
 
 
-def _chosen(path: Path, readers: dict[int, _LogReader], node: int | None) -> _LogReader:
-    """The reader of a board that was driven."""
-    heard = [number for number, reader in readers.items() if reader.hello is not None]
+def _chosen(path: Path, readers: dict[tuple[str, int], _LogReader], bus: str | None, node: int | None) -> _LogReader:
+    """The reader of a board that was driven: of one bus and one node."""
+    heard = [board for board, reader in readers.items() if reader.hello is not None]
     if not heard:
         raise BoebotError(f"{path} has no hello of a board; expected a log from before the run began")
-    if node is None and len(heard) > 1:
-        raise BoebotError(f"{path} has boards of several nodes; expected --node {' or '.join(map(str, heard))}")
-    node = heard[0] if node is None else node
-    if node not in heard:
-        raise BoebotError(f"{path} has no hello of a board of node {node}; expected {' or '.join(map(str, heard))}")
-    hello = readers[node].hello
+    wishes = [(1, node, "of node", "of several nodes", "--node"), (0, bus, "on bus", "on several buses", "--bus")]
+    for part, wanted, of, of_several, option in sorted(wishes, key=lambda wish: wish[1] is None):
+        known = sorted({board[part] for board in heard}, key=str)
+        names = " or ".join(map(str, known))
+        if wanted is not None and wanted not in known:
+            raise BoebotError(f"{path} has no hello of a board {of} {wanted}; expected {names}")
+        if wanted is None and len(known) > 1:
+            raise BoebotError(f"{path} has boards {of_several}; expected {option} {names}")
+        heard = [board for board in heard if wanted in (None, board[part])]
+    reader = readers[heard[0]]
+    hello = reader.hello
     assert hello is not None
     if not mismatch.speaks_alike(hello):
         raise mismatch.refusal(hello, str(path), _no_description)
-    if not readers[node].commands:
-        raise BoebotError(f"{path} has no set-points for node {node}: nobody drove the robot")
-    return readers[node]
+    if reader.is_shared:
+        raise BoebotError(f"{path} has two boards of node {heard[0][1]} on one bus; expected each to have another")
+    if not reader.commands:
+        raise BoebotError(f"{path} has no set-points for node {heard[0][1]}: nobody drove the robot")
+    return reader
 
 
 def _no_description(_: int) -> messages.Description:
@@ -265,23 +286,28 @@ class _LogReader:
     Attributes:
         hello: the board's last before the first set-point.
         parameters: counts in force then, as the board has answered them.
-        commands: (tick, command) of each set-point.
+        commands: (tick, command, whether none before it is missing, as far as numbers say) of each set-point.
+        is_shared: two boards use the node at a time.
     """
 
     def __init__(self, node: int) -> None:
         self.hello: messages.Hello | None = None
         self.parameters: dict[str, int] = {}
-        self.commands: list[tuple[int, Command]] = []
+        self.commands: list[tuple[int, Command, bool]] = []
+        self.is_shared = False
         self._is_over = False
+        self._sequence = 0  # of the host's newest message: set-points have it, each other message counts one
+        self._accepted = 0  # set-point that the board had accepted last when the session began
+        self._newest: dict[int | None, int] = {}  # tick of each session
         self._session: int | None = None  # of the newest telemetry
         self._ends = [Assembler(to_board, frozenset({node})) for to_board in (True, False)]
         self._asked: dict[int, int] = {}  # number of a request -> parameter
         self._telemetry: list[tuple[float, messages.Telemetry]] = []
-        self._slow: list[tuple[int, type[messages.Message], bytes]] = []  # how much telemetry had come before
+        self._slow: list[tuple[int, type[messages.Message], bytes]] = []  # how many set-points had come before
 
     def take(self, sent: Sent) -> None:
         """The next frame of this node."""
-        if self._is_over or sent.frame.identifier & ~NODE_MASK not in PARTS:
+        if sent.frame.identifier & ~NODE_MASK not in PARTS:
             return
         for end in self._ends:
             if end.takes(sent.frame.identifier):
@@ -294,12 +320,15 @@ class _LogReader:
 
     def _take(self, time_s: float, came: CanMessage) -> None:
         kind = messages.MESSAGES[came.id]
-        if came.sequence is not None:
-            self._take_set_point(came)
-        elif kind is messages.Telemetry:
+        self._sequence += came.id < messages.Hello.ID and came.sequence is None
+        if kind is messages.Telemetry:
             self._take_telemetry(time_s, came)
+        elif self._is_over:
+            return
+        elif came.sequence is not None:
+            self._take_set_point(came, came.sequence)
         elif kind in messages.DEVICE_MESSAGES:
-            self._slow.append((len(self._telemetry), kind, came.payload))
+            self._slow.append((len(self.commands), kind, came.payload))
         elif self.commands:
             self._is_over = kind is messages.Close
         elif kind is messages.Hello:
@@ -315,47 +344,68 @@ class _LogReader:
 
     def _take_telemetry(self, time_s: float, came: CanMessage) -> None:
         telemetry = messages.Telemetry.unpack(came.payload)
+        if is_other := came.session != self._session:  # has it gone on beside the one before?
+            self.is_shared |= 0 < telemetry.tick - self._newest.get(came.session, telemetry.tick) < _SILENCE_TICKS
+            self._session, self._accepted = came.session, telemetry.setpoint_sequence
+        self._newest[came.session] = telemetry.tick
         newest = self._telemetry[-1][1].tick if self._telemetry else -1
         was_reset = telemetry.tick <= newest
-        if self.commands and (was_reset or came.session != self._session):
-            self._is_over = True
+        self._is_over |= bool(self.commands) and (was_reset or is_other)
+        if self._is_over:
             return
         if was_reset:
             self._telemetry.clear()
             self._slow.clear()
-        self._session = came.session
         self._telemetry.append((time_s, telemetry))
 
-    def _take_set_point(self, came: CanMessage) -> None:
+    def _take_set_point(self, came: CanMessage, sequence: int) -> None:
         if not self._telemetry or came.session != self._session:
             return
         point: Any = messages.MESSAGES[came.id].unpack(came.payload)
-        newest = self._telemetry[-1][1].tick
-        tick = newest - 128 + ((point.answers_tick - newest + 128) & 0xFF)  # the nearest one with that low byte
+        newest = self._telemetry[-1][1]
+        tick = newest.tick - 128 + ((point.answers_tick - newest.tick + 128) & 0xFF)  # the nearest one with that byte
         kind = _SET_POINTS.get(came.id)
         signals = (0.0, 0.0) if kind is None else (point.left / _PER_UNIT, point.right / _PER_UNIT)
+        follows = (
+            (self._sequence + 1) & 0xFF == sequence if self.commands else newest.setpoint_sequence == self._accepted
+        )
+        self._sequence = sequence
         if not self.commands or tick > self.commands[-1][0]:
-            self.commands.append((tick, Command(kind or "stop", *signals)))
+            self.commands.append((tick, Command(kind or "stop", *signals), follows))
 
     def result(self, path: Path, robot: RobotDescription, seed: int) -> RunResult:
-        """The run. Its time 0 is the tick that the first set-point answers."""
+        """The run, up to its first gap. Its time 0 is as of a driver: the brain's period begins with the ticks that
+        the period divides, and a first step may be late. The sums are a driver's, too: a brain that compares times
+        sees the last bit."""
         assert self.hello is not None
         tick_s = 1.0 / self.hello.tick_rate
-        first, last = self.commands[0][0], self.commands[-1][0]
+        ticks = [tick for tick, *_ in self.commands]
+        gaps = Counter(after - before for before, after in pairwise(ticks))
+        period = gaps.most_common(1)[0][0] if gaps else 1
+        first = ticks[0]
+        time_zero = -(first - first % period) * tick_s
+        times = {telemetry.tick: telemetry.tick * tick_s + time_zero for _, telemetry in self._telemetry}
+        count, gap = len(ticks), None
+        for place, (tick, _, follows) in enumerate(self.commands):
+            before = ticks[place - 1] if place else first - 2 * period
+            if tick not in times or (not follows and tick - before > period):  # nearer ones have none between them
+                lacks = "set-points" if tick in times else f"the telemetry of tick {tick}, which a set-point answers"
+                if place == 0:
+                    raise BoebotError(f"{path} begins with a gap: it lacks {lacks}")
+                where = f"has a gap after tick {before} ({times[before]:.2f} s): it lacks {lacks}"
+                gap = GapError(f"{path} {where}; {count - place} of {count} commands are behind it")
+                count = place
+                break
+        last = ticks[count - 1]
         record = Record()
-        times = {}
         for stamp_s, telemetry in self._telemetry:
             if first <= telemetry.tick <= last:
-                time_s = times[telemetry.tick] = (telemetry.tick - first) * tick_s
-                record.append_telemetry(time_s, telemetry.pack(), stamp_s, 0.0)
-        for place, kind, payload in self._slow:
-            if place < len(self._telemetry):  # the brain saw it with the next telemetry
-                record.append(kind.NAME, (self._telemetry[place][1].tick - first) * tick_s, payload)
-        for tick, command in self.commands:
-            if tick not in times:
-                raise BoebotError(f"{path} lacks the telemetry of tick {tick}, which a set-point answers")
+                record.append_telemetry(times[telemetry.tick], telemetry.pack(), stamp_s, 0.0)
+        for place, slow, payload in self._slow:
+            if place < count:  # a host reads all that has come before it answers
+                record.append(slow.NAME, times[ticks[place]], payload)
+        for tick, command, _ in self.commands[:count]:
             record.append_command(times[tick], *command)
-        gaps = Counter(after[0] - before[0] for before, after in zip(self.commands, self.commands[1:], strict=False))
         return RunResult(
             brain="unknown",
             robot=robot,
@@ -363,17 +413,17 @@ class _LogReader:
             description="a log of CAN frames",
             arena=None,
             seed=seed,
-            period=(gaps.most_common(1)[0][0] if gaps else 1) * tick_s,
+            period=period * tick_s,
             tick=tick_s,
-            error=None,
+            error=gap,
             record=record,
             world=None,
             clock_offset=0.0,
-            steps=len(self.commands),
+            steps=count,
             late_steps=0,
             resets=0,
             lost_frames=sum(end.lost for end in self._ends),
             bad_frames=0,
-            run_time=(last - first) * tick_s,
+            run_time=times[last],
             wall_time=0.0,
         )

@@ -225,7 +225,7 @@ class Record:
     def clock_offset(self) -> float:
         """The transport's clock (s) at the run's time 0; 0 where that is not known."""
         rows = self.rows("clock")
-        return float(_CLOCK.unpack(rows[0][1])[0]) if rows else 0.0
+        return float(_CLOCK.unpack(rows[-1][1])[0]) if rows else 0.0
 
     @property
     def times(self) -> list[float]:

@@ -308,10 +308,13 @@ class BoardDriver:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
                 look_s, wait_until_s = now_s, now_s + (period + 1) * tick_s
                 continue
+            (newest,) = tick_of(received[-1][0])
+            if self._last_s < 0.0 and newest - due >= n:
+                due = -1  # a first step that is late by more than a period begins with the present one
             for payload, board_s, host_s, bound_s in received:  # noqa: B007
                 (tick,) = tick_of(payload)
                 if due < 0:
-                    due = tick + -tick % n
+                    due = max(newest - newest % n, tick + -tick % n)
                     time_zero = -due * tick_s
                     self.clock_offset_s = host_s + (due - tick) * tick_s
                     self.record.append_clock(self.clock_offset_s)
