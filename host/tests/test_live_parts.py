@@ -21,7 +21,7 @@ from boebot.live.live_view import LiveView
 from boebot.live.outbox import EVENTS, LETTERS, Outbox
 from boebot.live.pace import Pace
 from boebot.record.record import Record
-from boebot.running.brain_parameters import bounds, meaning, parameters, set_parameter
+from boebot.running.brain_parameters import bounds, meaning, set_parameters, sliders
 from boebot.running.interventions import Arm, Deed, Hand, Parameter, Place, Release, Stop, Tally
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
@@ -197,16 +197,17 @@ def test_rubbish_is_one_sentence(text: str) -> None:
 
 def test_every_slider_of_the_bundled_brain_stays_within_what_its_process_takes() -> None:
     brain = load_brain("demo")
-    for name, value in parameters(brain).items():
+    shown = sliders(brain)
+    assert {"avoid.turn", "avoid.utility.b", "avoid.utility.w.near", "charge.utility.tau_gamma"} <= shown.keys()
+    assert shown.keys().isdisjoint({"avoid.period", "avoid.utility.w.low", "wander.utility.w.near"})
+    for name, value in shown.items():
         least, most = bounds(brain, name)
         assert least <= value <= most, name
         for one in (least, most, value):
-            set_parameter(brain, name, one)
+            set_parameters(brain, {name: one})
+    assert bounds(brain, "wander.utility.b") == (-1.5, 1.5)
     assert meaning(brain, "avoid.after") == "s to turn on once both are clear."
-    with pytest.raises(BoebotError, match=r"has no parameter 'avoid\.fly'"):
-        set_parameter(brain, "avoid.fly", 1.0)
-    with pytest.raises(BoebotError, match="avoid: turn"):
-        set_parameter(brain, "avoid.turn", 2.0)
+    assert meaning(brain, "avoid.utility.w.near") == "weights, by the name of the state variable."
 
 
 def test_first_chunk_has_all_robots_from_their_beginning(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

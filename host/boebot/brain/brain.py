@@ -7,7 +7,7 @@ the order in which they were given; the active motor behavior.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from boebot.brain.process import CognitiveProcess, MotorBehavior, Process
@@ -61,11 +61,13 @@ class Brain:
 
     Attributes:
         processes: all of them, with those that others brought along.
+        given: those that it was made of.
         variables: the state variables.
         steps: one BrainStep for each step of the present run that `take` has not given yet. A run takes them into its
             record as it goes on: they are in the result's `brain_record`.
         switches: one Switch for each change of the active behavior, as long.
         begun: names of the processes that have been active in the present or last run.
+        margin: by how much a motor behavior's utility must exceed the active one's to take over.
     """
 
     def __init__(
@@ -88,13 +90,14 @@ class Brain:
             BrainError: the parts do not fit together.
         """
         given = _checked(processes, Process, "processes")
+        self.given: tuple[Process, ...] = tuple(given)
         self.processes: tuple[Process, ...] = tuple(given + [one for each in given for one in each.companions()])
         self.variables = tuple(_checked(variables, StateVariable, "state variables"))
         self.steps: list[BrainStep] = []
         self.switches: list[Switch] = []
         self.begun: set[str] = set()
         self.PERIOD = period
-        self._margin = margin
+        self.margin = margin
         self._check()
         self.NEEDS = _united([*(each.NEEDS for each in self.processes), *(each.needs for each in self.variables)])
         self._utilities = Utilities(
@@ -131,8 +134,8 @@ class Brain:
                 raise BrainError(f"two {kind} are called {twice!r}; expected another name= for each")
         if not (isinstance(self.PERIOD, int | float) and 0 < self.PERIOD < math.inf):
             raise BrainError(f"a brain's period of {self.PERIOD!r}; expected seconds from step to step")
-        if not (isinstance(self._margin, int | float) and 0 <= self._margin < math.inf):
-            raise BrainError(f"a margin of {self._margin!r}; expected 0 or more")
+        if not (isinstance(self.margin, int | float) and 0 <= self.margin < math.inf):
+            raise BrainError(f"a margin of {self.margin!r}; expected 0 or more")
 
     # ---- a run -------------------------------------------------------------------------------------------------
 
@@ -156,6 +159,11 @@ class Brain:
         self._step_if_due(self._driving, robot)
         name = self.processes[self._driving].name
         self.steps.append(BrainStep(now, name, z, tuple(utilities.values), tuple(utilities.gammas)))
+
+    def change(self, process: Process, fields: Mapping[str, Any]) -> None:
+        """Parameters of one of its processes get other values, which that takes; also while a run goes on."""
+        vars(process).update(fields, has_changed=True)
+        self._utilities.follow([each.utility for each in self.processes])
 
     @property
     def active(self) -> str:
@@ -206,7 +214,7 @@ class Brain:
         """Motor behaviors: the one of the highest utility. Cognitive processes: all with a utility above 0."""
         values = self._utilities.values
         best = max(self._motor, key=values.__getitem__)  # of equals, the first
-        if self._driving < 0 or values[best] > values[self._driving] + self._margin:
+        if self._driving < 0 or values[best] > values[self._driving] + self.margin:
             self._switch_motor(robot, best, z)
         active = self._active
         for index in self._cognitive:

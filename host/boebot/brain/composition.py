@@ -15,10 +15,11 @@
     utility = { b = 0.5 }
 
     [process.dodge]
-    kind = "avoid"
+    kind = "avoid"                   # or the class's whole name, boebot.behaviors.avoid.Avoid
     utility = { b = -1.0, w = { near = 3.0 } }
 
-Kinds are the classes of boebot.behaviors and boebot.cognition, in lower case with underscores.
+Kinds are the classes of boebot.behaviors and boebot.cognition, in lower case with underscores. `described` is the way
+back: what a brain was made of, as the record of a run has it.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import inspect
+import json
 import re
 import typing
 from collections.abc import Callable, Iterator
@@ -36,6 +38,7 @@ from typing import Any
 
 import msgspec
 
+from boebot import arguments
 from boebot.brain.brain import Brain
 from boebot.brain.process import Process, snake_case
 from boebot.brain.utility import Utility
@@ -88,14 +91,19 @@ def load(path: Path) -> Brain:
     Raises:
         BrainError: one sentence with the file, the line, the key and what was expected.
     """
-    table = toml_files.read(path, BrainError)
+    return composed(toml_files.read(path, BrainError), path.name)
+
+
+def composed(table: dict[str, Any], file: str) -> Brain:
+    """The brain that a file's table describes; `file`: its name, for errors. Raises as `load`."""
     processes = table.get("process")
     if isinstance(processes, dict):
         for name, process in processes.items():
             if isinstance(process, dict):
-                process.setdefault("kind", name)
-    described: Any = toml_files.convert(table, _file_type(), path.name, BrainError)
-    places = _Places(table, path.name)
+                kind = process.setdefault("kind", name)
+                process["kind"] = next((key for key, one in process_kinds().items() if class_name(one) == kind), kind)
+    described: Any = toml_files.convert(table, _file_type(), file, BrainError)
+    places = _Places(table, file)
     variables: dict[str, StateVariable] = {}
     made: dict[str, Process] = {}
     for name, one in described.process.items():
@@ -109,6 +117,52 @@ def load(path: Path) -> Brain:
             _check_names(name, process, variables)
     with places.at(""):
         return Brain(made.values(), variables.values(), period=described.period_s, margin=described.margin)
+
+
+def described(brain: Brain) -> dict[str, Any]:
+    """What a brain is made of, as the table of a file, with the whole names of classes. Beside it `undescribed`, in
+    words, what no file can say: where there is nothing of this kind, the table composes the same brain."""
+    variables = {one.name: _source(one, brain) for one in brain.variables}
+    odd = [] if type(brain) is Brain else [f"the brain is a {class_name(type(brain))}"]
+    odd += [f"state variable {name!r} is read by a function" for name, one in variables.items() if one is None]
+    processes: dict[str, Any] = {}
+    for process in brain.given:
+        table = processes[process.name] = {"kind": class_name(type(process))}
+        if type(process) not in process_kinds().values():
+            odd.append(f"process {process.name!r} is a {table['kind']}")
+        for field in dataclasses.fields(process):
+            if field.init and field.name not in _NO_PARAMETERS:
+                value = getattr(process, field.name)
+                try:
+                    table[field.name] = _plain(value, brain)
+                except TypeError:
+                    odd.append(f"{process.name}.{field.name} is {arguments.shown(value)}")
+        numbers = {field.name: getattr(process.utility, field.name) for field in dataclasses.fields(Utility)}
+        table["utility"] = numbers | {"w": dict(process.utility.w)}
+    whole = {"period_s": brain.PERIOD, "margin": brain.margin, "variable": variables, "process": processes}
+    as_json: dict[str, Any] = json.loads(json.dumps(whole | {"undescribed": odd}))
+    return as_json
+
+
+def class_name(kind: type) -> str:
+    """With its module's."""
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _source(variable: StateVariable, brain: Brain) -> dict[str, str] | None:
+    """The table of a state variable; None: a function of somebody's own reads it."""
+    sources = [({"kind": kind}, make) for kind, make in variable_kinds().items()]
+    for process in brain.given:
+        if type(process) in process_kinds().values():
+            for kind, make in _offered(process).items():
+                sources.append(({"of": process.name} | ({"kind": kind} if kind else {}), make))
+    return next((table for table, make in sources if dataclasses.replace(make(), name=variable.name) == variable), None)
+
+
+def _plain(value: Any, brain: Brain) -> Any:
+    """A parameter as JSON has it: what reads a state variable is its name. Raises TypeError where it is neither."""
+    named = [one.name for one in brain.variables if callable(value) and value in (one.read, _Reading(one.name, {}))]
+    return msgspec.to_builtins(float(value) if isinstance(value, float) else value) if not named else named[0]
 
 
 class _Places:
@@ -194,7 +248,7 @@ class _Reading:
     """What the state variable of that name reads; processes are made before the state variables are."""
 
     variable: str
-    variables: dict[str, StateVariable]
+    variables: dict[str, StateVariable] = dataclasses.field(compare=False)
 
     def __call__(self, robot: Robot) -> float | None:
         return self.variables[self.variable].read(robot)

@@ -73,6 +73,7 @@ class Process:
         self._others: Callable[[object], Process] = _alone
         self._kick: Callable[[Process, float], None] = _unheard
         self._chances: dict[tuple[float, float], float] = {}
+        self.has_changed = False  # parameters have since it was made
         self.forget()
 
     def forget(self) -> None:
@@ -151,8 +152,11 @@ class Process:
         others: Callable[[object], Process],
         kick: Callable[[Process, float], None],
     ) -> None:
-        """A run begins."""
-        self.forget()
+        """A run begins. What has been made of parameters that have changed is made anew."""
+        if self.has_changed:
+            self.__post_init__()
+        else:
+            self.forget()
         self.step_time, self.random = step_time, source
         self._others, self._kick = others, kick
         self._chances.clear()

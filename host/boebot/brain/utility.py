@@ -84,9 +84,13 @@ class Utilities:
         """
         self.values = [0.0] * len(functions)
         self.gammas = [0.0] * len(functions)
-        self._functions = tuple(functions)
         self._variables = tuple(variables)
+        self.follow(functions)
+
+    def follow(self, functions: Sequence[Utility]) -> None:
+        """From now on these, as many as before; values and gammas go on from where they are. Raises as above."""
         self._weights = [self._indexed(function) for function in functions]
+        self._functions = tuple(functions)
         self._arguments = [(one.b, one.c, weights) for one, weights in zip(functions, self._weights, strict=True)]
         self._factors: dict[float, list[tuple[float, float]]] = {}  # by the time that has passed (s)
 

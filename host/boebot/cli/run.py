@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import math
+import tomllib
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -81,6 +82,15 @@ def run(
     seed: options.Seed = 1,
     period: options.Period = None,
     without: options.Without = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="A parameter of a brain of processes for this run: avoid.turn=0.4, avoid.utility.w.near=2, ... Of "
+            "several robots all that have it, or one: 2:avoid.turn=0.4.",
+        ),
+    ] = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
     step_timeout: Annotated[
         float | None,
@@ -149,6 +159,7 @@ def run(
         step_timeout=step_timeout,
         force_timing=force_timing,
         pins=pins,
+        parameters=_assigned(parameters or []),
     )
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
@@ -178,6 +189,29 @@ def run(
 
 
 run.__doc__ = _HELP
+
+
+def _assigned(texts: list[str]) -> dict[str, Any]:
+    """Of "NAME=VALUE", the value as in TOML; what is none there is a text.
+
+    Raises:
+        BoebotError: one is no such thing, or names a parameter again.
+    """
+    found: dict[str, Any] = {}
+    for one in texts:
+        name, sign, text = one.partition("=")
+        if not sign or name in found:
+            wrong = f"comes after {name}={found[name]}" if name in found else "sets nothing"
+            raise BoebotError(f"--set {one} {wrong}; expected NAME=VALUE once, as avoid.turn=0.4")
+        for read in (_toml, float, str):
+            with contextlib.suppress(ValueError):
+                found[name] = read(text)
+                break
+    return found
+
+
+def _toml(text: str) -> Any:
+    return tomllib.loads(f"value = {text}")["value"]
 
 
 def _check_alone(context: typer.Context) -> None:

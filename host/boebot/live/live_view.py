@@ -24,7 +24,7 @@ from boebot.live.outbox import LETTERS, Message
 from boebot.live.pace import Pace
 from boebot.live.page_server import LOOPBACK
 from boebot.record.result import RunResult
-from boebot.running.brain_parameters import bounds, meaning, parameters
+from boebot.running.brain_parameters import bounds, meaning, sliders
 from boebot.running.interventions import Deed, Hands
 from boebot.view import page_data, scene
 
@@ -222,7 +222,7 @@ class LiveView:
             "driver": None,
             "robots": [
                 {
-                    "parameters": parameters(robot.task.brain),
+                    "parameters": sliders(robot.task.brain),
                     "latched": robot.driver.robot.latched,
                     "driver": page,
                     "pose": _pose_now(robot),
@@ -319,7 +319,7 @@ class Heard:
 def _possible(robots: Sequence[Hands]) -> frozenset[str]:
     """What people may do to that run."""
     can = {"hand"}
-    if any(parameters(robot.task.brain) for robot in robots):
+    if any(sliders(robot.task.brain) for robot in robots):
         can.add("parameters")
     first = robots[0]
     if first.driver.session.arena is not None:
@@ -331,12 +331,12 @@ def _possible(robots: Sequence[Hands]) -> frozenset[str]:
 
 def _sliders(robot: Hands) -> list[Message]:
     brain = robot.task.brain
-    sliders = []
-    for name, value in parameters(brain).items():
+    made = []
+    for name, value in sliders(brain).items():
         least, most = bounds(brain, name)
         text = meaning(brain, name)
-        sliders.append({"name": name, "value": value, "least": least, "most": most, "unit": "", "text": text})
-    return sliders
+        made.append({"name": name, "value": value, "least": least, "most": most, "unit": "", "text": text})
+    return made
 
 
 def _pose_now(robot: Hands) -> tuple[float, float, float] | None:

@@ -23,7 +23,7 @@ from boebot.link.messages import Telemetry
 from boebot.record.blocks import Row
 from boebot.record.result import RunResult
 from boebot.robot import Command, Equipment, Observation, Robot
-from boebot.running.brain_parameters import set_parameter
+from boebot.running.brain_parameters import in_force, parameters, set_parameters
 from boebot.running.interventions import Arm, Deed, Hand, Parameter, Release, Stop, interventions
 
 NOT_SEEN = frozenset(("setpoint_sequence",))
@@ -140,7 +140,10 @@ def replayed(result: RunResult, brain: object) -> list[Command]:
     deeds = interventions(result.record)
     held: Hand | None = None
     commands = []
-    try:
+    known = parameters(loaded)
+    with contextlib.ExitStack() as stack:
+        stack.callback(loaded.end)
+        stack.enter_context(in_force(loaded, {name: one for name, one in result.parameters.items() if name in known}))
         for observation in _observations(result):
             if loaded.is_over:
                 break
@@ -155,8 +158,6 @@ def replayed(result: RunResult, brain: object) -> list[Command]:
             if held is not None:
                 robot.drive(held.left, held.right)
             commands.append(robot.command)
-    finally:
-        loaded.end()
     return commands
 
 
@@ -173,7 +174,7 @@ def _done_again(deed: Deed, robot: Robot, brain: brains.LoadedBrain, held: Hand 
             robot.arm()
         case Parameter(name, value):
             with contextlib.suppress(BrainError):  # of another brain
-                set_parameter(brain, name, value)
+                set_parameters(brain, {name: value})
     return held
 
 

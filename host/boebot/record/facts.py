@@ -64,6 +64,8 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     processes: list[str] | None
     behaviors: list[str]
     variables: list[str]
+    parameters: dict[str, Any]
+    made_of: dict[str, Any] | None
 
 
 _CHANGED = ("error", "interrupted", "identity", "layout", "processes", "behaviors", "variables")

@@ -65,7 +65,10 @@ class RunResult(FormerNames):
         watchdog_resets: where the watchdog of an emulated board found the program, oldest first.
         counters: what an emulated board counted.
         layout: of a robot without a board: where the readings of each of its devices stand.
-        brain_names: of a brain of processes: what it is made of; None: a brain of another kind.
+        brain_names: of a brain of processes: names of its parts; None: a brain of another kind.
+        parameters: of the brain that were set for this run, by name, as "avoid.turn".
+        made_of: of a brain of processes: classes and parameters of its processes, their utilities, and state variables,
+            as the run began (docs/reference/run-files.md).
     """
 
     FORMER: ClassVar = {"distance": DISTANCE, "contacts": CONTACTS}
@@ -98,6 +101,8 @@ class RunResult(FormerNames):
     layout: Layout | None = None
     without: Sequence[str] = ()
     brain_names: BrainNames | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    made_of: Mapping[str, Any] | None = None
     odometry_source: str | None = None
     long_steps: int = 0
     longest_step: float = 0.0

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from boebot.arenas import load_arena
+from boebot.brain import Brain
+from boebot.brain.composition import composed
 from boebot.errors import BoebotError
 from boebot.record.compare import RowDifference, record_difference
 from boebot.record.reading import CutError, attachments_of, read_run
@@ -84,7 +86,8 @@ def recorded(path: Path) -> Recorded:
     """The run in a folder.
 
     Raises:
-        BoebotError: it cannot be read or repeated: a real or paced run, or a brain from no file.
+        BoebotError: it cannot be read or repeated: a real or paced run, or a brain that is neither from a file nor all
+            described.
     """
     attached = attachments_of(path)
     results = _robots(read_run(path))
@@ -97,9 +100,7 @@ def recorded(path: Path) -> Recorded:
         raise BoebotError(f"{path} was run in real time, which no run repeats bit by bit; expected one that was not")
     for result, said in zip(results, asked["members"], strict=True):
         if said["brain"] is None:
-            raise BoebotError(
-                f"brain {result.brain!r} came from no file; expected a run of a bundled brain or of a file"
-            )
+            _composed(result)
     return Recorded(results, asked, attached)
 
 
@@ -114,6 +115,7 @@ def again(run: Recorded, progress: Progress | None = None) -> Repetition:
         files = {
             said["brain"]: str(brain_file(run.attached, Path(said["brain"]), number, len(run.results), Path(folder)))
             for number, said in enumerate(run.asked["members"], 1)
+            if said["brain"] is not None
         }
         request = _request(run, files, Path(folder))
         repeated = Repeated([result.record for result in run.results])
@@ -137,12 +139,13 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         seconds = min(seconds, run.seconds + BEYOND_S)
     members = [
         Member(
-            brain=brains[said["brain"]],
+            brain=_composed(result) if said["brain"] is None else brains[said["brain"]],
             robot=result.robot,
             pose=None if said["pose"] is None else tuple(said["pose"]),
             seed=said["seed"],
             period=said["period"],
             without=said["without"],
+            parameters=result.parameters,
         )
         for result, said in zip(run.results, asked["members"], strict=True)
     ]
@@ -156,6 +159,21 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         force_timing=asked["force_timing"],
         pins=asked.get("pins", False),
     )
+
+
+def _composed(result: RunResult) -> Brain:
+    """The brain of a run, made of the kit's parts as its record has it.
+
+    Raises:
+        BoebotError: that does not say all of it.
+    """
+    whole = dict(result.made_of or {"undescribed": ["it is no Brain of processes"]})
+    if odd := whole.pop("undescribed"):
+        raise BoebotError(
+            f"brain {result.brain!r} came from no file, and its record does not hold all of it: {'; '.join(odd)}; "
+            "expected a run of a bundled brain, of a file, or of a Brain of the kit's parts"
+        )
+    return composed(whole, "the record")
 
 
 def _arena(run: Recorded, folder: Path) -> str | Path | None:

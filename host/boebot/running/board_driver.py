@@ -434,4 +434,6 @@ class BoardDriver:
             counters=dict(self.session.counters()),
             without=self.task.request.without,
             brain_names=BrainNames.of(self.task.brain.brain),
+            parameters=self.task.parameters,
+            made_of=self.task.made_of,
         )

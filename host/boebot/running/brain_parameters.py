@@ -1,95 +1,197 @@
-"""The parameters that a brain's processes declare, as a person may change them while it runs: numbers, each with its
-meaning from the process's own documentation and with bounds that the process takes."""
+"""The parameters of a brain's processes by name: set before a run, and as a person may change them while it goes on,
+with the meaning from the documentation and within what each process takes.
+
+    avoid.turn              a field of the process avoid: a number, a text, True or False, or a tuple of them
+    avoid.utility.b         of its utility (8.4) to (8.6); so are c, tau and tau_gamma
+    avoid.utility.w.near    its weight of the state variable near; 0 where the utility does not name it
+"""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import inspect
 import math
 import re
-from typing import TYPE_CHECKING, Any
+import typing
+from collections.abc import Collection, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from boebot.errors import BrainError
+import msgspec
+
+from boebot.arguments import shown
+from boebot.brain.utility import Utility
+from boebot.errors import BrainError, did_you_mean
+from boebot.robot import Robot
 
 if TYPE_CHECKING:
     from boebot.brain import Process
     from boebot.brains import LoadedBrain
 
 _ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n     +\S.*)*)", re.MULTILINE)  # of "Args:" in a docstring
+_PLAIN = bool | int | float | str | tuple[Any, ...] | None  # what a parameter may be
 
 
-def parameters(brain: LoadedBrain) -> dict[str, float]:
-    """The numbers that its processes declare, by name, as "avoid.turn"."""
-    return {f"{process.name}.{name}": getattr(process, name) for process, name in _declared(brain)}
+class _Place(NamedTuple):
+    """Of one parameter."""
+
+    process: Process
+    field: str
+    part: str = ""
+    """of its utility: "b", "w.near\""""
+
+    @property
+    def value(self) -> Any:
+        """It now."""
+        whole = getattr(self.process, self.field)
+        if self.part.startswith("w."):
+            return whole.w.get(self.part[2:], 0.0)
+        return getattr(whole, self.part) if self.part else whole
+
+    @property
+    def declared(self) -> Any:
+        """The type of the field, as the class says it."""
+        return self.process.__dataclass_fields__[self.field].type
+
+    @property
+    def is_slider(self) -> bool:
+        """A person may move it while a run goes on: a number that need not be whole, not the period, and no weight that
+        the utility lacks."""
+        is_number = isinstance(self.value, float | int) and not isinstance(self.value, bool)
+        is_lacking = self.part.startswith("w.") and self.part[2:] not in self.process.utility.w
+        is_free = self.field != "period" and self.declared not in ("int", int) and not is_lacking
+        return is_free and is_number and math.isfinite(self.value)
 
 
-def _declared(brain: LoadedBrain) -> list[tuple[Process, str]]:
-    if brain.brain is None:
-        return []
-    found = []
-    for process in brain.brain.processes:
+def _places(brain: LoadedBrain) -> dict[str, _Place]:
+    found = {}
+    for process in () if brain.brain is None else brain.brain.processes:
         for one in dataclasses.fields(process):
-            value = getattr(process, one.name)
-            is_number = isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value)
-            if one.name != "period" and one.init and is_number:
-                found.append((process, one.name))
+            is_plain = isinstance(getattr(process, one.name), bool | int | float | str | tuple | list | None)
+            if one.init and is_plain and one.name not in ("name", "utility"):
+                found[f"{process.name}.{one.name}"] = _Place(process, one.name)
+        weights = [f"w.{variable.name}" for variable in brain.brain.variables] if brain.brain else []
+        for part in ("b", *weights, "tau", "c", "tau_gamma"):
+            found[f"{process.name}.utility.{part}"] = _Place(process, "utility", part)
     return found
 
 
-def set_parameter(brain: LoadedBrain, name: str, value: float) -> None:
-    """Gives a parameter another value, if its process takes it.
+def parameters(brain: LoadedBrain) -> dict[str, Any]:
+    """All of them, by name."""
+    return {name: place.value for name, place in _places(brain).items()}
+
+
+def sliders(brain: LoadedBrain) -> dict[str, float]:
+    """Those that a person may move while a run goes on: numbers."""
+    return {name: place.value for name, place in _places(brain).items() if place.is_slider}
+
+
+def set_parameters(brain: LoadedBrain, values: Mapping[str, Any]) -> None:
+    """Gives parameters other values, all or none.
 
     Raises:
-        BrainError: there is no such parameter, or the process refuses the value.
+        BrainError: there is no such parameter, or its process refuses the value.
     """
-    process, field = _find(brain, name)
-    kind = type(getattr(process, field))
-    check_parameter(process, field, kind(value))
-    setattr(process, field, kind(value))
+    places = _places(brain)
+    changed: dict[str, tuple[Process, dict[str, Any]]] = {}  # fields, by the process's name
+    for name, value in values.items():
+        if name not in places:
+            raise unknown(name, places, repr(brain.name))
+        process, field, _ = places[name]
+        _, fields = changed.setdefault(process.name, (process, {}))
+        fields[field] = _changed(places[name], value, fields.get("utility", process.utility))
+    for process, fields in changed.values():
+        _check(process, fields)
+    for process, fields in changed.values():
+        assert brain.brain is not None
+        brain.brain.change(process, fields)
 
 
-def _find(brain: LoadedBrain, name: str) -> tuple[Process, str]:
-    for process, field in _declared(brain):
-        if f"{process.name}.{field}" == name:
-            return process, field
-    raise BrainError(f"the brain has no parameter {name!r}; expected one of {', '.join(parameters(brain)) or 'none'}")
-
-
-def check_parameter(process: Process, field: str, value: float) -> None:
-    """Raises BrainError where the process would refuse that value when it is made, in whichever way."""
-    changed: dict[str, Any] = {field: value}
+@contextlib.contextmanager
+def in_force(brain: LoadedBrain, values: Mapping[str, Any]) -> Iterator[None]:
+    """They have these values in the block, and those from before after it: a `Brain` may run again. Raises as
+    `set_parameters`."""
+    before = {name: value for name, value in parameters(brain).items() if name in values}
+    set_parameters(brain, values)
     try:
-        dataclasses.replace(process, **changed)
+        yield
+    finally:
+        set_parameters(brain, before)
+
+
+def unknown(name: str, known: Collection[str], where: str) -> BrainError:
+    """The sentence about a name that is none of the `known` ones of a brain."""
+    beginnings = dict.fromkeys(f"{one.partition('.')[0]}." for one in known)
+    begun = [one for one in known if one.startswith(f"{name.partition('.')[0]}.")]
+    expected = f"one of {', '.join(begun)}" if begun else f"one that begins with {', '.join(beginnings)}"
+    if not known:
+        expected = "a Brain of processes: others have none by name"
+    return BrainError(f"brain {where} has no parameter {name!r}; expected {expected}{did_you_mean(name, known)}")
+
+
+def _types(kind: type[Process]) -> Mapping[str, Any]:
+    """Of the parameters of a class, as it declares them."""
+    try:
+        return typing.get_type_hints(kind, localns={"Robot": Robot})
+    except Exception:  # of a class of somebody's own: names that only type checkers know
+        return {}
+
+
+def _changed(place: _Place, value: Any, utility: Utility) -> Any:
+    """The field of the process with that value; of its utility, that one with it."""
+    process, field, part = place
+    key, _, variable = part.partition(".")
+    plain = value.tolist() if hasattr(value, "tolist") else value  # numpy's
+    try:
+        fitting = msgspec.convert(plain, float if part else _types(type(process)).get(field, _PLAIN))
+        change: dict[str, Any] = {"w": {**utility.w, variable: fitting}} if variable else {key: fitting}
+        return dataclasses.replace(utility, **change) if part else fitting
+    except (msgspec.ValidationError, TypeError, OverflowError):
+        if part:
+            raise BrainError(f"{process.name}: utility.{part} is {shown(value)}; expected a number") from None
+        _check(process, {field: plain})  # its own sentence says more
+        raise BrainError(f"{process.name}: {field} is {shown(value)}; expected {place.declared}") from None
+    except BrainError as error:
+        raise BrainError(f"{process.name}: {error}") from None
+
+
+def _check(process: Process, fields: Mapping[str, Any]) -> None:
+    """Raises BrainError where the process would refuse these values when it is made, in whichever way."""
+    try:
+        dataclasses.replace(process, **fields)
     except BrainError:
         raise
     except Exception as error:
-        raise BrainError(f"{process.name} does not take {field} = {value!r}: {error}") from None
+        given = ", ".join(f"{key} = {shown(value)}" for key, value in fields.items())
+        raise BrainError(f"{process.name} does not take {given}: {error}") from None
 
 
 def bounds(brain: LoadedBrain, name: str) -> tuple[float, float]:
     """Between which values a slider for a parameter lies: about three times its present value, and within what its
-    process takes."""
-    process, field = _find(brain, name)
-    value = getattr(process, field)
+    process takes; a bias and a weight may change their sign."""
+    place = _places(brain)[name]
+    value = place.value
     far = 3.0 * abs(value) or 1.0
-    most = next(one for one in (far, 2 / 3 * far, 1.0, value) if one >= value and _takes(process, field, one))
-    low = (-far, value) if value < 0 else (0.0, value / 10, value)
-    least = next(one for one in low if _takes(process, field, one))
+    most = next(one for one in (far, 2 / 3 * far, 1.0, value) if one >= value and _takes(place, one))
+    low = (-far, value) if value < 0 or place.part[:1] in ("b", "w") else (0.0, value / 10, value)
+    least = next(one for one in low if _takes(place, one))
     return round(float(least), 9), round(float(most), 9)
 
 
-def _takes(process: Process, field: str, value: float) -> bool:
+def _takes(place: _Place, value: float) -> bool:
     try:
-        check_parameter(process, field, type(getattr(process, field))(value))
+        _check(place.process, {place.field: _changed(place, value, place.process.utility)})
     except BrainError:
         return False
     return True
 
 
 def meaning(brain: LoadedBrain, name: str) -> str:
-    """Of a parameter, as the documentation of its process's class says it; "" where it does not."""
-    process, field = _find(brain, name)
-    for kind in type(process).__mro__:
+    """Of a parameter, as the documentation of its process's class, or of `Utility`, says it; "" where it does not."""
+    place = _places(brain)[name]
+    kinds = (Utility,) if place.part else type(place.process).__mro__
+    field = place.part.partition(".")[0] or place.field
+    for kind in kinds:
         arguments = inspect.getdoc(kind) or ""
         for found, text in _ARGUMENT.findall(arguments.partition("Args:")[2].partition("Attributes:")[0]):
             if found == field:

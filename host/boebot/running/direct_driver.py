@@ -113,4 +113,6 @@ class DirectDriver:
             layout=self.session.layout,
             without=request.without,
             brain_names=BrainNames.of(self.task.brain.brain),
+            parameters=self.task.parameters,
+            made_of=self.task.made_of,
         )

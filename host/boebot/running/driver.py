@@ -7,9 +7,9 @@ steps, and the next turn carries out its command. A brain sees no difference bet
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from boebot.arguments import duration
 from boebot.boards import BoardRequest, BoardSession, VehicleSession
@@ -48,6 +48,10 @@ class Task:
     """how long a step of the brain may take by the wall clock; None: the driver's choice"""
     brain_seed: int
     """of the brain's chance"""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """of the brain that were set for this run, by name"""
+    made_of: Mapping[str, Any] | None = None
+    """the brain, if it is one of processes (boebot.brain.composition.described)"""
     unrealisable: str | None = None
     """why sensors, period and line do not go together in time, where the run was forced all the same"""
 

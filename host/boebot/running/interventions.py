@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 import msgspec
 
 from boebot.errors import BoebotError
-from boebot.running.brain_parameters import set_parameter
+from boebot.running.brain_parameters import set_parameters
 
 if TYPE_CHECKING:
     from boebot.record.record import Record
@@ -154,7 +154,7 @@ class Hands:
             case Shape(index, x, y, heading):
                 self.driver.session.place_shape(index, x, y, heading)
             case Parameter(name, value):
-                set_parameter(self.task.brain, name, value)
+                set_parameters(self.task.brain, {name: value})
 
 
 class Repeated:

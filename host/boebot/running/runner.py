@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import sys
 import time as wall
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from boebot.boards import BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.description.robots import RobotDescription
@@ -24,6 +25,7 @@ from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
 from boebot.running import hangs, interrupts
 from boebot.running.board_driver import BoardDriver
+from boebot.running.brain_parameters import in_force
 from boebot.running.direct_driver import DirectDriver
 from boebot.running.driver import Driver, Progress, Task, end_rows, keep_rows
 from boebot.running.interventions import Hands, Onlooker
@@ -53,6 +55,7 @@ def run(
     record: bool = True,
     pins: bool = False,
     view: bool = False,
+    parameters: Mapping[str, Any] | None = None,
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
@@ -79,6 +82,8 @@ def run(
         record: False: nothing is recorded; a result then has few figures, and `out` is refused.
         view: shows the run in the browser while it goes on, at real time at first; a person may interfere there, or
             begin it afresh: the result is that of the last run (docs/how-to/watch-a-run.md).
+        parameters: of a brain of processes, by name, for this run, such as {"avoid.turn": 0.4, "avoid.utility.b": -1.0}
+            (docs/how-to/several-behaviors.md).
         progress: called with the run's time so far (s), about ten times a second.
 
     Raises:
@@ -101,6 +106,7 @@ def run(
         force_timing=force_timing,
         record=record,
         pins=pins,
+        parameters=parameters,
     )
     return keep(viewed(request, progress, execute, view=view), out)
 
@@ -141,8 +147,9 @@ def execute(
         BoebotError: the run could not begin.
     """
     check_progress(progress)
-    with interrupts.heard():
+    with interrupts.heard(), ExitStack() as stack:
         (task,) = request.tasks()
+        stack.enter_context(in_force(task.brain, task.parameters))
         recording = Recording(1, recorded=request.record)
         task = replace(task, progress=progress, record=recording.records[0])
         opening = open_board if task.request.robot.has_board else open_vehicle

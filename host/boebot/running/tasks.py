@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from pathlib import Path
@@ -11,11 +11,13 @@ from typing import Any
 
 from boebot import brains
 from boebot.boards import DIRECT, BoardRequest, default_board, is_live
+from boebot.brain.composition import described
 from boebot.brains import LoadedBrain
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError
 from boebot.robot import Equipment
 from boebot.running.board_driver import check_time_to_live
+from boebot.running.brain_parameters import in_force, parameters, unknown
 from boebot.running.driver import Task
 from boebot.timing import realisable
 
@@ -36,6 +38,8 @@ class Member:
         period: seconds from step to step of the brain. None: the brain's PERIOD, or 0.05.
         without: imperfections of the simulated robot that are switched off, such as ("slip", "bounce");
             docs/reference/imperfections.md names them.
+        parameters: of its brain of processes, by name, for this run, such as {"avoid.turn": 0.4}
+            (docs/how-to/several-behaviors.md).
     """
 
     brain: object = "wander"
@@ -44,6 +48,7 @@ class Member:
     seed: int | None = None
     period: float | None = None
     without: Sequence[str] = ()
+    parameters: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +59,7 @@ class Request:
         members: the robots; several share one simulated world.
         arena, on, seconds, seed, realtime, step_timeout, force_timing, pins: as of `boebot.run`.
         record: what happens is recorded.
+        parameters: of brains, by name: of all robots that have it, or, as in "2:avoid.turn", of that one.
     """
 
     members: Sequence[Member]
@@ -66,6 +72,7 @@ class Request:
     force_timing: bool = False
     record: bool = True
     pins: bool = False
+    parameters: Mapping[str, Any] | None = None
 
     @classmethod
     def single(
@@ -101,6 +108,8 @@ class Request:
             raise BoebotError("there is no robot to run; expected at least one Member")
         for member in self.members:
             expect("members", member, "a list of boebot.Member", Member)
+        for values in (self.parameters, *(member.parameters for member in self.members)):
+            expect("parameters", values, 'values by name, as in {"avoid.turn": 0.4}', Mapping, type(None))
 
     def said(self, tasks: Sequence[Task]) -> dict[str, Any]:
         """What a record says of it, as values of JSON, so that the run can be repeated (boebot.running.again); `tasks`:
@@ -139,12 +148,30 @@ class Request:
                 tasks.append(_task(member, self, number))
             except BoebotError as error:
                 raise of_robot(error, number, len(self.members)) from None
+        for number, values in enumerate(self._parameters(tasks), 1):
+            try:
+                tasks[number - 1] = _with_parameters(tasks[number - 1], values)
+            except BoebotError as error:
+                raise of_robot(error, number, len(tasks)) from None
         kind = default_board([task.request.robot for task in tasks]) if self.on is None else self.on
         if self.pins and (is_live(kind) or not any(task.request.robot.has_board for task in tasks)):
             raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
         if len(tasks) == 1:
             return [replace(tasks[0], on=kind)]
         return [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
+
+    def _parameters(self, tasks: Sequence[Task]) -> list[dict[str, Any]]:
+        """What is to be set in each robot's brain."""
+        given = [dict(member.parameters or {}) for member in self.members]
+        for name, value in (self.parameters or {}).items():
+            number, _, own = name.rpartition(":")
+            known = [parameters(task.brain) if number in ("", str(n)) else {} for n, task in enumerate(tasks, 1)]
+            if not any(own in names for names in known):
+                brains_here = dict.fromkeys(repr(task.brain.name) for task in tasks)
+                raise unknown(name, [key for task in tasks for key in parameters(task.brain)], " or ".join(brains_here))
+            for values, names in zip(given, known, strict=True):
+                values.update({own: value} if own in names else {})
+        return given
 
 
 def _brain_file(loaded: LoadedBrain) -> str | None:
@@ -215,6 +242,14 @@ def prepare(
             f"brain {loaded.name!r} needs {' and '.join(missing)}, which robot {description.name!r} does not have"
         )
     return loaded, description, period_s
+
+
+def _with_parameters(task: Task, values: Mapping[str, Any]) -> Task:
+    """The task with these parameters of its brain, which are checked, and with what that is made of then."""
+    with in_force(task.brain, values):
+        now, brain = parameters(task.brain), task.brain.brain
+        made_of = None if brain is None else described(brain)
+        return replace(task, parameters={name: now[name] for name in values}, made_of=made_of)
 
 
 def expect(name: str, value: object, expected: str, *kinds: type) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import time as wall
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from boebot.record.recording import Recording
 from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
 from boebot.running import interrupts
+from boebot.running.brain_parameters import in_force
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
 from boebot.running.interventions import Hands, Onlooker
 from boebot.running.runner import UNENDED, driver_of, keep, result_of, viewed
@@ -101,8 +103,10 @@ def execute_together(
         BoebotError: the run could not begin.
     """
     check_progress(progress)
-    with interrupts.heard():
+    with interrupts.heard(), ExitStack() as stack:
         tasks = request.tasks()
+        for task in tasks:
+            stack.enter_context(in_force(task.brain, task.parameters))
         recording = Recording(len(tasks), recorded=request.record)
         tasks = [replace(task, record=record) for task, record in zip(tasks, recording.records, strict=True)]
         _check_own_brains([task.brain for task in tasks])
