@@ -21,6 +21,11 @@ def printable(text: str) -> str:
     )
 
 
+def as_utf8(name: str) -> str:
+    """A file's name, or a part of it, that any text can have: bytes that are no UTF-8 as escapes such as \\xff."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown name: the known one most like it, whatever the order of its words; or
     nothing."""

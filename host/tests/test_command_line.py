@@ -221,7 +221,25 @@ def test_imperfections_are_switched_off_by_name(capsys: pytest.CaptureFixture[st
     assert len(err.splitlines()) == 1
 
 
-def test_error_in_a_brain_comes_after_the_table(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize(("begin_s", "steps", "detail"), [(0.5, "11", ()), (0.5, "11", ("--verbose",)), (-1.0, "", ())])
+def test_error_in_a_brain_is_said_once_below_the_table_of_what_ran(
+    peer: Peer,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    begin_s: float,
+    steps: str,
+    detail: tuple[str, ...],
+) -> None:
+    brain = tmp_path / "wrong.py"
+    brain.write_text(f"def step(robot):\n    if robot.time > {begin_s}:\n        1 / 0\n")
+    code, out, err = boebot(capsys, "run", str(brain), *detail)
+    assert (code, err) == (1, f"boebot: {brain}, line 3: ZeroDivisionError: division by zero\n")
+    assert (steps in out) and ("early, by an error" in out) == bool(out) == bool(steps) and "Zero" not in out
+
+
+def test_error_in_a_brain_comes_with_the_figures_in_json(
+    peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     brain = tmp_path / "wrong.py"
     brain.write_text("def step(robot):\n    if robot.time > 0.5:\n        robot.fly()\n")
     code, out, err = boebot(capsys, "run", str(brain), "--json")
@@ -514,7 +532,7 @@ def test_error_of_the_brain_comes_before_that_of_its_files(
 
     monkeypatch.setattr("boebot.view.tables.write_summary", full)
     brain = tmp_path / "wrong.py"
-    brain.write_text(f"def step(robot):\n    {line}\n")
+    brain.write_text(f"def step(robot):\n    if robot.time > 0:\n        {line}\n")
     got, out, err = boebot(capsys, "run", str(brain), "--out", str(tmp_path / "out"))
     first, second = err.splitlines()
     assert got == code and "distance" in out
@@ -524,7 +542,7 @@ def test_error_of_the_brain_comes_before_that_of_its_files(
 def test_files_are_written_even_if_nobody_reads_the_table(
     peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def gone(*_: object) -> None:
+    def gone(*_: object, **__: object) -> None:
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr("boebot.cli.ending.print_run", gone)

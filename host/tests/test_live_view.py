@@ -160,6 +160,10 @@ def test_rubbish_floods_and_old_pages_are_let_go_and_the_run_goes_on(endless: Ru
                 stream.send(message)
             assert let_go(stream)
     with endless.stream() as stream:
+        stream.send(json.dumps({"type": "é" * 200}, ensure_ascii=False))  # the sentence has more bytes than letters
+        assert let_go(stream)
+        assert stream.close_reason is not None and "Invalid value 'ééé" in stream.close_reason
+    with endless.stream() as stream:
         page = Page(stream)
         with contextlib.suppress(ConnectionClosed):
             for _ in range(10_000):
@@ -227,6 +231,8 @@ def test_page_begins_a_run_afresh_also_after_its_end() -> None:
     with run.stream() as stream:
         page = Page(stream)
         assert page.until("end")["again"]
+        page.say(type="restart", seed=7, without=["slipp"])
+        assert "no imperfection 'slipp'; did you mean 'slip'?" in page.until("refused")["sentence"]
         page.say(type="restart", seed=7, without=["slip"])
         assert page.until("run")["live"]["seed"] == 7
         assert page.until("end")["tables"][0]["without"] == "slip"
@@ -276,6 +282,13 @@ def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> Non
         assert chunk["printed"].startswith("hello")
         assert [one["name"] for one in chunk["runs"][0]["shown"]["numbers"]] == ["x"]
         assert page.until("chunk", where=lambda chunk: chunk["state"]["time"] > 1.0)["runs"][1]["time"] == ""
+        page.until("end")
+        whole = short.read_text()
+        short.write_text("def main(robot:\n")  # a run that cannot begin: another one may be asked for
+        page.say(type="restart", seed=1, without=[])
+        assert f"{short}, line 1: " in page.until("end")["ended"]
+        short.write_text(whole)
+        page.say(type="restart", seed=1, without=[])
         page.until("end")
     code, out, error = run.end()
     assert code == 0, error

@@ -73,6 +73,25 @@ def test_record_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert reader.attachments == {"begin.json": b"{}", "end.json": b'{"ended": "complete"}'}
 
 
+def test_what_cannot_be_written_for_whatever_reason_is_said_and_what_is_before_it_stays_whole(tmp_path: Path) -> None:
+    path = tmp_path / "record.mcap"
+    with path.open("wb") as file:
+        writer = RecordWriter(file, "it")
+        writer.write(GROUPS[0], 0.0)
+        writer.attach("name\udcff", b"")  # no UTF-8
+        with pytest.raises(RecordError, match=r"^the record cannot be written to it: UnicodeEncodeError: "):
+            writer.finish()
+    assert rows_of(list(RecordReader(io.BytesIO(path.read_bytes()), "it").groups())) == rows_of(GROUPS[:1])
+
+
+def test_record_that_was_deleted_meanwhile_is_an_error(tmp_path: Path) -> None:
+    with (tmp_path / "record.mcap").open("wb") as file:
+        writer = RecordWriter(file, "it")
+        (tmp_path / "record.mcap").unlink()
+        with pytest.raises(RecordError, match="it was deleted"):
+            writer.finish()
+
+
 def test_record_cut_at_every_byte_is_read_up_to_its_last_whole_group(tmp_path: Path) -> None:
     data = write(tmp_path / "record.mcap", GROUPS)
     ends = []  # of each group in the file

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
 import sys
 import threading
 import time
@@ -44,6 +45,7 @@ class PausableThread:
         self.said = PAUSED
         self.error: BaseException | None = None
         self._work = work
+        self._process = os.getpid()
         self._thrown: BaseException | None = None
         self._ending = False  # each pause raises
         self._refused = 0
@@ -123,6 +125,7 @@ class PausableThread:
         self._await_turn()
 
     def _give_back(self, saying: str) -> None:
+        leave_copy(self._process)
         self.said = saying
         self._running = False
         self._paused.put(None)
@@ -143,6 +146,13 @@ class PausableThread:
         except BaseException as error:  # raised where the thread is resumed
             self.error = error
         self._give_back(DONE)
+
+
+def leave_copy(process: int) -> None:
+    """Ends this process if it is not that one (`os.getpid()`, before) but a copy of it, which a brain has forked: only
+    the first one goes on with the run."""
+    if os.getpid() != process:
+        os._exit(0)
 
 
 def throw(thread: int | None, kind: type[BaseException] | None) -> None:

@@ -34,8 +34,9 @@ from typing import Any
 from boebot import arguments
 from boebot.brain import Brain, Process, StateVariable, composition
 from boebot.brain.main_brain import MainBrain
+from boebot.brain.pausable_thread import leave_copy
 from boebot.cognition import Odometry
-from boebot.errors import BrainError, did_you_mean
+from boebot.errors import BrainError, as_utf8, did_you_mean
 from boebot.robot import Robot
 
 FOLDER = Path(__file__).resolve().parent
@@ -106,7 +107,7 @@ def load_brain(source: object) -> LoadedBrain:
     if isinstance(source, str | Path):
         path = _find(source)
         if path.suffix == TOML:
-            return _from_object(composition.load(path), path.stem, path)
+            return _from_object(composition.load(path), as_utf8(path.stem), path)
         return _from_module(_execute(path), path)
     if isinstance(source, ModuleType):
         file = getattr(source, "__file__", None)
@@ -214,13 +215,16 @@ def _execute(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
+        process = os.getpid()
         with _neighbours(path.parent):
             code = compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
             exec(code, module.__dict__)
     except KeyboardInterrupt:
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:  # also SystemExit, and what the brain itself derives from it
         raise BrainError(explain(error, path)) from error
+    finally:
+        leave_copy(process)
     return module
 
 
@@ -237,7 +241,7 @@ def _neighbours(folder: Path) -> Iterator[None]:
 
 
 def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
-    name = path.stem if path is not None else module.__name__
+    name = as_utf8(path.stem) if path is not None else module.__name__
     where = str(path or name)
     period, needs = _period(module, where), _needs(module, where)
     made = _made(module, where, path)

@@ -34,6 +34,7 @@ def main() -> NoReturn:
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
                 signal.signal(number, interrupts.interrupt)
         sys.unraisablehook = _ask_again
+        streams.open_closed()
         streams.accept_all_characters()
         code = _run()
         if not _is_interrupted(code):

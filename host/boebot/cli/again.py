@@ -21,7 +21,7 @@ def run_again(folder: Path, as_json: bool) -> None:
     try:
         run = recorded(folder)
         with (
-            streams.kept_for_the_answer(),
+            streams.kept(for_the_answer=True),
             output.progress_bar(f"{folder} again", run.seconds) as bar,
             output.step_watch(bar) as progress,
         ):

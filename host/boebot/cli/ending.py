@@ -23,11 +23,12 @@ def end(result: RunResult | TogetherResult, out: Path | None, wanted: Detail) ->
     if wanted is not Detail.NOTHING:
         for notice in notices(result):
             output.say(notice)
+    interrupted = isinstance(result.error, KeyboardInterrupt)
     with interrupts.ignored():
         files: list[Path] = []
         unsaved: BoebotError | None = None
         try:
-            print_run(result, wanted)
+            print_run(result, wanted, is_said=result.error is not None and not interrupted)
         finally:
             if out is not None:
                 try:
@@ -35,6 +36,7 @@ def end(result: RunResult | TogetherResult, out: Path | None, wanted: Detail) ->
                 except BoebotError as error:
                     unsaved = error
                     files = [out / RECORD, *error.files] if isinstance(error, IncompleteError) else []
+                files = [path for path in files if path.exists()]  # a brain may have deleted them
         if wanted is Detail.JSON:
             output.print_json(
                 result.table() | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]}
@@ -42,7 +44,6 @@ def end(result: RunResult | TogetherResult, out: Path | None, wanted: Detail) ->
         elif files and wanted is not Detail.NOTHING:
             assert out is not None
             output.line(files_in(out, files))
-    interrupted = isinstance(result.error, KeyboardInterrupt)
     first = InterruptedRunError("interrupted") if interrupted else result.error
     if first is not None:
         if unsaved is not None:

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from boebot.can.log import GapError, as_on_the_wire, is_log, read_log
-from boebot.cli import completion, options, output
+from boebot.cli import completion, options, output, streams
 from boebot.errors import BoebotError
 from boebot.link.fields import reader
 from boebot.link.messages import Telemetry
@@ -65,12 +65,14 @@ def replay(
             if robot is not None:
                 raise BoebotError(f"{run} is a log of CAN frames; expected --node in place of --robot")
             result = read_log(run, kind, node, 1 if seed is None else seed, bus)
-            commands = [as_on_the_wire(command) for command in replayed(result, brain)]
+            with streams.kept():
+                commands = [as_on_the_wire(command) for command in replayed(result, brain)]
         else:
             result = _recorded(run, robot)
             if (kind, node, bus, seed) != (None, None, None, None):
                 raise BoebotError(f"{run} is no log of CAN frames; expected no --kind, --node, --bus or --seed")
-            commands = replayed(result, brain)
+            with streams.kept():
+                commands = replayed(result, brain)
     except BoebotError as error:
         output.say(str(error))
         raise typer.Exit(EXIT_USAGE) from None

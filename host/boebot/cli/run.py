@@ -164,8 +164,6 @@ def run(
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
-            if json:  # it stands alone on standard output, whatever a brain prints
-                shown.enter_context(streams.kept_for_the_answer())
             title = name if on is None else f"{name} on {on}"
             bar = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
             progress = None if view else shown.enter_context(output.step_watch(bar))
@@ -180,6 +178,7 @@ def run(
 
             run_all = execute if count == 1 else execute_together
             page = shown.enter_context(watched.view(view=view, speed=speed, port=view_port))
+            shown.enter_context(streams.kept(for_the_answer=json))
             if page is None:
                 result = run_all(request, progress, folder, put_away)
             else:

@@ -29,6 +29,9 @@ ZERO = (
 HEADER = ("robot", "true distance (m)", "true contacts", "whisker touches", "brain")
 
 
+_EARLY = "early, by an error"
+
+
 class Detail(Enum):
     """How much is printed of a run."""
 
@@ -46,15 +49,18 @@ def detail(*, json: bool, verbose: bool, quiet: bool) -> Detail:
     return chosen[0] if chosen else Detail.FEW
 
 
-def print_run(result: RunResult | TogetherResult, wanted: Detail) -> None:
-    """The table of a run. JSON is for the caller, who knows its files."""
+def print_run(result: RunResult | TogetherResult, wanted: Detail, *, is_said: bool = False) -> None:
+    """The table of a run, if any time has passed in it. JSON is for the caller, who knows its files. `is_said`: the
+    sentence of the error that has ended it follows, and is not printed here."""
     robots = [result] if isinstance(result, RunResult) else result.robots
     several = len(robots) > 1
+    if is_said and not any(robot.run_time for robot in robots):
+        return
     if wanted is Detail.ALL:
         for number, robot in enumerate(robots, 1):
             if several:
                 output.line(f"robot {number}")
-            output.print_table(robot.table())
+            output.print_table(robot.table() | ({"ended": _EARLY} if is_said else {}))
             output.line("by this computer's clock:")
             output.print_table(robot.wall_clock())
     elif wanted is Detail.FEW:
@@ -64,8 +70,8 @@ def print_run(result: RunResult | TogetherResult, wanted: Detail) -> None:
             table = output.empty_table(show_header=False)
             table.add_column(style="dim")
             table.add_column(overflow="fold")
-            for row in five_rows(robots[0]):
-                table.add_row(*row)
+            for name, words in five_rows(robots[0]):
+                table.add_row(name, _EARLY if is_said and name == "ended" else words)
             output.console().print(table)
         for number, robot in enumerate(robots, 1):
             if wrong := not_zero(robot):

@@ -27,6 +27,14 @@ _OTHER = "?"
 _STDOUT, _STDERR = 1, 2  # file descriptors
 
 
+def open_closed() -> None:
+    """Standard streams that are closed lead nowhere from now on: else a file that is opened gets their number, and what
+    is printed."""
+    for name in ("stdin", "stdout", "stderr"):  # in this order: each gets the lowest number that is free, its own
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r+", encoding="utf-8"))  # noqa: SIM115, PTH123
+
+
 def accept_all_characters() -> None:
     """From now on a character that a terminal lacks is printed as the nearest of ASCII, and no error."""
     codecs.register_error("boebot.ascii", _in_ascii)
@@ -48,24 +56,36 @@ def _decomposed(char: str) -> str:
 
 
 @contextlib.contextmanager
-def kept_for_the_answer() -> Iterator[None]:
-    """What a brain prints meanwhile goes to standard error: also what it prints by the system, or by a program that it
-    starts. Standard output is left to the answer that follows."""
-    with contextlib.redirect_stdout(sys.stderr):
-        try:
-            own = os.dup(_STDOUT)
-        except OSError:  # it is closed
-            yield
-            return
-        try:
-            with contextlib.suppress(OSError):
-                os.dup2(_STDERR, _STDOUT)
-            yield
-        finally:
-            with contextlib.suppress(OSError, ValueError, AttributeError):
-                sys.__stdout__.flush()  # type: ignore[union-attr]
-            os.dup2(own, _STDOUT)
-            os.close(own)
+def kept(*, for_the_answer: bool = False) -> Iterator[None]:
+    """Whatever a brain does with them meanwhile, standard streams, folder, rights of new files and the depth of calls
+    are afterwards what they were.
+
+    `for_the_answer`: what it prints meanwhile goes to standard error, also what it prints by the system, or by a
+    program that it starts. Standard output is left to the answer that follows.
+    """
+    depth, rights = sys.getrecursionlimit(), os.umask(0)
+    os.umask(rights)
+    streams, folder = {"stdout": sys.stdout, "stderr": sys.stderr}, os.open(".", os.O_RDONLY)
+    own = [os.dup(number) for number in range(_STDERR + 1)]
+    if for_the_answer:
+        sys.stdout = sys.stderr
+        os.dup2(_STDERR, _STDOUT)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            sys.__stdout__.flush()  # type: ignore[union-attr]
+        for number, copy in enumerate(own):
+            os.dup2(copy, number)
+            os.close(copy)
+        for number, (name, stream) in enumerate(streams.items(), _STDOUT):
+            if stream.closed:
+                stream = open(number, "w", encoding=stream.encoding, errors=stream.errors, closefd=False)  # noqa: SIM115
+            setattr(sys, name, stream)
+        sys.setrecursionlimit(depth)
+        os.umask(rights)
+        os.fchdir(folder)
+        os.close(folder)
 
 
 def finish() -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
 from boebot.boards import imperfections
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, did_you_mean
 from boebot.live import messages
 from boebot.live.audience import Audience
 from boebot.live.chunks import EACH_S, Chunks, OfRun
@@ -92,6 +92,9 @@ class LiveView:
 
     def asked(self, page: int, what: messages.Asked) -> None:
         """See `Stage`. Once the run has ended, only another one can be asked for."""
+        for name in getattr(what, "without", ()):
+            if name not in self._imperfections:
+                raise BoebotError(f"there is no imperfection {name!r}{did_you_mean(name, self._imperfections)}")
         with self._changing:
             if self._controls is not None and (not self._has_ended or isinstance(what, messages.Restart)):
                 self._controls.heard(page, what)

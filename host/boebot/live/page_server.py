@@ -210,7 +210,7 @@ class PageServer:
                 if why_not is None:
                     continue
                 why = why_not
-            await connection.close(1008, why[:120])
+            await connection.close(1008, why.encode()[:120].decode(errors="ignore"))
             return
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
 from boebot.record.result import RunResult, TogetherResult
@@ -54,9 +55,15 @@ def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result
         run: carries out a request, with the view as its onlooker.
         waits: at a run's end as long as a page is open, which may ask for another one.
     """
+    result: Result | None = None
     while True:
-        with Heard(view):
-            result = run(request)
+        try:
+            with Heard(view):
+                result = run(request)
+        except BoebotError as error:
+            if result is None:
+                raise
+            result.error = error  # the run that was asked for last cannot begin; another one may be asked for
         if not isinstance(result.error, RestartedError):
             may_go_on = waits and not isinstance(result.error, KeyboardInterrupt)
             try:

@@ -40,7 +40,7 @@ class RecordWriter:
         self._channels: dict[str, int] = {}
         self._schema = 0
         self._work: queue.Queue[Callable[[], None] | None] = queue.Queue()
-        self._failure: OSError | None = None
+        self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
         self._thread.start()
         self._put(self._start)
@@ -53,7 +53,8 @@ class RecordWriter:
     def check(self) -> None:
         """Raises RecordError where something could not be written."""
         if self._failure is not None:
-            reason = self._failure.strerror or self._failure
+            kind = type(self._failure).__name__
+            reason = getattr(self._failure, "strerror", None) or f"{kind}: {self._failure}"
             raise RecordError(f"the record cannot be written to {self._name}: {reason}")
 
     def write(self, rows: Rows, time_s: float) -> None:
@@ -65,11 +66,13 @@ class RecordWriter:
         self._put(partial(self._attach, name, data, media_type))
 
     def finish(self) -> None:
-        """Ends the record; nothing is written any more. Raises as `check`."""
+        """Ends the record; nothing is written any more. Raises as `check`, and where the file has no name any more."""
         if self._thread.is_alive():
             self._work.put(None)
             self._thread.join()
         self.check()
+        if self._sync and os.fstat(self._file).st_nlink == 0:
+            raise RecordError(f"the record {self._name} was deleted while the run went on")
 
     def _put(self, work: Callable[[], None]) -> None:
         self.check()
@@ -86,15 +89,16 @@ class RecordWriter:
         """What cannot be written whole is not written at all, and nothing after it."""
         if self._failure is not None:
             return
-        work()
-        self._writer.flush()
-        whole, data = self._tail.take()
+        whole = self._tail.taken
         try:
+            work()
+            self._writer.flush()
+            data = self._tail.take()
             while data:
                 data = data[os.write(self._file, data) :]
             if self._sync:
                 os.fsync(self._file)
-        except OSError as error:
+        except Exception as error:  # of any kind: the run is to end by it, not this thread alone
             self._failure = error
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, whole)
@@ -114,11 +118,15 @@ class RecordWriter:
 
 
 class _Tail:
-    """The end of the file, before it is written."""
+    """The end of the file, before it is written.
+
+    Attributes:
+        taken: how much was taken so far (B).
+    """
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
-        self._size = self._written = 0
+        self._size = self.taken = 0
 
     def write(self, data: bytes) -> None:
         """At the end."""
@@ -132,12 +140,12 @@ class _Tail:
     def flush(self) -> None:
         """It is written by whoever takes it."""
 
-    def take(self) -> tuple[int, memoryview]:
-        """How much was taken before (B), and what is new."""
-        before, self._written = self._written, self._size
+    def take(self) -> memoryview:
+        """What is new."""
+        self.taken = self._size
         data = memoryview(b"".join(self._parts))
         self._parts.clear()
-        return before, data
+        return data
 
 
 class RecordReader:

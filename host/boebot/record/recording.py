@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, as_utf8
 from boebot.record.keepers import Keeper, OnDisk, Shared, Temporary
 from boebot.record.record import Record, Unrecorded
 from boebot.record.record_file import RecordError
@@ -61,7 +61,7 @@ class Recording:
         if folder is not None:
             keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD), waits=waits)
             for name, data in sources.items():
-                self._disk.writer.attach(name, data)
+                self._disk.writer.attach(as_utf8(name), data)
             self._disk.writer.attach(BEGIN, say(results, requested), JSON)
         for number, record in enumerate(self.records, 1):
             record.keep_in(keeper if len(self.records) == 1 else Shared(keeper, number))

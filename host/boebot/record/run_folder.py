@@ -48,9 +48,9 @@ class RunFolder:
         Raises:
             BoebotError: it cannot be written to, another run writes there, or it holds other things than a run.
         """
-        self.path = path
         self._lock = -1
         try:
+            self.path = path.absolute()  # a brain may change to another folder
             path.mkdir(parents=True, exist_ok=True)
             if not os.access(path, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))

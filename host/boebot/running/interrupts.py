@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import sys
 import threading
@@ -57,6 +58,7 @@ class Wishes:
 
 wishes = Wishes()
 _channel: int | None = None  # where the last resort listens
+_listens: int | None = None  # the other end; once nothing more can come there, the run has ended
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
@@ -150,7 +152,7 @@ def _say(word: bytes) -> None:
 def _last_resort(numbers: list[int]) -> Iterator[None]:
     """Has a thread of C read from a pipe, into which Python writes each signal's number even if none of its lines can
     run."""
-    global _channel
+    global _channel, _listens
     try:
         from boebot.running._last_resort import ffi, lib
     except ImportError:  # as on Windows
@@ -172,12 +174,12 @@ def _last_resort(numbers: list[int]) -> Iterator[None]:
         target=lambda: lib.last_resort_watch(listens, mask, *times, sentence), name="last resort", daemon=True
     )
     watcher.start()
-    _channel = speaks
+    _channel, _listens = speaks, listens
     try:
         yield
     finally:
         _say(_END)
-        _channel = None
+        _channel = _listens = None
         signal.set_wakeup_fd(-1)
         watcher.join()
         os.close(listens)
@@ -185,12 +187,24 @@ def _last_resort(numbers: list[int]) -> Iterator[None]:
 
 
 def _in_child() -> None:
-    """A forked process has no such thread, and its signals are not its parent's."""
+    """A process that a brain forks has no such thread, its signals are not its parent's, and it ends with the run."""
     global _channel
+    if _listens is not None:
+        threading.Thread(target=_end_with_run, args=(_listens,), daemon=True).start()
     if _channel is not None:
+        os.close(_channel)
         _channel = None
         with contextlib.suppress(ValueError):
             signal.set_wakeup_fd(-1)
+            for number in _raising():
+                signal.signal(number, signal.SIG_DFL)
+
+
+def _end_with_run(listens: int) -> None:
+    run = select.poll()
+    run.register(listens, 0)  # nothing is read there: only the end is waited for
+    run.poll()
+    os._exit(0)
 
 
 if hasattr(os, "register_at_fork"):

@@ -184,15 +184,17 @@ def keep(work: Callable[[RunFolder | None, Callable[[Result], None]], Result], o
         BoebotError: the folder cannot be written to; else whatever ended the run before its time, once that is written.
     """
 
+    expect("out", out, "a folder or None", str, Path, type(None))
+    place = None if out is None else Path(out).absolute()  # a brain may change to another folder
+
     def put_away(unended: Result) -> None:
         print(f"boebot: interrupted; {UNENDED}", file=sys.stderr)
-        if out is not None:
-            unended.save(out)
+        if place is not None:
+            unended.save(place)
 
-    if out is None:
+    if place is None:
         return _whole(work(None, put_away))
-    expect("out", out, "a folder or None", str, Path)
-    with RunFolder(Path(out)) as folder:
+    with RunFolder(place) as folder:
         result = work(folder, put_away)
         try:
             with interrupts.ignored():

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from boebot import brains
+from boebot.errors import as_utf8
 from boebot.running.driver import Task
 from boebot.running.tasks import Request
 
@@ -42,19 +43,19 @@ def brain_file(attached: Mapping[str, bytes], path: Path, number: int, count: in
     """
     prefix = f"{_prefix(number, count)}brain/"
     files = {name.removeprefix(prefix): data for name, data in attached.items() if name.startswith(prefix)}
-    if path.name not in files or all(_is_same(path.parent / name, data) for name, data in files.items()):
+    if as_utf8(path.name) not in files or all(_is_same(path.parent / name, data) for name, data in files.items()):
         return path
     copies = folder / f"robot-{number}"
     for name, data in files.items():
         copy = copies / name
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(data)
-    return copies / path.name
+    return copies / as_utf8(path.name)
 
 
 def arena_file(attached: Mapping[str, bytes], path: Path, folder: Path) -> Path:
     """The file of an arena as it was, as of `brain_file`."""
-    data = attached.get(f"arena/{path.name}")
+    data = attached.get(as_utf8(f"arena/{path.name}"))
     if data is None or _is_same(path, data):
         return path
     copy = folder / path.name

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import signal
 import sys
 import threading
@@ -24,7 +25,7 @@ from types import FrameType, TracebackType
 from typing import Any, NamedTuple
 
 from boebot import brains
-from boebot.brain.pausable_thread import throw
+from boebot.brain.pausable_thread import leave_copy, throw
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
 from boebot.robot import Command, Robot
@@ -159,6 +160,7 @@ class StepWatch:
         self._wishes = 0  # to end, before the step
         self._unheard_s = math.inf  # since when there is one that the main thread has not heard of
         self._thread = 0  # which the steps run in
+        self._process = os.getpid()
         self._count = 0  # of steps that have begun
         self._inside = False
         self._thrown = False
@@ -205,6 +207,7 @@ class StepWatch:
             self._inside = True
             answer = step(robot)
         finally:
+            leave_copy(self._process)
             self._leave()
             if self._wakes and wishes.count != self._wishes:  # also where the brain has caught it
                 raise KeyboardInterrupt

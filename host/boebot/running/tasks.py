@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
@@ -24,8 +25,19 @@ from boebot.timing import realisable
 DEFAULT_PERIOD = 0.05  # s
 
 
+class _NamesFiles:
+    """Its paths of files still name them in another folder, which a brain may change to."""
+
+    def __post_init__(self) -> None:
+        for name in vars(self).keys() & {"arena", "brain", "robot"}:
+            value = getattr(self, name)
+            is_name = not isinstance(value, str | Path) or not Path(value).suffix
+            if not is_name and os.path.isfile(value):  # noqa: PTH113 (no error where it is too long)
+                object.__setattr__(self, name, Path(value).absolute())
+
+
 @dataclass(frozen=True, kw_only=True)
-class Member:
+class Member(_NamesFiles):
     """One robot of a run.
 
     Attributes:
@@ -52,7 +64,7 @@ class Member:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class Request(_NamesFiles):
     """What to run: one value, from the command line to the last step.
 
     Attributes:
