@@ -24,6 +24,7 @@ from boebot.can.transport import open_can
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
+from boebot.link.frame import encode
 from boebot.link.link import Link
 from boebot.robot import Robot
 from boebot.running.runner import execute
@@ -184,6 +185,59 @@ def test_others_with_our_identifiers_stop_the_motors(frame: CanFrame, sentence: 
             assert str(board.ended()) == sentence.format(board.bus.name)
         stopped = board.telemetry_afterwards()
         assert stopped.pulse_left == 0 and stopped.latch != messages.Latch.NONE
+
+
+def test_host_that_another_program_sends_beside_stops_the_motors_and_ends_its_run() -> None:
+    """With the host's own session and tick, so that the board obeys."""
+    with bridged() as board, joined(board) as somebody:
+        sent = []
+
+        def beside(robot: Robot) -> None:
+            robot.drive(0.5, 0.5)
+            while not sent and robot.time > 0.2 and (message := somebody.recv(0.0)) is not None:
+                if message.arbitration_id == 0x120:
+                    message.data = (
+                        bytes([0x78, 0xEC, 0x78, 0xEC]) + message.data[4:7] + bytes([message.data[7] + 1 & 0xFF])
+                    )
+                    somebody.send(message)
+                    sent.append(message)
+
+        result = execute(Request.single(beside, on=board.url, seconds=5))
+        assert str(result.error) == (
+            f"another program sends to the board at {board.url}, too (frame 0x120); expected each board to have one "
+            "host: the motors were stopped"
+        )
+        assert result.run_time < 1.0 and board.error is None
+        with contextlib.closing(open_can(board.url)) as transport:
+            link = Link(transport)
+            link.open()
+            stopped = after(link, 0.05)
+            assert stopped.pulse_left == 0 and stopped.latch == messages.Latch.STOP_COMMAND
+
+
+def test_host_that_asked_for_a_session_in_vain_harms_no_other_one() -> None:
+    """It sees all that the other one sends, and neither of them stops the motors."""
+    with (
+        bridged() as board,
+        contextlib.closing(open_can(board.url)) as transport,
+        contextlib.closing(open_can(board.url)) as in_vain,
+    ):
+        link = Link(transport)
+        link.open()
+        in_vain.write(b"\0" + encode(messages.Open.ID, 0, messages.Open(messages.PROTOCOL_VERSION, 1, 6).pack()))
+        link.arm()
+        seen = drive(link, 0.2)
+        while in_vain.read(0.0):
+            pass
+        seen += drive(link, 0.1)
+        assert seen[-1].latch == messages.Latch.NONE and seen[-1].pulse_left > 24_000 and board.error is None
+
+
+def test_what_an_interface_brings_back_is_not_of_another_program() -> None:
+    name = "virtual:mirror?receive_own_messages=true"
+    with bridged(PythonCanBus(BusName.parse(name))) as board:
+        result = boebot.run(straight, on=f"can:{name}", seconds=0.3)
+        assert board.error is None and result.resets == 0 and result.steps == 6
 
 
 def test_board_with_a_number_that_is_taken_does_not_join() -> None:

@@ -11,9 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from boebot.can.bus import Bus
-from boebot.can.frames import NODE_MASK, PARTS, CanFrame, ForeignFrameError
+from boebot.can.frames import CanFrame, ForeignFrameError
 from boebot.can.iso_tp import LongMessages
-from boebot.can.layout import ISO_TP_TO_HOST, NODE_SHIFT
 from boebot.can.translator import BoardEnd
 from boebot.errors import BoardError
 from boebot.link.transport import Transport
@@ -123,7 +122,7 @@ class Bridge:
     def _take(self, frame: CanFrame) -> None:
         """A frame came over the bus."""
         if not self._end.assembler.takes(frame.identifier):
-            if self._is_own(frame.identifier):
+            if self._end.assembler.sends(frame.identifier):
                 raise BoardError(
                     f"another board on {self.bus.name} sends as node {self.node}, too (frame {frame.identifier:#05x}); "
                     "expected each board to have a node of its own: the motors were stopped"
@@ -143,12 +142,6 @@ class Bridge:
             ) from None
         if data:
             self.transport.write(data)
-
-    def _is_own(self, identifier: int) -> bool:
-        """Whether only this board sends frames with that identifier."""
-        plain = identifier & ~NODE_MASK
-        mine = bool(identifier & 1) and identifier >> NODE_SHIFT & 7 == self.node
-        return mine and (plain in PARTS or plain == ISO_TP_TO_HOST)
 
     def _write_long(self, datagrams: list[bytes]) -> None:
         for datagram in datagrams:

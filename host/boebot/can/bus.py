@@ -31,7 +31,7 @@ _AT_ONCE = 1000  # most frames of one look: a flood must not keep the board unhe
 BEHIND_S = 1.0
 _LEAVE_S = 0.2  # that the other side has to close a connection
 _READ_BYTES = 65536
-_ECHOES = 4096  # most own frames to be recognised when udp_multicast brings them back
+_ECHOES = 4096  # newest own frames that are known again where an interface brings them back
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "udp_multicast": {"hop_limit": 0},  # they stay on this computer
     "socketcand": {"host": "localhost", "tcp_tune": True},
@@ -128,7 +128,7 @@ class PythonCanBus:
         self.errors = 0
         self._can = import_extra("can")
         logging.getLogger("can").addHandler(logging.NullHandler())  # else its remarks go to standard error
-        self._echoes: Counter[CanFrame] | None = Counter() if name.interface == "udp_multicast" else None
+        self._echoes: Counter[CanFrame] = Counter()  # some interfaces bring them back by themselves, some if asked to
         settings = _DEFAULTS.get(name.interface, {}) | name.settings
         if name.interface == "socketcand":
             _check_listener(name, settings)
@@ -157,8 +157,9 @@ class PythonCanBus:
                 self._bus.send(message)
             except (self._can.CanError, OSError) as error:
                 raise BoardError(f"the CAN bus {self.name} takes no frames: {_reason(error)}") from None
-            if self._echoes is not None and len(self._echoes) < _ECHOES:
-                self._echoes[frame] += 1
+            self._echoes[frame] += 1
+            if len(self._echoes) > _ECHOES:
+                del self._echoes[next(iter(self._echoes))]
 
     def receive(self, wait_s: float) -> list[CanFrame]:
         """See `Bus`."""
@@ -202,7 +203,7 @@ class PythonCanBus:
         if message.is_extended_id or message.is_remote_frame or message.is_fd:
             return None
         frame = CanFrame(message.arbitration_id, bytes(message.data))
-        if self._echoes is not None and self._echoes[frame] > 0:
+        if self._echoes[frame] > 0:
             self._echoes[frame] -= 1
             if not self._echoes[frame]:
                 del self._echoes[frame]

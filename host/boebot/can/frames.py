@@ -115,7 +115,8 @@ def _parts() -> dict[int, _Part]:
 
 PARTS = _parts()
 SET_POINTS = frozenset(identifier for identifier, part in PARTS.items() if part.layout.is_set_point)
-(_STOP,) = LAYOUTS[messages.Stop.ID].identifiers  # the one message that may go to all nodes
+(STOP,) = LAYOUTS[messages.Stop.ID].identifiers  # the one message that may go to all nodes
+_ASKING = LAYOUTS[messages.Open.ID].identifiers + LAYOUTS[messages.Describe.ID].identifiers
 
 
 @dataclass
@@ -136,9 +137,17 @@ class Assembler:
     def takes(self, identifier: int) -> bool:
         """Whether a frame of that identifier is for this end."""
         node, own = identifier >> NODE_SHIFT & 7, identifier & ~NODE_MASK
-        if identifier & 1 == self.to_board or node not in self.nodes or (node == ALL_NODES and own != _STOP):
+        if identifier & 1 == self.to_board or node not in self.nodes or (node == ALL_NODES and own != STOP):
             return False
         return own in PARTS or own in (ISO_TP_TO_BOARD, ISO_TP_TO_HOST)
+
+    def sends(self, identifier: int) -> bool:
+        """Whether frames of that identifier come from this end alone: those of its node in the other direction, but
+        for the handshake's. Several hosts may ask for a session at a time."""
+        node, own = identifier >> NODE_SHIFT & 7, identifier & ~NODE_MASK
+        if identifier & 1 != self.to_board or node == ALL_NODES or node not in self.nodes:
+            return False
+        return (own in PARTS and own not in _ASKING) or own == ISO_TP_TO_HOST
 
     def add(self, frame: CanFrame) -> CanMessage | None:
         """Takes a frame; the message that it completes, if any.

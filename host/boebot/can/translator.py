@@ -137,11 +137,16 @@ class BoardEnd(_End):
 
 
 class HostEnd(_End):
-    """The end at the host's link: its bytes onto the bus, the board's frames into bytes."""
+    """The end at the host's link: its bytes onto the bus, the board's frames into bytes.
+
+    Attributes:
+        is_open: the board has spoken in this host's session, which has not been closed.
+    """
 
     def __init__(self, node: int, send_long: SendLong) -> None:
         """`node`: the board's number, 1 to 7."""
         super().__init__(node, send_long, to_board=False)
+        self.is_open = False
         self._lost = 0
 
     def from_link(self, data: bytes) -> list[CanFrame]:
@@ -160,9 +165,12 @@ class HostEnd(_End):
         self._lost = lost
         if message is None or not self._is_of_session(message.id, message.session):
             return b""
+        self.is_open |= message.session is not None
         return self._bytes(message.id, message.payload)
 
     def _follow(self, message_id: int, payload: bytes) -> None:
+        if message_id in (messages.Open.ID, messages.Close.ID):
+            self.is_open = False
         if message_id == messages.Open.ID:
             opening = messages.Open.unpack(payload)
             self._use_session(opening.board_nonce ^ opening.host_nonce)

@@ -6,7 +6,7 @@ import re
 import time
 
 from boebot.can.bus import Bus, BusName, PythonCanBus
-from boebot.can.frames import NODES, CanFrame, ForeignFrameError
+from boebot.can.frames import NODE_MASK, NODES, STOP, CanFrame, ForeignFrameError
 from boebot.can.iso_tp import LongMessages
 from boebot.can.load import BusLoad
 from boebot.can.translator import HostEnd
@@ -55,6 +55,7 @@ class CanTransport:
         self._load = load or BusLoad()
         self._long = LongMessages(node, lambda frame: self._send([frame]), at_board=False)
         self._end = HostEnd(node, self._long.send)
+        self._is_shared = False
         self._closed = False
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
@@ -102,7 +103,14 @@ class CanTransport:
         """The bytes that a frame completes."""
         self._load.add(self.now(), frame)
         if not self._end.assembler.takes(frame.identifier):
-            return b""
+            if self._is_shared or not (self._end.is_open and self._end.assembler.sends(frame.identifier)):
+                return b""
+            self._is_shared = True  # said once: what ends the run wants its answers
+            self._send([CanFrame(STOP | frame.identifier & NODE_MASK, bytes(1))])
+            raise BoardError(
+                f"another program sends to the board at {self.name}, too (frame {frame.identifier:#05x}); expected "
+                "each board to have one host: the motors were stopped"
+            )
         if frame.identifier == self._long.listens_to:
             return b"".join(self._end.long_bytes(datagram) for datagram in self._long.receive(frame))
         try:
