@@ -77,11 +77,9 @@ def add_vehicle(sim: Sim, request: BoardRequest) -> SimRobot:
     Raises:
         RobotError: its description is none of such a robot.
         ArenaError: its place is not free.
-        BoardError: an imperfection is none, is out of its range, or changes nothing of this robot.
+        BoardError: no such imperfection.
     """
-    return sim.add(
-        None, request.robot, pose=request.start_pose, without=request.without, imperfections=request.imperfections
-    )
+    return sim.add(None, request.robot, pose=request.start_pose, without=request.without)
 
 
 class DirectKind:

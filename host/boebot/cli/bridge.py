@@ -43,7 +43,6 @@ def bridge(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
-    imperfection: options.Imperfections = None,
     json: options.Json = False,
 ) -> None:
     """Put a board on a CAN bus: every message both ways, until Ctrl-C."""
@@ -58,13 +57,7 @@ def bridge(
     name = None if can is None else BusName.parse(can)
     description = load_robot(robot)
     request = BoardRequest(
-        robot=description,
-        arena=arena,
-        seed=seed,
-        realtime=True,
-        record=False,
-        without=options.names(without),
-        imperfections=options.magnitudes(imperfection),
+        robot=description, arena=arena, seed=seed, realtime=True, record=False, without=options.names(without)
     )
     with contextlib.ExitStack() as stack:
         session = open_board(board, request)

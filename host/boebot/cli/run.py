@@ -82,7 +82,6 @@ def run(
     seed: options.Seed = 1,
     period: options.Period = None,
     without: options.Without = None,
-<<<<<<< HEAD
     parameters: Annotated[
         list[str] | None,
         typer.Option(
@@ -92,9 +91,6 @@ def run(
             "several robots all that have it, or one: 2:avoid.turn=0.4.",
         ),
     ] = None,
-=======
-    imperfection: options.Imperfections = None,
->>>>>>> 309dd509 (Imperfections by name and magnitude: one table; a run, an option and a robot's file give them; what changes nothing is refused or told)
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
     step_timeout: Annotated[
         float | None,
@@ -141,7 +137,7 @@ def run(
         return
     if not brain:
         raise typer.BadParameter("expected a BRAIN, or --again DIR", context)
-    ideal, imperfect = options.names(without), options.magnitudes(imperfection)
+    ideal = options.names(without)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     request = Request(
@@ -152,7 +148,6 @@ def run(
                 pose=poses[index] if index < len(poses) else None,
                 period=period,
                 without=ideal,
-                imperfections=imperfect,
             )
             for index in range(count)
         ],

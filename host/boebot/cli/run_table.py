@@ -82,6 +82,46 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
     """Name and words of each."""
     table = result.table()
     where = f" in {table['arena']}" if table["arena"] else ""
-    changed = f", without {table['without']}" if table["without"] else ""
-    changed += f", with {table['imperfections']}" if table["imperfections"] else ""
+    without = f", without {table['without']}" if table["without"] else ""
     faster = f", {result.real_time_factor:.3g} times real time" if result.real_time_factor else ""
+    way = result.way_in_words()
+    if (error_m := result.odometry_error) is not None:
+        way.append(f"odometry off by {error_m:.2f} m at the end")
+    return [
+        ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{without}"),
+        ("time", f"{result.run_time:g} s{faster}"),
+        ("way", ", ".join(way)),
+        ("brain", _brain(result, table)),
+        ("ended", table["ended"] + _touched(result)),
+    ]
+
+
+def _touched(result: RunResult) -> str:
+    """That somebody interfered with the run, in words."""
+    return f", touched {figures.counted(result.touched, 'time', 'times')} by hand" if result.touched else ""
+
+
+def not_zero(result: RunResult) -> list[str]:
+    """What should be zero and is not, in words."""
+    table = result.table() | result.wall_clock()
+    wrong = {name: table[name] for name in ZERO if table[name]}
+    return [f"{name} {value}" for name, value, _ in figures.rows(wrong)]
+
+
+def _brain(result: RunResult, table: dict[str, Any]) -> str:
+    parts = [f"{figures.counted(result.steps, 'step', 'steps')}, {result.period:g} s apart"]
+    record = result.overview.brain
+    if record is not None:
+        shares = record.shares(result.run_time)
+        parts.append(figures.counted(record.behavior_switches, "switch", "switches"))
+        parts.append(", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share > 0))
+    return "; ".join(parts)
+
+
+def _row(number: int, robot: RunResult) -> tuple[str, ...]:
+    """Of one of several, under `HEADER`."""
+    table = robot.table()
+    ended = "complete" if robot.error is None else "ended early"
+    values = (table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches"))
+    cells = ("-" if value is None else figures.text(value) for value in values)
+    return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}"

@@ -14,13 +14,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
-<<<<<<< HEAD
 from boebot.boards import imperfections
 from boebot.errors import BoebotError, did_you_mean
-=======
-from boebot.errors import BoebotError
-from boebot.imperfections import switches
->>>>>>> 309dd509 (Imperfections by name and magnitude: one table; a run, an option and a robot's file give them; what changes nothing is refused or told)
 from boebot.live import messages
 from boebot.live.audience import Audience
 from boebot.live.chunks import EACH_S, Chunks, OfRun
@@ -63,6 +58,7 @@ class LiveView:
             BoebotError: the port is taken.
         """
         self._show = show
+        self._imperfections = imperfections()  # now: that takes longer than many steps of a run
         self._speed = speed
         self._pace = Pace(speed)
         self._controls: Controls | None = None
@@ -212,7 +208,9 @@ class LiveView:
             "can": sorted(self._controls.can),
             "seed": request.seed,
             "seconds": None if self._robots[0].task.seconds == float("inf") else self._robots[0].task.seconds,
-            "imperfections": [{"name": name, "text": text, "off": name in off} for name, text in switches().items()],
+            "imperfections": [
+                {"name": name, "text": text, "off": name in off} for name, text in self._imperfections.items()
+            ],
             "robots": [{"parameters": _sliders(robot)} for robot in self._robots],
         }
 

@@ -9,11 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, TypeVar
 
-<<<<<<< HEAD
 from boebot.errors import BoebotError
-=======
-from boebot.imperfections import switched_off
->>>>>>> 309dd509 (Imperfections by name and magnitude: one table; a run, an option and a robot's file give them; what changes nothing is refused or told)
 from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
 from boebot.record.result import RunResult, TogetherResult
@@ -95,13 +91,5 @@ def _ended(view: LiveView, result: RunResult | TogetherResult, *, waits: bool) -
 
 
 def _afresh(request: Request, wanted: messages.Restart) -> Request:
-    off = switched_off(wanted.without)
-    members = [
-        replace(
-            member,
-            without=tuple(wanted.without),
-            imperfections={name: value for name, value in (member.imperfections or {}).items() if name not in off},
-        )
-        for member in request.members
-    ]
+    members = [replace(member, without=tuple(wanted.without)) for member in request.members]
     return replace(request, seed=wanted.seed, members=members)

@@ -145,11 +145,7 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
             seed=said["seed"],
             period=said["period"],
             without=said["without"],
-<<<<<<< HEAD
             parameters=result.parameters,
-=======
-            imperfections=said["imperfections"],
->>>>>>> 309dd509 (Imperfections by name and magnitude: one table; a run, an option and a robot's file give them; what changes nothing is refused or told)
         )
         for result, said in zip(run.results, asked["members"], strict=True)
     ]

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-<<<<<<< HEAD
 import os
-=======
->>>>>>> 309dd509 (Imperfections by name and magnitude: one table; a run, an option and a robot's file give them; what changes nothing is refused or told)
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
@@ -19,7 +16,6 @@ from boebot.brain.composition import described
 from boebot.brains import LoadedBrain
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError
-from boebot.imperfections import checked
 from boebot.robot import Equipment
 from boebot.running.board_driver import check_time_to_live
 from boebot.running.brain_parameters import in_force, parameters, unknown
@@ -54,12 +50,8 @@ class Member(_NamesFiles):
         period: seconds from step to step of the brain. None: the brain's PERIOD, or 0.05.
         without: imperfections of the simulated robot that are switched off, such as ("slip", "bounce");
             docs/reference/imperfections.md names them.
-<<<<<<< HEAD
         parameters: of its brain of processes, by name, for this run, such as {"avoid.turn": 0.4}
             (docs/how-to/several-behaviors.md).
-=======
-        imperfections: magnitudes of others by name, such as {"servo_lag_s": 0.08}; that page has names and units.
->>>>>>> 309dd509 (Imperfections by name and magnitude: one table; a run, an option and a robot's file give them; what changes nothing is refused or told)
     """
 
     brain: object = "wander"
@@ -68,11 +60,7 @@ class Member(_NamesFiles):
     seed: int | None = None
     period: float | None = None
     without: Sequence[str] = ()
-<<<<<<< HEAD
     parameters: Mapping[str, Any] | None = None
-=======
-    imperfections: Mapping[str, float] | None = None
->>>>>>> 309dd509 (Imperfections by name and magnitude: one table; a run, an option and a robot's file give them; what changes nothing is refused or told)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,12 +95,10 @@ class Request(_NamesFiles):
         pose: tuple[float, float, float] | None = None,
         period: float | None = None,
         without: Sequence[str] = (),
-        imperfections: Mapping[str, float] | None = None,
         **others: Any,
     ) -> Request:
         """Of one robot: what a `Member` has, and `others` of the attributes above."""
-        one = Member(brain=brain, robot=robot, pose=pose, period=period, without=without, imperfections=imperfections)
-        return cls(members=[one], **others)
+        return cls(members=[Member(brain=brain, robot=robot, pose=pose, period=period, without=without)], **others)
 
     def check(self) -> None:
         """Raises BoebotError where one of them is wrong."""
@@ -156,7 +142,6 @@ class Request(_NamesFiles):
                     "seed": task.brain_seed,
                     "period": task.period_s,
                     "without": list(task.request.without),
-                    "imperfections": dict(task.request.imperfections),
                 }
                 for task in tasks
             ],
@@ -235,7 +220,6 @@ def _task(member: Member, request: Request, number: int) -> Task:
         pins=request.pins,
         start_pose=_pose(member.pose),
         without=_names("without", member.without),
-        imperfections={} if member.imperfections is None else checked(member.imperfections),
     )
     return Task(
         brain=loaded,
