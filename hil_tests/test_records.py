@@ -104,7 +104,7 @@ def test_what_is_no_record_is_one_sentence(tmp_path: Path, name: str, content: b
     if content is not None:
         (tmp_path / name).write_bytes(content)
     done = boebot("report", str(tmp_path / name))
-    assert done.returncode == 1 and sentence in done.stderr and len(done.stderr.splitlines()) == 1
+    assert done.returncode == 2 and sentence in done.stderr and len(done.stderr.splitlines()) == 1
 
 
 def test_record_goes_on_while_a_step_lasts(tmp_path: Path) -> None:

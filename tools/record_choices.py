@@ -184,8 +184,8 @@ def points(result: RunResult, folder: Path) -> list[str]:
 
 
 def groups_of(file: IO[bytes]) -> Iterator[Group]:
-    for group in RecordReader(file, "it").groups():
-        yield {name: unpacked(packed(block)) for name, block in group.items()}
+    for kept in RecordReader(file, "it").groups():
+        yield dict(unpacked(packed(block, name)) for name, block in kept.group.items())
 
 
 def printed() -> str:

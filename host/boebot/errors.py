@@ -39,7 +39,20 @@ def _words(name: str) -> str:
 
 
 class BoebotError(Exception):
-    """Something the user can mend. Its text is one sentence: the error, where it is, and what was expected."""
+    """Something the user can mend. Its text is one sentence: the error, where it is, and what was expected.
+
+    Attributes:
+        exit_code: of a command that ends by it.
+        brief: how a run ended that ended by it, in two words.
+    """
+
+    exit_code = 1
+    brief = "ended early"
+
+
+def brief(error: BaseException | None) -> list[str]:
+    """How a run ended that ended by that error, in two words; nothing where it ended as it should."""
+    return [] if error is None else [getattr(error, "brief", BoebotError.brief)]
 
 
 class InterruptedRunError(BoebotError):

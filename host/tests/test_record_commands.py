@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,9 @@ from PIL import Image
 
 import boebot as library
 from boebot import resources
-from boebot.record.reading import attachments_of
+from boebot.record.reading import attachments_of, read_run
+from boebot.record.record_file import RecordReader, RecordWriter
+from boebot.record.result import RunResult
 from boebot.running.again import again, recorded
 from command import boebot
 
@@ -143,8 +146,18 @@ def test_repetition_uses_the_recorded_files(
     Path("one/one_speed.py").write_text("SPEED = 0.3\n")
     Path("two/brain.py").write_text("# another one\n" + brains["two/brain.py"])
     sys.modules.pop("one_speed")  # as in a new process
+    ran = Path("ran")
+    Path("two/brain.py").write_text(f"open({str(ran)!r}, 'w')\n" + brains["two/brain.py"])
     code, out, err = boebot(capsys, "run", "--again", "run")
-    assert (code, err) == (0, "") and "bit-equal to run: " in out
+    sentence = (
+        "the record brings a brain that is not the file on this computer, brain.py, one_speed.py, brain.py; it could"
+    )
+    assert (code, out) == (2, "") and sentence in err and "expected --trust" in err
+    with pytest.raises(library.BoebotError, match=r"expected --trust \(trust=True\)"):
+        again(recorded(Path("run")))
+    assert not ran.exists()
+    code, out, err = boebot(capsys, "run", "--again", "run", "--trust")
+    assert (code, err) == (0, "") and "bit-equal to run: " in out and not ran.exists()
     sys.modules.pop("one_speed")
 
 
@@ -229,3 +242,210 @@ def test_brain_is_replayed_on_what_was_sensed(
     assert (code, err) == (0, "") and "all 40 commands are the same" in out
     code, out, _ = boebot(capsys, "replay", "run", "--brain", "other.py")
     assert code == 1 and re.match(r"step 0 \((tick \d+, )?0\.00 s\) differs: ", out)
+
+
+# ---- records that are damaged, or a stranger's -----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of two seconds in eight groups, as a run of some seconds of the wall clock has; by a file."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "mine.py").write_text("def step(robot):\n    robot.drive(0.2, 0.2 * robot.random.random())\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("boebot.record.record.STEPS_AT_MOST", 5)
+        library.run(folder / "mine.py", seconds=2, out=folder / "run")
+    return folder / "run"
+
+
+def copied(folder: Path, to: Path, change: Callable[[bytearray], object]) -> Path:
+    """A run's record, changed."""
+    data = bytearray((folder / "record.mcap").read_bytes())
+    change(data)
+    to.mkdir()
+    (to / "record.mcap").write_bytes(data)
+    return to
+
+
+def chunk(data: bytearray, number: int) -> int:
+    """Where the data of that chunk of a record begins."""
+    return [match.end() for match in re.finditer(rb"\x04\0\0\0zstd", data)][number]
+
+
+def bit(data: bytearray) -> None:
+    data[chunk(data, 4) + 100] ^= 1
+
+
+def zeros(data: bytearray) -> None:
+    begin = chunk(data, 4)
+    data[begin : begin + 512] = bytes(512)
+
+
+@pytest.mark.parametrize("change", [bit, zeros])
+def test_damaged_record_is_not_silent_anywhere(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    many: Path,
+    change: Callable[[bytearray], object],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    copied(many, tmp_path / "run", change)
+    lost = "the run from 1.00 s to 1.25 s is lost; figures are of what is left"
+    code, out, err = boebot(capsys, "report", "run", "--mend", "--csv", "--json")
+    said = json.loads(out)
+    assert code == 1 and lost in err and lost in said["ended"]
+    assert (said["steps"], said["ticks"]) == (40, 201 - 25)
+    assert json.loads(Path("run/summary.json").read_text())["ended"] == said["ended"]
+    assert lost in Path("run/replay.html").read_text() and len(Path("run/run.csv").read_text().splitlines()) == 177
+    for asked, expected in {
+        (
+            "replay",
+            "run",
+            "--brain",
+            str(many.parent / "mine.py"),
+        ): "all 20 commands are the same, as far as it goes",
+        ("plot", "run", "true_x_m"): "plot.png",
+        ("run", "--again", "run"): "",
+        ("report", "run/record-mended.mcap"): "record is damaged",
+        ("replay", "run/record-mended.mcap", "--brain", str(many.parent / "mine.py")): "all 20 commands are the same",
+    }.items():
+        code, out, err = boebot(capsys, *asked)
+        assert code == 1 and lost in err and expected in " ".join(out.split()), asked
+    with Image.open("plot.png") as picture:
+        assert picture.info["Title"] == "mine on shieldbot, record damaged"
+    rows = {
+        number: boebot_rows(Path(name)) for number, name in enumerate(("run/record.mcap", "run/record-mended.mcap"))
+    }
+    assert rows[0] == rows[1]
+
+
+def boebot_rows(record: Path) -> dict[str, list[tuple[float, bytes]]]:
+    result = read_run(record)
+    assert isinstance(result, RunResult)
+    return {stream: result.record.rows(stream) for stream in result.record.streams()}
+
+
+def test_damaged_attachment_is_not_believed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, many: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def seed(name: bytes) -> Callable[[bytearray], object]:
+        def change(data: bytearray) -> None:
+            data[data.index(b'"seed": 1', data.index(name)) + 8] = ord("3")
+
+        return change
+
+    for name in ("end", "begin"):
+        run = copied(many, tmp_path / name, seed(f"{name}.json".encode()))
+        code, out, err = boebot(capsys, "report", name, "--json")
+        said = json.loads(out)
+        assert code == 1 and f"attachment '{name}.json' is lost" in err
+        assert (said["seed"], said["steps"], said["ticks"]) == (1, 40, 201)
+        code, out, err = boebot(capsys, "run", "--again", name)
+        assert (code, out) == (1, "") and "expected a record that is not damaged inside" in err, run
+
+
+def test_mended_record_of_one_whose_end_is_damaged_still_says_so(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path
+) -> None:
+    run = copied(many, tmp_path / "run", lambda data: data.__setitem__(data.rindex(b'"steps": 40') + 9, ord("5")))
+    assert boebot(capsys, "report", str(run), "--mend", "-q")[0] == 1
+    code, out, err = boebot(capsys, "report", str(run / "record-mended.mcap"), "--json")
+    assert code == 1 and "attachment 'end.json' is lost" in err and json.loads(out)["steps"] == 40
+    assert boebot(capsys, "run", "--again", str(run / "record-mended.mcap"))[0] == 1
+
+
+def test_exit_codes_of_what_is_no_record(capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path) -> None:
+    """2 in all commands; 0 for one that is cut; of one whose beginning and end are damaged nothing is known: 1."""
+    (tmp_path / "notes").write_text("mine")
+
+    def no_names(data: bytearray) -> None:
+        for name in (b"begin.json", b"end.json"):
+            data[data.index(name) + 60] ^= 1
+
+    def cut(data: bytearray) -> None:
+        del data[chunk(data, 6) :]
+
+    damaged, short = copied(many, tmp_path / "damaged", no_names), copied(many, tmp_path / "short", cut)
+    old = copied(many, tmp_path / "old", lambda data: None)
+    brain = ("--brain", str(many.parent / "mine.py"))
+    for folder, expected in {tmp_path / "notes": 2, tmp_path / "nowhere": 2, damaged: 1, short: 0, old: 0}.items():
+        for command in (("report", "{}"), ("plot", "{}", "tick"), ("replay", "{}", *brain), ("run", "--again", "{}")):
+            asked = [str(folder) if word == "{}" else word for word in command]
+            if command[0] == "plot":
+                asked += ["--out", str(tmp_path / "plot.png")]
+            code, _, err = boebot(capsys, *asked)
+            assert code == expected and "Traceback" not in err, asked
+
+
+def test_nothing_is_not_the_same_as_nothing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, many: Path
+) -> None:
+    """A record that is cut before its first group."""
+    monkeypatch.chdir(tmp_path)
+    copied(many, tmp_path / "run", lambda data: data.__delitem__(slice(chunk(data, 0), None)))
+    for asked in (("replay", "run", "--brain", "wander"), ("run", "--again", "run")):
+        code, out, err = boebot(capsys, *asked)
+        assert (code, out) == (2, "") and "there is nothing to compare" in err
+
+
+def strangers(many: Path, to: Path, name: str, asked: dict[str, object], source: bytes = b"") -> Path:
+    """A record with a brain's file of that name, whose request is changed."""
+    attached = attachments_of(many)
+    begin = json.loads(attached["begin.json"])
+    begin["request"] |= asked
+    to.mkdir()
+    with (many / "record.mcap").open("rb") as old, (to / "record.mcap").open("wb") as file:
+        writer = RecordWriter(file, "it")
+        writer.attach("brain/mine.py", attached["brain/mine.py"])
+        writer.attach(f"brain/{name}", source)
+        writer.attach("begin.json", json.dumps(begin).encode())
+        for kept in RecordReader(old, "it").groups():
+            writer.write(kept.group, kept.end_s)
+        writer.attach("end.json", attached["end.json"])
+        writer.finish()
+    return to
+
+
+@pytest.mark.parametrize("name", ["../x.py", "/x.py", "a/../../x.py", "..\\x.py", "a//x.py", "x.py\0", "./x.py"])
+def test_file_of_a_record_lands_nowhere_else(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path, name: str
+) -> None:
+    run = strangers(many, tmp_path / "run", name, {}, b"harm")
+    code, out, err = boebot(capsys, "run", "--again", str(run), "--trust")
+    assert (code, out) == (2, "") and f"the record has a file {'brain/' + name!r}; expected a path below brain/" in err
+    assert not list(tmp_path.rglob("x.py*"))
+
+
+def test_stranger_cannot_have_a_port_opened_or_a_file_of_ours_run(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path
+) -> None:
+    begin = json.loads(attachments_of(many)["begin.json"])
+    (member,) = begin["request"]["members"]
+    ours = tmp_path / "ours.py"
+    ours.write_text("open(__file__ + '.ran', 'w')\ndef step(robot):\n    pass\n")
+    port, brain = {"on": "/dev/ttyUSB0"}, {"members": [member | {"brain": str(ours)}]}
+    refused: list[tuple[dict[str, object], str]] = [
+        ({**port}, "is of a real robot"),
+        ({**brain}, "the record lacks the file of brain"),
+    ]
+    for number, (asked, sentence) in enumerate(refused):
+        run = strangers(many, tmp_path / str(number), "other.py", asked)
+        code, out, err = boebot(capsys, "run", "--again", str(run))
+        assert (code, out) == (2, "") and sentence in err
+    assert [path.name for path in tmp_path.glob("ours*")] == ["ours.py"]
+
+
+def test_link_in_the_folder_of_a_stranger_is_not_followed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path
+) -> None:
+    mine = tmp_path / "mine.txt"
+    mine.write_text("mine")
+    run = copied(many, tmp_path / "run", lambda data: data.__delitem__(slice(chunk(data, 6), None)))
+    for name in ("summary.json", "run.png", "replay.html", "record-mended.mcap"):
+        (run / f".part-{name}").symlink_to(mine)
+        (run / name).symlink_to(mine)
+    assert boebot(capsys, "report", str(run), "--mend")[0] == 0
+    assert mine.read_text() == "mine" and not (run / "summary.json").is_symlink()

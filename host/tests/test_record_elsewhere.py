@@ -30,8 +30,8 @@ def streams_of(record: Path) -> dict[str, dict[str, Any]]:
     """What boebot reads, in the form of read_record.cjs."""
     blocks: dict[str, list[Any]] = {}
     with record.open("rb") as file:
-        for group in RecordReader(file, str(record)).groups():
-            for stream, block in group.items():
+        for kept in RecordReader(file, str(record)).groups():
+            for stream, block in kept.group.items():
                 blocks.setdefault(stream, []).append(block)
     return {
         stream: {

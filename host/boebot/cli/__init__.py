@@ -79,7 +79,7 @@ def _run() -> object:
         return _interrupted(str(error), error)
     except BoebotError as error:
         _say(str(error), error)
-        return EXIT_ERROR
+        return error.exit_code
     except typer.Abort:
         raise KeyboardInterrupt from None
     except OSError as error:

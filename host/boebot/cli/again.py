@@ -1,34 +1,39 @@
 """`boebot run --again DIR`: repeats a simulated run from its record, and says where the repetition differs.
 
-Exit codes: 0 it is bit-equal; 1 it differs; 2 it cannot be repeated.
+Exit codes: 0 it is bit-equal; 1 it differs, or the record is damaged; 2 it cannot be repeated.
 """
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import typer
 
 from boebot.cli import output, streams
 from boebot.errors import BoebotError
+from boebot.record.reading import CutError
 from boebot.running.again import Repetition, again, recorded
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
 
 
-def run_again(folder: Path, as_json: bool) -> None:
-    """Repeats the run, prints what came of it, and ends the command with its exit code."""
+def run_again(folder: Path, as_json: bool, trust: bool) -> None:
+    """Repeats the run, prints what came of it, and ends the command with its exit code. `trust`: without asking."""
     try:
         run = recorded(folder)
+        if run.foreign and not trust and sys.stdin is not None and sys.stdin.isatty():
+            output.say(run.warning)
+            trust = typer.confirm("run it?", err=True)
         with (
             streams.kept(for_the_answer=True),
             output.progress_bar(f"{folder} again", run.seconds) as bar,
             output.step_watch(bar) as progress,
         ):
-            repetition = again(run, progress)
+            repetition = again(run, progress, trust=trust)
     except BoebotError as error:
         output.say(str(error))
-        raise typer.Exit(EXIT_USAGE) from None
+        raise typer.Exit(EXIT_DIFFERS if isinstance(error, CutError) else EXIT_USAGE) from None
     if repetition.part is not None:
         output.say(repetition.part)
     if as_json:

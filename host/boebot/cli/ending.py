@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+import typer
 
 from boebot.cli import output
 from boebot.cli.run_table import Detail, print_run
 from boebot.errors import BoebotError, InterruptedRunError
+from boebot.record.reading import CutError
 from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RECORD
 from boebot.running import interrupts
 from boebot.view import IncompleteError
+
+
+@contextlib.contextmanager
+def of_record(result: RunResult | TogetherResult) -> Iterator[None]:
+    """Says what the record of a result lacks; where it is damaged inside, the command ends with exit code 1."""
+    error = result.error
+    if not isinstance(error, CutError):
+        yield
+        return
+    output.say(str(error))
+    yield
+    if error.exit_code:
+        raise typer.Exit(error.exit_code)
 
 
 def end(result: RunResult | TogetherResult, out: Path | None, wanted: Detail) -> None:

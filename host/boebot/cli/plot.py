@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import options, output
-from boebot.record.reading import CutError, read_run, robots_of
+from boebot.cli import ending, options, output
+from boebot.record.reading import read_run, robots_of
 
 
 def plot(
@@ -28,6 +28,5 @@ def plot(
 
     result = read_run(run)
     robots = robots_of(result, robot)
-    if isinstance(result.error, CutError):
-        output.say(str(result.error))
-    output.line(f"picture: {column_plot.write(robots, columns, out or Path('plot.png'))}")
+    with ending.of_record(result):
+        output.line(f"picture: {column_plot.write(robots, columns, out or Path('plot.png'))}")

@@ -1,7 +1,8 @@
 """`boebot replay DIR --brain B`: runs a brain on what was sensed in a run, and names the first command that differs.
 In place of a run's folder it takes a log of CAN frames, whoever has recorded it.
 
-Exit codes: 0 all commands are the same; 1 one differs, or a log lacks some; 2 it cannot be replayed.
+Exit codes: 0 all commands are the same; 1 one differs, or the record is damaged, or a log lacks some; 2 it cannot be
+replayed.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Annotated
 import typer
 
 from boebot.can.log import GapError, as_on_the_wire, is_log, read_log
-from boebot.cli import completion, options, output, streams
+from boebot.cli import completion, ending, options, output, streams
 from boebot.errors import BoebotError
 from boebot.link.fields import reader
 from boebot.link.messages import Telemetry
@@ -75,9 +76,13 @@ def replay(
                 commands = replayed(result, brain)
     except BoebotError as error:
         output.say(str(error))
-        raise typer.Exit(EXIT_USAGE) from None
-    if isinstance(result.error, CutError):
-        output.say(str(result.error))
+        raise typer.Exit(EXIT_DIFFERS if isinstance(error, CutError) else EXIT_USAGE) from None
+    with ending.of_record(result):
+        _compare(result, commands)
+
+
+def _compare(result: RunResult, commands: list[Command]) -> None:
+    """Prints what came of it; where something differs, it ends the command with its exit code."""
     steps = result.record.steps
     for number, (step, command) in enumerate(zip(steps, commands, strict=False)):
         recorded = Command(*step[1:])
@@ -90,12 +95,13 @@ def replay(
     if isinstance(result.error, GapError):
         output.line(f"the {len(steps)} commands before the gap are the same; what is behind it was not compared")
         raise typer.Exit(EXIT_DIFFERS)
-    output.line(f"all {len(steps)} commands are the same")
+    part = ", as far as it goes" if isinstance(result.error, CutError) else ""
+    output.line(f"all {len(steps)} commands are the same{part}")
 
 
 def _recorded(run: Path, number: int | None) -> RunResult:
-    """The run in a folder, of one robot."""
-    robots = robots_of(read_run(run), number)
+    """The run in a folder, of one robot; what a brain did after something that is lost cannot be replayed."""
+    robots = robots_of(read_run(run, up_to_damage=True), number)
     if len(robots) > 1:
         raise BoebotError(f"{run} is a run of {len(robots)} robots; expected --robot 1 to {len(robots)}")
     (result,) = robots.values()

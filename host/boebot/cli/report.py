@@ -35,13 +35,14 @@ def report(
         ),
     ] = None,
     mended: Annotated[
-        bool, typer.Option("--mend", help="Of a record that is cut: a whole one beside it, record-mended.mcap.")
+        bool, typer.Option("--mend", help="Of a cut or damaged record: what is left of it, as record-mended.mcap.")
     ] = False,
     json: options.Json = False,
     verbose: options.Verbose = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Print a run's figures and write its files anew, from its record. A record that is cut is read up to there."""
+    """Print a run's figures and write its files anew, from its record. A record that is cut is read up to there; of one
+    that is damaged, what is left is read and the exit code is 1."""
     if can is not None and can not in log.KINDS:
         raise typer.BadParameter(f"there is no format {can!r}; expected one of {', '.join(log.KINDS)}")
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
@@ -59,20 +60,20 @@ def report(
             if can is not None:
                 files += _can_logs(result, folder, can)
             if mended and isinstance(result.error, CutError):
-                files.append(mend(folder / RECORD, result))
+                files.append(mend(folder / RECORD if run.is_dir() else run, result))
         except BoebotError as error:  # the figures are printed all the same
             unsaved = error
             files += error.files if isinstance(error, IncompleteError) else []
-    if isinstance(result.error, CutError):
-        output.say(str(result.error))
-    if wanted is Detail.JSON:
-        output.print_json(result.table() | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]})
-    elif wanted is not Detail.NOTHING:
-        print_run(result, wanted)
-        if files:
-            output.line(ending.files_in(folder, files))
-    if unsaved is not None:
-        raise unsaved
+    with ending.of_record(result):
+        if wanted is Detail.JSON:
+            wall_clock = {"wall_clock": result.wall_clock()}
+            output.print_json(result.table() | wall_clock | {"files": [str(path) for path in files]})
+        elif wanted is not Detail.NOTHING:
+            print_run(result, wanted)
+            if files:
+                output.line(ending.files_in(folder, files))
+        if unsaved is not None:
+            raise unsaved
 
 
 def _can_logs(result: RunResult | TogetherResult, folder: Path, kind: str) -> list[Path]:

@@ -125,6 +125,9 @@ def run(
             help="In place of a brain: repeat the simulated run in that folder, and say where it differs.",
         ),
     ] = None,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="With --again: run a brain that came with the record.")
+    ] = False,
     json: options.Json = False,
     verbose: options.Verbose = False,
     quiet: options.Quiet = False,
@@ -133,8 +136,10 @@ def run(
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
     if repeated is not None:
         _check_alone(context)
-        run_again(repeated, json)
+        run_again(repeated, json, trust)
         return
+    if trust:
+        raise typer.BadParameter("--trust goes with --again DIR", context)
     if not brain:
         raise typer.BadParameter("expected a BRAIN, or --again DIR", context)
     ideal = options.names(without)
@@ -214,10 +219,10 @@ def _toml(text: str) -> Any:
 
 
 def _check_alone(context: typer.Context) -> None:
-    """Raises a usage error where --again has other arguments beside it than --json."""
+    """Raises a usage error where --again has other arguments beside it than --json and --trust."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
     given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
-    others = sorted(given - {"repeated", "json"})
+    others = sorted(given - {"repeated", "json", "trust"})
     if others:
         raise typer.BadParameter(
             f"--again repeats a run as it was; expected no {others[0].replace('_', '-')} beside it", context

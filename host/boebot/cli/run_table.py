@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from boebot.cli import output
+from boebot.errors import brief
 from boebot.record import figures
 from boebot.record.result import RunResult, TogetherResult
 
@@ -121,7 +122,7 @@ def _brain(result: RunResult, table: dict[str, Any]) -> str:
 def _row(number: int, robot: RunResult) -> tuple[str, ...]:
     """Of one of several, under `HEADER`."""
     table = robot.table()
-    ended = "complete" if robot.error is None else "ended early"
+    ended = (brief(robot.error) or ["complete"])[0]
     values = (table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches"))
     cells = ("-" if value is None else figures.text(value) for value in values)
     return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}"

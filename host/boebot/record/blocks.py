@@ -98,17 +98,18 @@ def schema() -> bytes:
     return FileDescriptorSet(file=[_descriptor()]).SerializeToString()
 
 
-def packed(block: Block) -> bytes:
-    """A block as it stands on disk."""
-    message = _message_class()(data=block.data)
+def packed(block: Block, stream: str = "") -> bytes:
+    """A block as it stands on disk, with the name of its stream: MCAP says that once for all, in a chunk that may be
+    lost."""
+    message = _message_class()(data=block.data, stream=stream)
     message.time.extend(block.times.tolist())
     message.size.extend(block.sizes.tolist())
     packed: bytes = message.SerializeToString()
     return packed
 
 
-def unpacked(data: bytes) -> Block:
-    """The block of those bytes.
+def unpacked(data: bytes) -> tuple[str, Block]:
+    """Its stream and the block of those bytes.
 
     Raises:
         ValueError: they are none.
@@ -124,7 +125,7 @@ def unpacked(data: bytes) -> Block:
     is_sound = count > 0 and len(block.sizes) in (1, count)
     if not is_sound or int(np.broadcast_to(block.sizes, count).sum()) != len(block.data):
         raise ValueError(f"no block: {count} times, {len(block.sizes)} sizes and {len(block.data)} bytes")
-    return block
+    return message.stream, block
 
 
 def chain(groups: Iterable[Group], stream: str) -> Iterator[Block]:
@@ -144,6 +145,7 @@ def _descriptor() -> Any:
     message.field.add(name="time", number=1, label=kinds.LABEL_REPEATED, type=kinds.TYPE_DOUBLE)
     message.field.add(name="data", number=2, label=kinds.LABEL_OPTIONAL, type=kinds.TYPE_BYTES)
     message.field.add(name="size", number=3, label=kinds.LABEL_REPEATED, type=kinds.TYPE_UINT32)
+    message.field.add(name="stream", number=4, label=kinds.LABEL_OPTIONAL, type=kinds.TYPE_STRING)
     return file
 
 

@@ -29,6 +29,9 @@ from boebot.running.interventions import Arm, Deed, Hand, Parameter, Release, St
 NOT_SEEN = frozenset(("setpoint_sequence",))
 """Fields of telemetry that say what the host itself sent, and that no device shows to a brain."""
 
+EXPECTED = "expected one with a step of its brain at least"
+"""Of a run that is to be compared: that nothing differs from nothing says nothing."""
+
 _OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "waits", "shifts")
 """Streams whose times are of the transport's clock, or near it."""
 
@@ -131,8 +134,11 @@ def replayed(result: RunResult, brain: object) -> list[Command]:
     that is over before the run was gives fewer commands. What a person did to robot and brain is done again.
 
     Raises:
+        BoebotError: the run has no commands.
         BrainError: the brain cannot be loaded, or fails.
     """
+    if not result.record.count("command"):
+        raise BoebotError(f"there is nothing to compare: the run has no commands; {EXPECTED}")
     loaded = brains.load_brain(brain)
     description = result.robot
     fastest = () if result.layout is None else (description.body.wheel_speed_maximum_m_s,)

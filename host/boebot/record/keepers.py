@@ -70,22 +70,23 @@ class OnDisk:
 
     def groups(self) -> Iterator[Group]:
         """See `Keeper`; those up to where the disk was full, if it was."""
-        return RecordReader(self._file, self._name).groups()
+        return (kept.group for kept in RecordReader(self._file, self._name).groups())
 
 
 class Finished:
     """On disk, by a run that is over."""
 
-    def __init__(self, file: IO[bytes], name: str) -> None:
-        self._file, self._name = file, name
+    def __init__(self, reader: RecordReader, name: str, *, up_to_damage: bool) -> None:
+        """As of `RecordReader.groups`."""
+        self._reader, self._name, self._up_to_damage = reader, name, up_to_damage
 
     def write(self, rows: Rows, time_s: float) -> None:
         """Raises TypeError: nothing is written there any more."""
         raise TypeError(f"the record {self._name} is finished")
 
     def groups(self) -> Iterator[Group]:
-        """See `Keeper`."""
-        return RecordReader(self._file, self._name).groups()
+        """See `Keeper`; those that are sound."""
+        return (kept.group for kept in self._reader.groups(up_to_damage=self._up_to_damage))
 
 
 class Temporary:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import errno
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import msgspec
 
@@ -14,27 +15,38 @@ from boebot.errors import ArenaError
 from boebot.record.facts import result_of
 from boebot.record.keepers import Finished, Keeper, Shared
 from boebot.record.record import Record
-from boebot.record.record_file import RecordError, RecordReader
+from boebot.record.record_file import NoRecordError, RecordError, RecordReader, in_words
 from boebot.record.recording import BEGIN, END
-from boebot.record.result import RunResult, TogetherResult
+from boebot.record.result import RunResult, TogetherResult, why
 from boebot.record.run_folder import FORMAT, RECORD
 
 
 class CutError(RecordError):
-    """A record ends before its run did."""
+    """A record lacks a part of its run: it is cut at its end, or damaged inside.
+
+    Attributes:
+        lost: what is damaged, in words; empty: nothing, it is cut.
+        other: why the run itself ended before its time, as far as the record says.
+    """
+
+    def __init__(self, sentence: str, lost: Sequence[str] = (), other: BaseException | None = None) -> None:
+        super().__init__(sentence)
+        self.lost, self.other = lost, other
+        self.exit_code = 1 if lost else 0
+        self.brief = "record damaged" if lost else "record cut"
 
 
-def read_run(path: str | Path) -> RunResult | TogetherResult:
+def read_run(path: str | Path, *, up_to_damage: bool = False) -> RunResult | TogetherResult:
     """The run in a folder, or in the file of its record. Of a record that is cut the run has ended there, with a
-    `CutError` that says so.
+    `CutError` that says so. One that is damaged inside has such an error, too, and all rows that are sound;
+    `up_to_damage`: only those before the first ones that are lost.
 
     Raises:
-        BoebotError: there is no record, or it is none of a run, or too short to say whose it is.
+        BoebotError: there is no record, or it is none of a run, or does not say whose it is.
     """
-    file, opened = _opened(path)
-    reader = RecordReader(opened, str(file)).read()
+    file, reader = _opened(path)
     said = _said(reader, file)
-    keeper = Finished(opened, str(file))
+    keeper = Finished(reader, str(file), up_to_damage=up_to_damage)
     world = None if said["arena"] is None else _arena(said["arena"], file)
     count = len(said["robots"])
     keepers: list[Keeper] = [keeper] if count == 1 else [Shared(keeper, number) for number in range(1, count + 1)]
@@ -45,9 +57,11 @@ def read_run(path: str | Path) -> RunResult | TogetherResult:
         ]
     except (ValueError, TypeError) as error:
         raise RecordError(f"{file}: {END} in it does not describe a run: {error}") from None
-    if reader.is_cut:
+    here = [str(damage) for damage in reader.found.damages if damage.begin < damage.end or not said["lost"]]
+    lost = [*said["lost"], *here]
+    if reader.found.is_cut or lost:
         for result in results:
-            _cut(result, reader, file)
+            _lack(result, reader, file, lost, ends_there=up_to_damage or END not in reader.found.attachments)
     if count == 1:
         return results[0]
     ended = next((result.error for result in results if result.error is not None), None)
@@ -71,34 +85,39 @@ def robots_of(result: RunResult | TogetherResult, number: int | None = None) -> 
 
 def attachments_of(path: str | Path) -> dict[str, bytes]:
     """What is attached to a record, by name. Raises as `read_run`."""
-    file, opened = _opened(path)
-    with opened:
-        return dict(RecordReader(opened, str(file)).read().attachments)
+    return dict(_opened(path)[1].found.attachments)
 
 
-def _opened(path: str | Path) -> tuple[Path, IO[bytes]]:
+def _opened(path: str | Path) -> tuple[Path, RecordReader]:
+    """A record, read once."""
     file = Path(path) / RECORD if Path(path).is_dir() else Path(path)
     try:
-        return file, file.open("rb")
+        return file, RecordReader(file.open("rb"), str(file)).read()
     except OSError as error:
         what = "there is no record of a run" if error.errno == errno.ENOENT else error.strerror or error
-        raise RecordError(f"{file}: {what}; expected the folder of a run, or its {RECORD}") from None
+        raise NoRecordError(f"{file}: {what}; expected the folder of a run, or its {RECORD}") from None
 
 
 def _said(reader: RecordReader, file: Path) -> dict[str, Any]:
     """What was said last of the run."""
-    text = reader.attachments.get(END, reader.attachments.get(BEGIN))
+    found = reader.found
+    text = found.attachments.get(END, found.attachments.get(BEGIN))
     if text is None:
-        where = f"; it is cut after {file.stat().st_size} B" if reader.is_cut else ""
-        raise RecordError(f"{file} does not say whose run it is{where}; expected {BEGIN} in it")
+        where = f"; it is cut after {file.stat().st_size} B" if found.is_cut else ""
+        sentence = f"{file} does not say whose run it is{where}; expected {BEGIN} in it"
+        if found.damages:
+            lost = [str(damage) for damage in found.damages]
+            raise CutError(f"{sentence}; it is damaged: {in_words(lost)}", lost)
+        raise NoRecordError(sentence)
     try:
         said: dict[str, Any] = json.loads(text)
         said["arena"], said["robots"][0]
         version = said["format"]
-    except (ValueError, LookupError, TypeError) as error:
-        raise RecordError(f"{file}: {BEGIN} in it cannot be read: {error}") from None
+        said["lost"] = [str(one) for one in said.get("lost", ())]
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise NoRecordError(f"{file}: {BEGIN} in it cannot be read: {error}") from None
     if version != FORMAT:
-        raise RecordError(f"{file} has format {version}; expected {FORMAT}: read it with the boebot that wrote it")
+        raise NoRecordError(f"{file} has format {version}; expected {FORMAT}: read it with the boebot that wrote it")
     return said
 
 
@@ -109,14 +128,26 @@ def _arena(description: Any, file: Path) -> Arena:
         raise RecordError(f"{file}: the arena in it cannot be read: {error}") from None
 
 
-def _cut(result: RunResult, reader: RecordReader, file: Path) -> None:
-    """What the end of a record would have said, as far as its streams say it."""
-    record = result.record
+def _lack(result: RunResult, reader: RecordReader, file: Path, lost: Sequence[str], *, ends_there: bool) -> None:
+    """Notes what a result lacks. `ends_there`: what the end of the record would have said is taken from its streams, as
+    far as they say it."""
+    record, found = result.record, reader.found
     times = record.times_of("telemetry") if record.count("telemetry") else record.times_of("readings")
     end_s = float(times[-1]) if len(times) else 0.0
-    result.run_time, result.steps = end_s, record.count("command")
-    result.clock_offset = record.clock_offset
-    result.error = CutError(
-        f"the record is cut: it ends at {end_s:.2f} s of the run, after {reader.whole_bytes:,} whole bytes of "
+    if ends_there:
+        result.run_time, result.steps = end_s, record.count("command")
+        result.clock_offset = record.clock_offset
+        if lost and result.layout is None and not record.count("clock"):
+            result.world = None  # at which of its times the truth was is lost
+    cut = (
+        f"the record is cut: it ends at {end_s:.2f} s of the run, after {found.whole_bytes:,} whole bytes of "
         f"{file.stat().st_size:,} in {file.name}"
     )
+    if not lost:
+        result.error = CutError(cut)
+        return
+    other = result.error
+    parts = [f"the record is damaged: {in_words(lost)}; figures are of what is left"]
+    parts += [cut] if found.is_cut else []
+    parts += [] if other is None else [f"the run ended early: {why(other)}"]
+    result.error = CutError("; ".join(parts), [*lost, *([cut] if found.is_cut else [])], other)

@@ -1,30 +1,52 @@
 """A record on disk: an MCAP file (mcap.dev), written while the run goes on, and readable wherever it was cut.
 
 Each group of blocks is a chunk, compressed and with a CRC; each stream is a channel. Sources and figures of the run are
-attachments. What each chunk and attachment holds is on the disk once it is written, as far as the disk keeps fsync.
+attachments, with a CRC as well. What each chunk and attachment holds is on the disk once it is written, as far as the
+disk keeps fsync.
+
+A reader believes no byte whose CRC is wrong or missing. What is damaged it names and leaves out, and it goes on with
+the next sound chunk or attachment. The messages of a chunk have the number of their group, from 0, as `sequence`, and
+the times of the run (ns) that it lies between as `publish_time` and `log_time`: so a chunk that is missing is noticed.
+The CRC of all data, which the end of a record that is not cut has, covers what lies between them.
+(MCAP's records: mcap.dev/spec)
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
+import math
 import os
 import queue
+import re
 import struct
 import sys
 import threading
-from collections.abc import Callable, Iterator
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cache, partial
-from typing import IO, Any, cast
+from typing import IO, Any, NamedTuple, cast
 
 from boebot.errors import BoebotError
 from boebot.record.blocks import SCHEMA, Group, Rows, group_of, packed, schema, unpacked
 
 LARGEST_CHUNK = 1 << 28  # B, that is read; a second of a run has a hundredth of it
+PIECE = 1 << 16  # B, that are read or unpacked at a time
+TRIES, SPARE = 8, 1 << 26  # times its size, and B more, that a file is looked at for what is sound
 TEXT = "text/plain"
+LONGEST_NAME = 200  # B, of an attachment that is named
+NAMED = 3  # damages, one by one; of more it is said how many
 
 
 class RecordError(BoebotError):
     """A record cannot be written or read."""
+
+
+class NoRecordError(RecordError):
+    """A file is no record of a run."""
+
+    exit_code = 2
 
 
 class RecordWriter:
@@ -36,9 +58,10 @@ class RecordWriter:
 
         self._file, self._name, self._sync = file.fileno(), name, sync
         self._tail = _Tail()
-        self._writer: Any = Writer(cast(IO[bytes], self._tail), chunk_size=sys.maxsize)
+        self._writer: Any = Writer(cast(IO[bytes], self._tail), chunk_size=sys.maxsize, enable_data_crcs=True)
         self._channels: dict[str, int] = {}
-        self._schema = 0
+        self._schema = self._groups = 0
+        self._until_s = 0.0
         self._work: queue.Queue[Callable[[], None] | None] = queue.Queue()
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
@@ -57,9 +80,13 @@ class RecordWriter:
             reason = getattr(self._failure, "strerror", None) or f"{kind}: {self._failure}"
             raise RecordError(f"the record cannot be written to {self._name}: {reason}")
 
-    def write(self, rows: Rows, time_s: float) -> None:
-        """A group, at that time of the run (s). Raises as `check`."""
-        self._put(partial(self._write, rows, max(0, round(time_s * 1e9))))
+    def write(self, rows: Rows, time_s: float, begin_s: float | None = None, number: int | None = None) -> None:
+        """A group, up to that time of the run (s). Raises as `check`. `begin_s`, `number`: of one that was read from
+        another record; None: it follows the last one."""
+        number = self._groups if number is None else number
+        times = (self._until_s if begin_s is None else begin_s, time_s)
+        self._groups, self._until_s = number + 1, time_s
+        self._put(partial(self._write, rows, number, *(max(0, round(each * 1e9)) for each in times)))
 
     def attach(self, name: str, data: bytes, media_type: str = TEXT) -> None:
         """A file within the file. Raises as `check`."""
@@ -107,11 +134,12 @@ class RecordWriter:
         self._writer.start(profile="boebot", library="boebot")
         self._schema = self._writer.register_schema(name=SCHEMA, encoding="protobuf", data=schema())
 
-    def _write(self, rows: Rows, time_ns: int) -> None:
+    def _write(self, rows: Rows, number: int, begin_ns: int, time_ns: int) -> None:
         for stream, block in group_of(rows).items():
             if stream not in self._channels:
                 self._channels[stream] = self._writer.register_channel(stream, "protobuf", self._schema)
-            self._writer.add_message(self._channels[stream], time_ns, packed(block), time_ns)
+            data = packed(block, stream)
+            self._writer.add_message(self._channels[stream], time_ns, data, begin_ns, sequence=number)
 
     def _attach(self, name: str, data: bytes, media_type: str) -> None:
         self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
@@ -148,107 +176,236 @@ class _Tail:
         return data
 
 
-class RecordReader:
-    """Reads a record from its beginning to its end, or to where it is cut.
+class Damage(NamedTuple):
+    """What of a record is not as it was written.
 
     Attributes:
-        is_cut: it ends before its end; known once it was read so far.
-        whole_bytes: of the file, up to the end of the last whole chunk or attachment that was read.
-        attachments: those that were read so far.
+        begin, end: of the bytes in the file (B) that are left out.
+        after_s, before_s: of the run, between which they lie; infinite: up to its end.
+        what: is wrong, in words; "": a part of the run is lost.
+    """
+
+    begin: int
+    end: int
+    after_s: float
+    before_s: float
+    what: str
+
+    def __str__(self) -> str:
+        until = "its end" if math.isinf(self.before_s) else f"{self.before_s:.2f} s"
+        what = self.what or f"the run from {self.after_s:.2f} s to {until} is lost"
+        return f"bytes {self.begin:,} to {self.end:,}: {what}"
+
+
+class Kept(NamedTuple):
+    """A group as a record has it: its number from 0, and the times of the run (s) that it lies between."""
+
+    number: int
+    begin_s: float
+    end_s: float
+    group: Group
+
+
+@dataclass
+class Found:
+    """What one pass over a record has found so far.
+
+    Attributes:
+        damages: oldest first.
+        is_cut: the record ends before its end.
+        whole_bytes: of the file, up to the end of the last sound chunk or attachment.
+        attachments: by name.
+    """
+
+    damages: list[Damage] = field(default_factory=list)
+    is_cut: bool = False
+    whole_bytes: int = 0
+    attachments: dict[str, bytes] = field(default_factory=dict)
+
+
+class RecordReader:
+    """Reads what is sound of a record, from its beginning to its end or to where it is cut.
+
+    Attributes:
+        found: when all of it was read first; no later pass changes it.
     """
 
     def __init__(self, file: IO[bytes], name: str) -> None:
         """A file that can be read anew from its beginning; `name`: as errors call it.
 
         Raises:
-            RecordError: it is no MCAP file.
+            NoRecordError: it is no MCAP file.
         """
         self._file, self._name = file, name
-        self.is_cut = False
-        self.whole_bytes = 0
-        self.attachments: dict[str, bytes] = {}
-        from mcap.writer import MCAP0_MAGIC
-
-        file.seek(0)
-        begin = file.read(len(MCAP0_MAGIC))
-        if not MCAP0_MAGIC.startswith(begin):
-            raise RecordError(f"{name} is no record of a run; expected an MCAP file")
+        self.found = Found()
+        if not _MAGIC.startswith(self._at(0, len(_MAGIC))):
+            raise NoRecordError(f"{name} is no record of a run; expected an MCAP file")
 
     def read(self) -> RecordReader:
         """Passes over all of it, for what it says of itself."""
-        for _ in self._records():
+        found = Found()
+        for _ in self._pass(found):
             pass
+        self.found = found
         return self
 
-    def groups(self) -> Iterator[Group]:
-        """The groups, oldest first."""
-        from mcap.records import Channel, Chunk, Message
-        from mcap.stream_reader import breakup_chunk
+    def groups(self, *, up_to_damage: bool = False) -> Iterator[Kept]:
+        """The groups, oldest first; `up_to_damage`: those before the first one that is missing.
 
-        topics: dict[int, str] = {}
-        for record in self._records():
-            if not isinstance(record, Chunk):
-                continue
-            try:
-                _check_size(record)
-                group = {}
-                for one in breakup_chunk(record, validate_crc=True):
-                    if isinstance(one, Channel):
-                        topics[one.id] = one.topic
-                    elif isinstance(one, Message):
-                        group[topics[one.channel_id]] = unpacked(one.data)
-            except _damages():
-                self.is_cut = True
+        Raises:
+            RecordError: damage was found that was not there, or not looked for, when the record was read first.
+        """
+        found = Found()
+        for number, kept in enumerate(self._pass(found)):
+            if up_to_damage and kept.number != number:
                 return
-            yield group
+            yield kept
+        if new := [str(damage) for damage in found.damages if damage not in self.found.damages]:
+            raise RecordError(f"the record {self._name} is damaged: {in_words(new)}; expected what was written")
 
-    def _records(self) -> Iterator[Any]:
-        from mcap.records import Attachment, Chunk
-        from mcap.stream_reader import StreamReader
+    def _pass(self, found: Found) -> Iterator[Kept]:
+        """The groups that are sound; all else goes to `found`."""
+        size = self._file.seek(0, io.SEEK_END)
+        limit, crc = self._end(size) or (size, None)
+        found.is_cut = crc is None and self._at(max(size - len(_MAGIC), len(_MAGIC)), size) != _MAGIC
+        found.whole_bytes = len(_MAGIC)
+        place, budget = _BEGIN, TRIES * size + SPARE
+        last, hole = Kept(-1, 0.0, 0.0, {}), -1  # where bytes begin that are not sound; -1: all are
+        while place < limit and budget > 0:
+            end, what = self._record(place, limit)
+            number = what.number if isinstance(what, Kept) else last.number + 1
+            if what is None or number <= last.number:
+                hole = place if hole < 0 else hole
+                budget -= end - place + PIECE
+                place = self._likely(place + 1)
+                continue
+            if hole >= 0 or number > last.number + 1:
+                before_s = what.begin_s if isinstance(what, Kept) else math.inf
+                found.damages.append(self._damage(hole if hole >= 0 else place, place, last.end_s, before_s))
+                hole = -1
+            place = found.whole_bytes = end
+            if isinstance(what, Kept):
+                place += _INDEX * len(what.group)
+                last = what
+                yield what
+            else:
+                found.attachments |= what
+        if hole >= 0 and not found.is_cut:
+            found.damages.append(self._damage(hole, limit, last.end_s, math.inf))
+        elif crc is not None and not found.damages and self._crc(limit) != crc:
+            found.damages.append(Damage(0, limit, 0.0, math.inf, "something beside the run is wrong in these"))
 
-        self.is_cut, self.attachments = False, {}
-        whole = _Whole(self._file)
-        file = cast(IO[bytes], whole)
+    def _at(self, begin: int, size: int) -> bytes:
+        """Some bytes of the file, as far as it goes. Several can read the same file in turns."""
+        self._file.seek(begin)
+        return self._file.read(size)
+
+    def _crc(self, end: int) -> int:
+        crc = 0
+        for begin in range(0, end, PIECE):
+            crc = zlib.crc32(self._at(begin, min(PIECE, end - begin)), crc)
+        return crc
+
+    def _end(self, size: int) -> tuple[int, int] | None:
+        """Where the data ends, and its CRC, as the end of the file says; None: that is not sound."""
         try:
-            for record in StreamReader(file, emit_chunks=True, record_size_limit=2 * LARGEST_CHUNK).records:
-                if isinstance(record, Attachment):
-                    self.attachments[record.name] = record.data
-                if isinstance(record, Attachment | Chunk):
-                    self.whole_bytes = whole.read_bytes
-                yield record
+            *kind, begin, _, crc, magic = _FOOTER.unpack(self._at(max(0, size - _FOOTER.size), size))
+            index = self._at(min(begin, size), size)
+            *end, data_crc = _DATA_END.unpack(self._at(max(0, size - len(index) - _DATA_END.size), _DATA_END.size))
+        except struct.error:
+            return None
+        is_sound = (*kind, *end, magic) == (2, 20, 15, 4, _MAGIC) and zlib.crc32(index[:-12]) == crc
+        return (begin - _DATA_END.size, data_crc) if is_sound else None
+
+    def _likely(self, begin: int) -> int:
+        """Where the next chunk or attachment may begin; else the end of the file."""
+        while data := self._at(begin, PIECE):
+            if found := _LIKELY.search(data):
+                return begin + found.start()
+            begin += max(len(data) - _LIKELY_SIZE, 1)
+        return begin
+
+    def _record(self, begin: int, limit: int) -> tuple[int, Kept | dict[str, bytes] | None]:
+        """Where the chunk or attachment that begins there ends, at `limit` at most, and what is in it; None: it is not
+        sound."""
+        kind, length = _HEAD.unpack(self._at(begin, _HEAD.size).ljust(_HEAD.size, b"\0"))
+        end = begin + _HEAD.size + length
+        if end > limit or length > 2 * LARGEST_CHUNK or kind not in _KINDS:
+            return min(end, limit), None
+        try:
+            return end, _KINDS[kind](self._at(begin + _HEAD.size, length))
         except _damages():
-            self.is_cut = True
+            return end, None
+
+    def _damage(self, begin: int, end: int, after_s: float, before_s: float) -> Damage:
+        """What begins there, as far as its bytes can be believed."""
+        head = self._at(begin, 29 + LONGEST_NAME)
+        name = head[29 : 29 + int.from_bytes(head[25:29], "little")].decode(errors="replace")
+        is_attachment = begin < end and head[:1] == bytes([_ATTACHMENT])
+        return Damage(begin, end, after_s, before_s, f"attachment {name!r} is lost" if is_attachment else "")
 
 
-class _Whole:
-    """A file of which nothing is read in part: a shorter rest is its end. Several can read the same file in turns.
-
-    Attributes:
-        read_bytes: from its beginning.
-    """
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self._file = file
-        self.read_bytes = 0
-
-    def read(self, size: int) -> bytes:
-        """Raises EOFError."""
-        self._file.seek(self.read_bytes)
-        data = self._file.read(size)
-        if len(data) < size:
-            raise EOFError
-        self.read_bytes += size
-        return data
+_MAGIC = b"\x89MCAP0\r\n"
+_BEGIN = len(_MAGIC) + 29  # of what is written, behind magic and header
+_CHUNK, _ATTACHMENT = 6, 9  # kinds of MCAP's records
+_INDEX = 31  # B, behind a chunk for each stream that it has
+_HEAD = struct.Struct("<BQ")  # kind, B that follow
+_DATA_END = struct.Struct("<BQI")  # kind, B that follow, CRC of all before it
+_FOOTER = struct.Struct("<BQQQI8s")  # kind, B that follow, where the index and its offsets begin, its CRC, magic
+_LIKELY = re.compile(rb"\x06(?=.{36}\x04\0\0\0zstd)|\x09(?=.{8}\0{16})", re.DOTALL)  # begin of chunk, attachment
+_LIKELY_SIZE = 44
 
 
-def _check_size(chunk: Any) -> None:
-    import zstandard
+def _group(body: bytes) -> Kept:
+    """The group of a chunk. Raises one of `_damages`."""
+    from mcap.data_stream import ReadDataStream
+    from mcap.records import Chunk, Message
+    from mcap.stream_reader import breakup_chunk
 
-    sizes = [chunk.uncompressed_size]
-    if chunk.compression == "zstd":
-        sizes.append(zstandard.frame_content_size(chunk.data))
-    if max(sizes) > LARGEST_CHUNK:
-        raise ValueError(f"a chunk of {max(sizes):,} B")
+    stream = ReadDataStream(io.BytesIO(body))
+    chunk = Chunk.read(stream)
+    data = _decompressed(chunk)
+    is_whole = (stream.count, len(data), chunk.compression) == (len(body), chunk.uncompressed_size, "zstd")
+    if not is_whole or zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError("wrong CRC")
+    chunk.compression, chunk.data = "", data
+    messages = [record for record in breakup_chunk(chunk) if isinstance(record, Message)]
+    ((number, begin_ns, end_ns),) = {(one.sequence, one.publish_time, one.log_time) for one in messages}
+    return Kept(number, begin_ns / 1e9, end_ns / 1e9, dict(unpacked(one.data) for one in messages))
+
+
+def _attachment(body: bytes) -> dict[str, bytes]:
+    """An attachment by its name. Raises one of `_damages`."""
+    from mcap.data_stream import ReadDataStream
+    from mcap.records import Attachment
+
+    stream = ReadDataStream(io.BytesIO(body))
+    attachment = Attachment.read(stream)
+    if stream.count != len(body) or zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
+        raise ValueError("wrong CRC")
+    return {attachment.name: attachment.data}
+
+
+_KINDS: dict[int, Callable[[bytes], Kept | dict[str, bytes]]] = {_CHUNK: _group, _ATTACHMENT: _attachment}
+
+
+def _decompressed(chunk: Any) -> bytes:
+    """The bytes of a chunk. Only what there really is takes memory, whatever size it claims."""
+    from zstandard import ZstdDecompressor
+
+    data = bytearray()
+    with ZstdDecompressor().stream_reader(chunk.data) as stream:
+        while part := stream.read(PIECE):
+            data += part
+            if len(data) > LARGEST_CHUNK:
+                raise ValueError(f"a chunk of more than {LARGEST_CHUNK:,} B")
+    return bytes(data)
+
+
+def in_words(damages: Sequence[str]) -> str:
+    """The first of them by themselves."""
+    more = len(damages) - NAMED
+    return "; ".join(damages[:NAMED]) + (f"; and {more} more places" if more > 0 else "")
 
 
 @cache

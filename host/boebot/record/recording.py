@@ -81,8 +81,9 @@ class Recording:
         return failure
 
 
-def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None) -> bytes:
-    """What a record says of a run, as JSON; as it begins, also what was requested."""
+def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None, lost: Sequence[str] = ()) -> bytes:
+    """What a record says of a run, as JSON; as it begins, also what was requested. `lost`: what was damaged in the
+    record that this one is mended from."""
     from boebot.record.facts import facts_of
 
     said: dict[str, Any] = {
@@ -92,6 +93,7 @@ def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None
         "written": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "arena": next((result.world.description for result in results if result.world is not None), None),
         "robots": [facts_of(result) for result in results],
+        "lost": lost,
     }
     if requested is not None:
         said["request"] = requested

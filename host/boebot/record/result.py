@@ -17,6 +17,7 @@ from boebot.description.robots import RobotDescription
 from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
+from boebot.errors import brief
 from boebot.former_names import CONTACTS, DISTANCE, Figures, FormerNames
 from boebot.link.fields import text
 from boebot.link.messages import DevicesTelemetry, Identity
@@ -129,7 +130,7 @@ class RunResult(FormerNames):
             f"{self.run_time:.1f} s",
             *self.way_in_words(),
             f"seed {self.seed}",
-            "complete" if self.error is None else f"ended early: {textwrap.shorten(why(self.error), 120)}",
+            "complete" if self.error is None else f"{brief(self.error)[0]}: {textwrap.shorten(why(self.error), 120)}",
         ]
         return ", ".join(parts)
 

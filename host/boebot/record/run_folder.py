@@ -122,6 +122,7 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     """
     part = unfinished(path)
     try:
+        part.unlink(missing_ok=True)  # in the folder of a stranger it may be a link to elsewhere
         write(part)
         part.replace(path)
     except OSError as error:

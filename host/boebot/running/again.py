@@ -7,21 +7,23 @@ import math
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
 from boebot.arenas import load_arena
+from boebot.boards import is_live
 from boebot.brain import Brain
 from boebot.brain.composition import composed
-from boebot.errors import BoebotError
-from boebot.record.compare import RowDifference, record_difference
+from boebot.errors import BoebotError, as_utf8
+from boebot.record.compare import EXPECTED, RowDifference, record_difference
 from boebot.record.reading import CutError, attachments_of, read_run
 from boebot.record.recording import BEGIN
 from boebot.record.result import RunResult, TogetherResult, why
 from boebot.running.driver import Progress
 from boebot.running.interventions import Repeated
 from boebot.running.runner import execute
-from boebot.running.sources import arena_file, brain_file
+from boebot.running.sources import arena_file, brain_files, write_copies
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
 
@@ -66,6 +68,22 @@ class Recorded:
     asked: Mapping[str, Any]
     attached: Mapping[str, bytes]
 
+    @cached_property
+    def foreign(self) -> dict[int, dict[str, bytes]]:
+        """Of robots by their numbers, from 1, whose brain is not the file on this computer: what is run in its place,
+        the record's files by name. Raises as `brain_files`."""
+        names = [
+            (number, one["brain"]) for number, one in enumerate(self.asked["members"], 1) if one["brain"] is not None
+        ]
+        found = {n: brain_files(self.attached, Path(name), n, len(self.results)) for n, name in names}
+        return {number: files for number, files in found.items() if files}
+
+    @property
+    def warning(self) -> str:
+        """What `foreign` means, in words."""
+        names = ", ".join(name for files in self.foreign.values() for name in files)
+        return f"the record brings a brain that is not the file on this computer, {names}; it could do all that you may"
+
     @property
     def seconds(self) -> float:
         """How long it was."""
@@ -86,15 +104,21 @@ def recorded(path: Path) -> Recorded:
     """The run in a folder.
 
     Raises:
+        CutError: it is damaged inside.
         BoebotError: it cannot be read or repeated: a real or paced run, or a brain that is neither from a file nor all
             described.
     """
     attached = attachments_of(path)
     results = _robots(read_run(path))
+    error = results[0].error
+    if isinstance(error, CutError) and error.lost:
+        raise CutError(f"{path} cannot be repeated: {error}; expected a record that is not damaged inside", error.lost)
+    if not any(result.record.count("command") for result in results):
+        raise BoebotError(f"there is nothing to compare in {path}: the run has no commands; {EXPECTED}")
     asked = json.loads(attached.get(BEGIN, b"{}")).get("request")
     if asked is None:
         raise BoebotError(f"{path} does not say what was asked for; expected a record of this boebot")
-    if results[0].world is None:
+    if results[0].world is None or is_live(asked["on"] or ""):
         raise BoebotError(f"{path} is of a real robot, whose run cannot be repeated; expected a simulated run")
     if asked["realtime"]:
         raise BoebotError(f"{path} was run in real time, which no run repeats bit by bit; expected one that was not")
@@ -104,19 +128,22 @@ def recorded(path: Path) -> Recorded:
     return Recorded(results, asked, attached)
 
 
-def again(run: Recorded, progress: Progress | None = None) -> Repetition:
-    """Repeats a run.
+def again(run: Recorded, progress: Progress | None = None, *, trust: bool = False) -> Repetition:
+    """Repeats a run. `trust`: also where that is to run Python, or a brain's TOML, that came with the record and is not
+    the file on this computer.
 
     Raises:
-        BoebotError: it cannot be repeated, as a bundled arena has changed.
+        BoebotError: it cannot be repeated, as a bundled arena has changed; there is such a file, and no trust.
         KeyboardInterrupt: Ctrl-C.
     """
+    if run.foreign and not trust:
+        raise BoebotError(f"{run.warning}; expected --trust (trust=True) if you know whose it is")
     with tempfile.TemporaryDirectory() as folder:
-        files = {
-            said["brain"]: str(brain_file(run.attached, Path(said["brain"]), number, len(run.results), Path(folder)))
-            for number, said in enumerate(run.asked["members"], 1)
-            if said["brain"] is not None
-        }
+        files = {said["brain"]: said["brain"] for said in run.asked["members"]}
+        for number, brought in run.foreign.items():
+            name, copies = run.asked["members"][number - 1]["brain"], Path(folder, f"robot-{number}")
+            write_copies(brought, copies)
+            files[name] = str(copies / as_utf8(Path(name).name))
         request = _request(run, files, Path(folder))
         repeated = Repeated([result.record for result in run.results])
         run_all = execute if len(run.results) == 1 else execute_together
@@ -124,7 +151,7 @@ def again(run: Recorded, progress: Progress | None = None) -> Repetition:
     for result in new:
         if isinstance(result.error, KeyboardInterrupt):
             raise result.error
-    return _compared(run, new, {copy: original for original, copy in files.items()})
+    return _compared(run, new, {copy: original for original, copy in files.items() if copy != original})
 
 
 def _robots(result: RunResult | TogetherResult) -> Sequence[RunResult]:

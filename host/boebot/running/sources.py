@@ -8,12 +8,13 @@ Of several robots, names of brain and robot begin with robot-1/, robot-2/ and so
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from boebot import brains
-from boebot.errors import as_utf8
+from boebot.errors import BoebotError, as_utf8
 from boebot.running.driver import Task
 from boebot.running.tasks import Request
 
@@ -32,29 +33,42 @@ def sources(request: Request, tasks: Sequence[Task]) -> dict[str, bytes]:
     return found
 
 
-def brain_file(attached: Mapping[str, bytes], path: Path, number: int, count: int, folder: Path) -> Path:
-    """The file of a brain as it was: it itself where nothing of it has changed, else a copy from the record.
+def brain_files(attached: Mapping[str, bytes], path: Path, number: int, count: int) -> dict[str, bytes]:
+    """The files of a brain as they were, by their names in its folder; none where it is the kit's, or its file on this
+    computer and all that it imported from beside it are still the same.
 
     Args:
         attached: to the record of the run.
         path: of the brain's file then.
         number: of the robot, from 1, of `count`.
-        folder: for copies.
+
+    Raises:
+        BoebotError: the record does not have them, or names one that would land elsewhere.
     """
+    if str(path) in brains.bundled_files():
+        return {}
     prefix = f"{_prefix(number, count)}brain/"
     files = {name.removeprefix(prefix): data for name, data in attached.items() if name.startswith(prefix)}
-    if as_utf8(path.name) not in files or all(_is_same(path.parent / name, data) for name, data in files.items()):
-        return path
-    copies = folder / f"robot-{number}"
-    for name, data in files.items():
-        copy = copies / name
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_bytes(data)
-    return copies / as_utf8(path.name)
+    for name in files:
+        if "\0" in name or {"", ".", ".."} & set(re.split(r"[/\\]", name)):
+            raise BoebotError(f"the record has a file {prefix + name!r}; expected a path below {prefix}")
+    if as_utf8(path.name) not in files:
+        raise BoebotError(f"the record lacks the file of brain {path}; expected {prefix}{as_utf8(path.name)} in it")
+    return {} if all(_is_same(path.parent / name, data) for name, data in files.items()) else files
+
+
+def write_copies(files: Mapping[str, bytes], folder: Path) -> None:
+    """Files of `brain_files`, into an empty folder. Raises BoebotError where they cannot be written."""
+    try:
+        for name, data in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+    except OSError as error:
+        raise BoebotError(f"the record's file {name!r} cannot be written: {error.strerror}") from None
 
 
 def arena_file(attached: Mapping[str, bytes], path: Path, folder: Path) -> Path:
-    """The file of an arena as it was, as of `brain_file`."""
+    """The file of an arena as it was, as of `brain_files`."""
     data = attached.get(as_utf8(f"arena/{path.name}"))
     if data is None or _is_same(path, data):
         return path

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from boebot.errors import BoebotError, did_you_mean, printable
+from boebot.errors import BoebotError, brief, did_you_mean, printable
 from boebot.former_names import FIGURES, refusal
 from boebot.view import figure_file, style, tables
 
@@ -49,7 +49,8 @@ def write(robots: Mapping[int, RunResult], names: Sequence[str], path: Path) -> 
         axes.grid(color=style.GRID, lw=0.7)
         axes.set_facecolor(style.FLOOR)
     panels[-1].set_xlabel("time (s)", color=style.INK, fontsize=9)
-    title = printable("; ".join(dict.fromkeys(f"{one.brain} on {one.robot.name}" for one in robots.values())))
+    titles = (f"{one.brain} on {one.robot.name}" + ", ".join(["", *brief(one.error)]) for one in robots.values())
+    title = printable("; ".join(dict.fromkeys(titles)))
     panels[0].set_title(title, fontsize=12, color=style.INK, parse_math=False)
     return figure_file.save(figure, path, title)
 

@@ -40,6 +40,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from boebot.arenas.floor_plan import floor_plan, moving_solids
 from boebot.devices.laser import Laser
+from boebot.errors import brief
 from boebot.record.brain_record import each_switch
 from boebot.record.parts import Part, events, parts
 from boebot.record.record import KINDS
@@ -346,7 +347,7 @@ def _log(result: RunResult, prefix: str) -> Iterator[Entry]:
     yield from heapq.merge(_events(result, prefix), _switches(result, prefix), key=lambda entry: entry.time_ns)
     said = [(Log.WARNING, notice) for notice in result.notices]
     if result.error is not None:
-        said.append((Log.ERROR, f"ended early: {result.table()['ended']}"))
+        said.append((Log.ERROR, f"{brief(result.error)[0]}: {result.table()['ended']}"))
     for level, sentence in said:
         yield _line(result.run_time, level, f"{prefix}run", sentence)
 

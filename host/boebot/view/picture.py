@@ -12,6 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Affine2D
 
+from boebot.errors import brief
 from boebot.record.figures import counted
 from boebot.view import scene, style, utility_panel
 from boebot.view.arena_drawing import draw_arena, legend_entries
@@ -132,9 +133,7 @@ def _caption(result: RunResult) -> list[str]:
     parts.append(f"seed {result.seed}")
     if result.without:
         parts.append(f"without {counted(len(result.without), 'imperfection', 'imperfections')}")
-    if result.error is not None:
-        parts.append("ended early")
-    return parts
+    return [*parts, *brief(result.error)]
 
 
 def _legend(result: RunResult, view: scene.View) -> list[Artist]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.lines import Line2D
 
+from boebot.errors import brief
 from boebot.record.figures import counted
 from boebot.view import scene, style
 from boebot.view.arena_drawing import draw_arena, legend_entries
@@ -58,14 +59,12 @@ def _title(result: TogetherResult) -> str:
 
 
 def _caption(result: TogetherResult) -> list[str]:
-    parts = [
+    return [
         f"{max(robot.run_time for robot in result.robots):.1f} s",
         f"true distance {sum(robot.true_distance or 0.0 for robot in result.robots):.2f} m in all",
         counted(sum(robot.true_contacts or 0 for robot in result.robots), "true contact", "true contacts"),
+        *brief(result.error),
     ]
-    if result.error is not None:
-        parts.append("ended early")
-    return parts
 
 
 def _legend(shown: list[Shown]) -> list[Artist]:
