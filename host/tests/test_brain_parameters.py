@@ -123,6 +123,8 @@ def test_what_a_process_has_made_of_a_parameter_follows_it() -> None:
         ("avoid.utility.w.tired", 1.0, "brain 'brain' has no parameter 'avoid.utility.w.tired'"),
         ("avoid.turn", 10**400, r"avoid does not take turn = 1000.*\.\.\."),
         ("avoid.turn", {}, "avoid: turn is {}; expected a number"),
+        (3, 0.4, "brain 'brain' has no parameter '3'; expected one that begins with wander"),
+        ("avoid.turn", [object()], "avoid: turn is .*; expected a number"),
         ("avoid.period", -1.0, "avoid: period is -1.0; expected seconds from step to step"),
     ],
 )  # fmt: skip
@@ -141,31 +143,20 @@ def test_a_brain_that_is_none_of_processes_has_no_parameters() -> None:
         boebot.run(mind(), parameters=3)  # type: ignore[arg-type]
 
 
-def test_robots_that_have_a_parameter_get_it_or_one_of_them() -> None:
-    members = [Member(brain=mind(), robot="arsim"), Member(brain="wander"), Member(brain=mind(), robot="arsim")]
-    request = Request(members=members, parameters={"avoid.turn": 0.3, "3:avoid.turn": 0.2, "1:wander.turn": 0.1})
-    assert [task.parameters for task in request.tasks()] == [
-        {"avoid.turn": 0.3, "wander.turn": 0.1},
-        {},
-        {"avoid.turn": 0.2},
-    ]
-    with pytest.raises(
-        BoebotError, match=r"brain 'brain' or 'wander' has no parameter '2:avoid\.turn'; .*did you mean"
-    ):
-        Request(members=members, parameters={"2:avoid.turn": 0.3}).tasks()
-    own = [Member(brain=mind(), robot="arsim", parameters={"avoid.turn": 0.1}), Member(brain="wander", parameters={})]
-    assert Request(members=own).tasks()[0].parameters == {"avoid.turn": 0.1}
-    with pytest.raises(BoebotError, match=r"robot 1: avoid: turn is 9.0; expected a motor signal"):
-        Request(members=[Member(brain=mind(), parameters={"avoid.turn": 9}), Member()]).tasks()
+def test_each_robot_has_its_own() -> None:
+    members = [Member(brain=mind(), parameters={"avoid.turn": turn}) for turn in (0.1, 0.2)]
+    assert [task.parameters for task in Request(members=members).tasks()] == [{"avoid.turn": 0.1}, {"avoid.turn": 0.2}]
+    with pytest.raises(BoebotError, match=r"robot 2: brain 'wander' has no parameter 'avoid\.turn'"):
+        Request(members=[members[0], Member(parameters={"avoid.turn": 0.1})]).tasks()
 
 
 def test_the_command_line_reads_values_as_toml_or_texts() -> None:
-    given = ["a.b=0.4", "a.c=.5", "a.d=left", "a.e=[1, 2.5]", "a.f=true", "a.g=1e-3", "a.h=", "a.w.x=-2"]
+    given = ["a.b=0.4", "a.c=.5", "a.d=left", "a.e=[1, 2.5]", "a.f=true", "a.g=1e-3", "a.h=", "a.w.x=-2", "2:a.i=a=b"]
     values = {"a.b": 0.4, "a.c": 0.5, "a.d": "left", "a.e": [1, 2.5], "a.f": True, "a.g": 1e-3, "a.h": "", "a.w.x": -2}
-    assert _assigned(given) == values
-    for wrong in (["a.b"], ["a.b=1", "a.b=2"]):
-        with pytest.raises(BoebotError, match="expected NAME=VALUE once"):
-            _assigned(wrong)
+    assert _assigned(given, 2) == [values, values | {"a.i": "a=b"}]
+    for wrong in (["a.b"], ["a.b=1", "a.b=2"], ["3:a.b=1"], ["a.b=1", "2:a.b=1"]):
+        with pytest.raises(BoebotError, match=f"--set {wrong[-1]}; expected NAME=VALUE or N:NAME=VALUE, once for each"):
+            _assigned(wrong, 2)
 
 
 # ---- the record --------------------------------------------------------------------------------------------------

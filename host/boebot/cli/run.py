@@ -88,7 +88,7 @@ def run(
             "--set",
             metavar="NAME=VALUE",
             help="A parameter of a brain of processes for this run: avoid.turn=0.4, avoid.utility.w.near=2, ... Of "
-            "several robots all that have it, or one: 2:avoid.turn=0.4.",
+            "several robots of each, or of one: 2:avoid.turn=0.4.",
         ),
     ] = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
@@ -145,6 +145,7 @@ def run(
     ideal = options.names(without)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
+    assigned = _assigned(parameters or [], count)
     request = Request(
         members=[
             Member(
@@ -153,6 +154,7 @@ def run(
                 pose=poses[index] if index < len(poses) else None,
                 period=period,
                 without=ideal,
+                parameters=assigned[index],
             )
             for index in range(count)
         ],
@@ -164,7 +166,6 @@ def run(
         step_timeout=step_timeout,
         force_timing=force_timing,
         pins=pins,
-        parameters=_assigned(parameters or []),
     )
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
@@ -195,27 +196,28 @@ def run(
 run.__doc__ = _HELP
 
 
-def _assigned(texts: list[str]) -> dict[str, Any]:
-    """Of "NAME=VALUE", the value as in TOML; what is none there is a text.
+def _assigned(texts: list[str], count: int) -> list[dict[str, Any]]:
+    """Of "NAME=VALUE" or "2:NAME=VALUE" for each of so many robots; a value is as in TOML, what is none there a text.
 
     Raises:
-        BoebotError: one is no such thing, or names a parameter again.
+        BoebotError: one is no such thing, or comes twice.
     """
-    found: dict[str, Any] = {}
+    robots: dict[str, dict[str, Any]] = {str(number): {} for number in range(1, count + 1)}
     for one in texts:
-        name, sign, text = one.partition("=")
-        if not sign or name in found:
-            wrong = f"comes after {name}={found[name]}" if name in found else "sets nothing"
-            raise BoebotError(f"--set {one} {wrong}; expected NAME=VALUE once, as avoid.turn=0.4")
-        for read in (_toml, float, str):
+        place, sign, text = one.partition("=")
+        number, _, name = place.rpartition(":")
+        meant = [values for robot, values in robots.items() if number in ("", robot)]
+        if not sign or not meant or any(name in values for values in meant):
+            raise BoebotError(
+                f"--set {one}; expected NAME=VALUE or N:NAME=VALUE, once for each robot from 1 to {count}"
+            )
+        for read in (lambda text: tomllib.loads(f"value = {text}")["value"], float, str):
             with contextlib.suppress(ValueError):
-                found[name] = read(text)
+                value = read(text)
                 break
-    return found
-
-
-def _toml(text: str) -> Any:
-    return tomllib.loads(f"value = {text}")["value"]
+        for values in meant:
+            values[name] = value
+    return list(robots.values())
 
 
 def _check_alone(context: typer.Context) -> None:

@@ -51,7 +51,8 @@ class _Place(NamedTuple):
     @property
     def declared(self) -> Any:
         """The type of the field, as the class says it."""
-        return self.process.__dataclass_fields__[self.field].type
+        kind = self.process.__dataclass_fields__[self.field].type
+        return getattr(kind, "__name__", kind)
 
     @property
     def is_slider(self) -> bool:
@@ -59,7 +60,7 @@ class _Place(NamedTuple):
         the utility lacks."""
         is_number = isinstance(self.value, float | int) and not isinstance(self.value, bool)
         is_lacking = self.part.startswith("w.") and self.part[2:] not in self.process.utility.w
-        is_free = self.field != "period" and self.declared not in ("int", int) and not is_lacking
+        is_free = self.field != "period" and self.declared != "int" and not is_lacking
         return is_free and is_number and math.isfinite(self.value)
 
 
@@ -96,7 +97,7 @@ def set_parameters(brain: LoadedBrain, values: Mapping[str, Any]) -> None:
     changed: dict[str, tuple[Process, dict[str, Any]]] = {}  # fields, by the process's name
     for name, value in values.items():
         if name not in places:
-            raise unknown(name, places, repr(brain.name))
+            raise _unknown(str(name), places, brain.name)
         process, field, _ = places[name]
         _, fields = changed.setdefault(process.name, (process, {}))
         fields[field] = _changed(places[name], value, fields.get("utility", process.utility))
@@ -119,14 +120,14 @@ def in_force(brain: LoadedBrain, values: Mapping[str, Any]) -> Iterator[None]:
         set_parameters(brain, before)
 
 
-def unknown(name: str, known: Collection[str], where: str) -> BrainError:
-    """The sentence about a name that is none of the `known` ones of a brain."""
+def _unknown(name: str, known: Collection[str], brain: str) -> BrainError:
+    """The sentence about a name that is none of the `known` ones."""
     beginnings = dict.fromkeys(f"{one.partition('.')[0]}." for one in known)
     begun = [one for one in known if one.startswith(f"{name.partition('.')[0]}.")]
     expected = f"one of {', '.join(begun)}" if begun else f"one that begins with {', '.join(beginnings)}"
     if not known:
         expected = "a Brain of processes: others have none by name"
-    return BrainError(f"brain {where} has no parameter {name!r}; expected {expected}{did_you_mean(name, known)}")
+    return BrainError(f"brain {brain!r} has no parameter {name!r}; expected {expected}{did_you_mean(name, known)}")
 
 
 def _types(kind: type[Process]) -> Mapping[str, Any]:
@@ -143,14 +144,18 @@ def _changed(place: _Place, value: Any, utility: Utility) -> Any:
     key, _, variable = part.partition(".")
     plain = value.tolist() if hasattr(value, "tolist") else value  # numpy's
     try:
-        fitting = msgspec.convert(plain, float if part else _types(type(process)).get(field, _PLAIN))
+        fitting = msgspec.convert(
+            msgspec.to_builtins(plain), float if part else _types(type(process)).get(field, _PLAIN)
+        )
         change: dict[str, Any] = {"w": {**utility.w, variable: fitting}} if variable else {key: fitting}
         return dataclasses.replace(utility, **change) if part else fitting
     except (msgspec.ValidationError, TypeError, OverflowError):
         if part:
             raise BrainError(f"{process.name}: utility.{part} is {shown(value)}; expected a number") from None
         _check(process, {field: plain})  # its own sentence says more
-        raise BrainError(f"{process.name}: {field} is {shown(value)}; expected {place.declared}") from None
+        raise BrainError(
+            f"{process.name}: {field} is {shown(value)}; expected {place.declared}, as a TOML file can have it"
+        ) from None
     except BrainError as error:
         raise BrainError(f"{process.name}: {error}") from None
 

@@ -18,7 +18,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError
 from boebot.robot import Equipment
 from boebot.running.board_driver import check_time_to_live
-from boebot.running.brain_parameters import in_force, parameters, unknown
+from boebot.running.brain_parameters import in_force, parameters
 from boebot.running.driver import Task
 from boebot.timing import realisable
 
@@ -71,7 +71,6 @@ class Request(_NamesFiles):
         members: the robots; several share one simulated world.
         arena, on, seconds, seed, realtime, step_timeout, force_timing, pins: as of `boebot.run`.
         record: what happens is recorded.
-        parameters: of brains, by name: of all robots that have it, or, as in "2:avoid.turn", of that one.
     """
 
     members: Sequence[Member]
@@ -84,7 +83,6 @@ class Request(_NamesFiles):
     force_timing: bool = False
     record: bool = True
     pins: bool = False
-    parameters: Mapping[str, Any] | None = None
 
     @classmethod
     def single(
@@ -95,10 +93,12 @@ class Request(_NamesFiles):
         pose: tuple[float, float, float] | None = None,
         period: float | None = None,
         without: Sequence[str] = (),
+        parameters: Mapping[str, Any] | None = None,
         **others: Any,
     ) -> Request:
         """Of one robot: what a `Member` has, and `others` of the attributes above."""
-        return cls(members=[Member(brain=brain, robot=robot, pose=pose, period=period, without=without)], **others)
+        member = Member(brain=brain, robot=robot, pose=pose, period=period, without=without, parameters=parameters)
+        return cls(members=[member], **others)
 
     def check(self) -> None:
         """Raises BoebotError where one of them is wrong."""
@@ -120,8 +120,6 @@ class Request(_NamesFiles):
             raise BoebotError("there is no robot to run; expected at least one Member")
         for member in self.members:
             expect("members", member, "a list of boebot.Member", Member)
-        for values in (self.parameters, *(member.parameters for member in self.members)):
-            expect("parameters", values, 'values by name, as in {"avoid.turn": 0.4}', Mapping, type(None))
 
     def said(self, tasks: Sequence[Task]) -> dict[str, Any]:
         """What a record says of it, as values of JSON, so that the run can be repeated (boebot.running.again); `tasks`:
@@ -160,30 +158,12 @@ class Request(_NamesFiles):
                 tasks.append(_task(member, self, number))
             except BoebotError as error:
                 raise of_robot(error, number, len(self.members)) from None
-        for number, values in enumerate(self._parameters(tasks), 1):
-            try:
-                tasks[number - 1] = _with_parameters(tasks[number - 1], values)
-            except BoebotError as error:
-                raise of_robot(error, number, len(tasks)) from None
         kind = default_board([task.request.robot for task in tasks]) if self.on is None else self.on
         if self.pins and (is_live(kind) or not any(task.request.robot.has_board for task in tasks)):
             raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
         if len(tasks) == 1:
             return [replace(tasks[0], on=kind)]
         return [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
-
-    def _parameters(self, tasks: Sequence[Task]) -> list[dict[str, Any]]:
-        """What is to be set in each robot's brain."""
-        given = [dict(member.parameters or {}) for member in self.members]
-        for name, value in (self.parameters or {}).items():
-            number, _, own = name.rpartition(":")
-            known = [parameters(task.brain) if number in ("", str(n)) else {} for n, task in enumerate(tasks, 1)]
-            if not any(own in names for names in known):
-                brains_here = dict.fromkeys(repr(task.brain.name) for task in tasks)
-                raise unknown(name, [key for task in tasks for key in parameters(task.brain)], " or ".join(brains_here))
-            for values, names in zip(given, known, strict=True):
-                values.update({own: value} if own in names else {})
-        return given
 
 
 def _brain_file(loaded: LoadedBrain) -> str | None:
@@ -206,10 +186,15 @@ def of_robot(error: BaseException, number: int, count: int) -> BaseException:
 def _task(member: Member, request: Request, number: int) -> Task:
     """The run of the `number`-th robot, from 1."""
     expect("seed", member.seed, "a whole number or None", Integral, type(None))
+    expect("parameters", member.parameters, 'values by name, as in {"avoid.turn": 0.4}', Mapping, type(None))
+    given = member.parameters or {}
     loaded, description, period_s = prepare(member.brain, member.robot, member.period)
     verdict = realisable.judge(description, period_s, board=realisable.of_image(description))
     if not request.force_timing:
         realisable.check(verdict)
+    with in_force(loaded, given):
+        now = parameters(loaded)
+        made_of = None if loaded.brain is None else described(loaded.brain)
     board = BoardRequest(
         robot=description,
         arena=None if request.arena is None else str(request.arena),
@@ -228,6 +213,8 @@ def _task(member: Member, request: Request, number: int) -> Task:
         seconds=request.seconds,
         period_s=period_s,
         step_timeout_s=request.step_timeout,
+        parameters={name: now[name] for name in given},
+        made_of=made_of,
         brain_seed=request.seed + number - 1 if member.seed is None else member.seed,
         unrealisable=None if verdict.is_realisable else verdict.sentence,
     )
@@ -254,14 +241,6 @@ def prepare(
             f"brain {loaded.name!r} needs {' and '.join(missing)}, which robot {description.name!r} does not have"
         )
     return loaded, description, period_s
-
-
-def _with_parameters(task: Task, values: Mapping[str, Any]) -> Task:
-    """The task with these parameters of its brain, which are checked, and with what that is made of then."""
-    with in_force(task.brain, values):
-        now, brain = parameters(task.brain), task.brain.brain
-        made_of = None if brain is None else described(brain)
-        return replace(task, parameters={name: now[name] for name in values}, made_of=made_of)
 
 
 def expect(name: str, value: object, expected: str, *kinds: type) -> None:
