@@ -193,6 +193,7 @@ setup(
     package_data={
         "": ["py.typed", "*.pyi", "*.html", "*.css", "*.js"],
         "boebot.brains": ["*.toml"],
+        "boebot.imperfections": ["*.toml"],
         "boebot.arenas.bundled": ["*.toml", "*.json"],
     },
     include_package_data=False,

@@ -6,7 +6,7 @@ A test builds an arena, puts a robot with its own description into it, and speak
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -80,6 +80,7 @@ def circle(
     *,
     noise: bool = False,
     seed: int = 1,
+    imperfections: Mapping[str, float] | None = None,
 ) -> Iterator[CircleRig]:
     """The robot (boebot) in the arena, its board greeted and armed."""
     description = load_robot("boebot") if robot is None else robot
@@ -87,7 +88,7 @@ def circle(
     board = (
         avr_board(avr_image(description.pin_map)) if url == "avr" else native_board(native_library(description.pin_map))
     )
-    rig = CircleRig(SimSession(sim.add(board, description, pose=pose), url, alone(sim)))
+    rig = CircleRig(SimSession(sim.add(board, description, pose=pose, imperfections=imperfections), url, alone(sim)))
     with rig:
         rig.start()
         yield rig

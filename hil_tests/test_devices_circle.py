@@ -20,8 +20,6 @@ from boebot.link.messages import CompassStatus
 from hil_tests.circle import CircleRig, arena_of, block, circle, robot_of, wall_at
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from reading import read
-from sim_bridge.devices import compass as compass_model
-from sim_bridge.devices import light as light_model
 from sim_bridge.robots import imperfections
 
 pytestmark = pytest.mark.emulated
@@ -95,12 +93,12 @@ def test_analog_infrared_holds_its_value_until_the_next_measurement(board_url: s
 
 def decay_us(x: float, y: float, heading: float, lamps: list[Light]) -> float:
     """1.5 ms at L = 1; L = ambient + sum P max(0, cos theta) / (d0^2 + d^2) (world/sensors/light.h)."""
-    light = light_model.LIGHT_AMBIENT
+    light = imperfections.AS_BUILT["light_ambient"]
     for lamp in lamps:
         dx, dy = lamp.x_m - x, lamp.y_m - y
         d = math.hypot(dx, dy)
         facing = max(0.0, math.cos(math.atan2(dy, dx) - heading))
-        light += lamp.power_w * facing / (light_model.LIGHT_NEAR_M**2 + d * d)
+        light += lamp.power_w * facing / (imperfections.AS_BUILT["light_near_m"] ** 2 + d * d)
     return 1500.0 / light
 
 
@@ -196,9 +194,9 @@ def test_compass_gives_the_heading_of_the_placed_robot(board_url: str) -> None:
 def test_a_turn_finds_the_compass_of_this_unit(board_url: str, seed: int) -> None:
     """The circle's centre is the robot's iron; what remains is the bias of the mounting, the same at each heading."""
     draw = imperfections.Draw(seed, noise=True, robot=0)
-    bias = compass_model.COMPASS_BIAS_RAD * draw(61, 0)
-    iron = compass_model.COMPASS_IRON * math.hypot(draw(61, 1), draw(61, 2))
-    counts = compass_model.COMPASS_HORIZONTAL_G * 1090
+    bias = draw["compass_bias_rad"] * draw(61, 0)
+    iron = draw["compass_iron"] * math.hypot(draw(61, 1), draw(61, 2))
+    counts = draw["compass_horizontal_g"] * 1090
     with circle(board_url, arena_of(), noise=True, seed=seed) as rig:
         reported = fields_over_a_turn(rig)
         centre = float(np.mean([t.compass_x for t in reported])), float(np.mean([t.compass_y for t in reported]))

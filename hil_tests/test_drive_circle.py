@@ -18,9 +18,7 @@ from boebot.link import messages
 from hil_tests.circle import CircleRig, arena_of, circle, robot_of
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from reading import read
-from sim_bridge.devices import battery as battery_model
-from sim_bridge.devices import servo as servo_model
-from sim_bridge.robots import imperfections
+from sim_bridge.robots.imperfections import AS_BUILT
 
 pytestmark = pytest.mark.emulated
 
@@ -35,7 +33,7 @@ def wheel_speed(robot: RobotDescription, share: float, force: float) -> float:
     (3.15) gives up to hold `force` (N, at each rim)."""
     radius = robot.body.wheel_radius_m
     free = 51.25 * 2 * math.pi / 60 * math.tanh(200 / 78.5) * radius * share
-    return free - force * radius / servo_model.SERVO_GAIN_N_S
+    return free - force * radius / AS_BUILT["servo_gain_n_s"]
 
 
 def drag_of(robot: RobotDescription) -> float:
@@ -48,7 +46,7 @@ def drag_of(robot: RobotDescription) -> float:
 def drawn_by_servos(speed: float, force: float, radius: float) -> float:
     """Amperes of both: idle, by speed, and by torque."""
     torque = force * radius
-    return 2 * (0.015 + battery_model.SERVO_RUN_A_S_M * speed + battery_model.SERVO_A_PER_N_M * torque)
+    return 2 * (0.015 + AS_BUILT["servo_run_a_s_m"] * speed + AS_BUILT["servo_a_per_n_m"] * torque)
 
 
 def supply_of(robot: RobotDescription) -> Supply:
@@ -75,7 +73,7 @@ def test_battery_sags_while_the_boebot_drives_and_its_wheels_slow_down(board_url
     pack, drag = supply_of(robot), drag_of(robot)
     with circle(board_url, arena_of()) as rig:
         battery = BatteryDivider(pin="A0")
-        idle = pack.full_v - pack.resistance_ohm * battery_model.BOARD_A
+        idle = pack.full_v - pack.resistance_ohm * AS_BUILT["board_a"]
         assert idle == pytest.approx(5.3)
         reported = read(battery, "battery", rig.devices(after_s=0.3))
         assert reported.valid and reported.voltage == pytest.approx(
@@ -85,7 +83,7 @@ def test_battery_sags_while_the_boebot_drives_and_its_wheels_slow_down(board_url
         for _ in range(20):
             speed = wheel_speed(robot, volts / 5.0, 0.0)
             speed = wheel_speed(robot, volts / 5.0, drag * speed / 2)
-            amperes = battery_model.BOARD_A + drawn_by_servos(speed, drag * speed / 2, robot.body.wheel_radius_m)
+            amperes = AS_BUILT["board_a"] + drawn_by_servos(speed, drag * speed / 2, robot.body.wheel_radius_m)
             volts = pack.full_v - pack.resistance_ohm * amperes
         assert volts == pytest.approx(4.6, abs=0.05), "what was measured on a robot"
         rig.drive_for(1.0, 1.0, 2.0)
@@ -111,7 +109,7 @@ def test_an_empty_pack_switches_the_motors_off(board_url: str) -> None:
     """Alone the board has 4.9 V; with the servos' current the pack falls below the parameter's minimum: latched."""
     robot = robot_of(supply={"full_v": 4.0 + 0.2, "empty_v": 3.0})
     with circle(board_url, arena_of(), robot) as rig:
-        assert rig.robot.supply_voltage == pytest.approx(4.2 - 2.5 * battery_model.BOARD_A, abs=0.01)
+        assert rig.robot.supply_voltage == pytest.approx(4.2 - 2.5 * AS_BUILT["board_a"], abs=0.01)
         rig.drive_for(1.0, 1.0, 0.6)
         now = rig.latest()
         assert now.latch == messages.Latch.SUPPLY_LOW
@@ -153,12 +151,11 @@ def test_brown_out_switches_the_motors_off_and_the_link_comes_back(board_url: st
 
 
 def edges_shown_and_true(
-    url: str, monkeypatch: pytest.MonkeyPatch, missed: float, extra: float, *, every_edge: bool = False
+    url: str, missed: float, extra: float, *, every_edge: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """Of both wheels, over 20 s at full speed. `every_edge`: also such as follow each other faster than a wheel's."""
-    monkeypatch.setitem(imperfections.parameters(), "ENCODER_MISSED", missed)
-    monkeypatch.setitem(imperfections.parameters(), "ENCODER_EXTRA", extra)
-    with circle(url, arena_of(), load_robot("shieldbot"), noise=True, seed=5) as rig:
+    chances = {"encoder_missed": missed, "encoder_extra": extra}
+    with circle(url, arena_of(), load_robot("shieldbot"), noise=True, seed=5, imperfections=chances) as rig:
         if every_edge:
             rig.set("encoder_gap", 0)
         before = rig.latest()
@@ -169,22 +166,22 @@ def edges_shown_and_true(
         return np.array(shown), np.array([body.wheel_left, body.wheel_right]) * EDGES / (2 * math.pi)
 
 
-def test_encoders_count_each_edge(board_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    shown, true = edges_shown_and_true(board_url, monkeypatch, 0.0, 0.0)
+def test_encoders_count_each_edge(board_url: str) -> None:
+    shown, true = edges_shown_and_true(board_url, 0.0, 0.0)
     assert np.all(np.abs(shown - true) <= 1.0)
 
 
-def test_encoders_with_missed_edges_count_less(board_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_encoders_with_missed_edges_count_less(board_url: str) -> None:
     """A pulse is lost with probability p for each edge that would begin it: a share 2 p / (1 + p) of the edges."""
-    shown, true = edges_shown_and_true(board_url, monkeypatch, 0.1, 0.0)
+    shown, true = edges_shown_and_true(board_url, 0.1, 0.0)
     assert shown.sum() / true.sum() == pytest.approx(1 - 2 * 0.1 / 1.1, abs=0.03)
 
 
-def test_extra_edges_of_encoders_count_if_every_edge_does(board_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_extra_edges_of_encoders_count_if_every_edge_does(board_url: str) -> None:
     """Each flicker adds two edges."""
-    shown, true = edges_shown_and_true(board_url, monkeypatch, 0.0, 0.1, every_edge=True)
+    shown, true = edges_shown_and_true(board_url, 0.0, 0.1, every_edge=True)
     assert shown.sum() / true.sum() == pytest.approx(1 + 2 * 0.1 * FLICKERS_SEEN, abs=0.03)
-    shown, true = edges_shown_and_true(board_url, monkeypatch, 0.0, 0.1)
+    shown, true = edges_shown_and_true(board_url, 0.0, 0.1)
     assert np.all(np.abs(shown - true) <= 1.0)
 
 

@@ -11,7 +11,8 @@ from typing import Any
 
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices import servo as servo_model
+from sim_bridge.devices.servo import RPM
+from sim_bridge.robots.imperfections import AS_BUILT
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct
 
 
@@ -131,23 +132,23 @@ class ServoMotor:
 
 
 def servo_parameters(where: str, changes: Any, mount: int = 1, wheel_radius: float = 0.0331) -> Any:
-    """C struct of the nominal servo with `changes`; values and sources are those of robots/imperfections.py."""
-    top = servo_model.SERVO_TOP_RPM * servo_model.RPM
+    """C struct of the nominal servo with `changes`; magnitudes as in the table of imperfections."""
+    top = AS_BUILT["servo_top_rpm"] * RPM
     usual = {
         "mount": mount,
         "wheel_radius": wheel_radius,
         "centre_us": 1500.0,
-        "dead_band_us": servo_model.SERVO_DEAD_BAND_US,
+        "dead_band_us": AS_BUILT["servo_dead_band_us"],
         "top_ccw_rad_s": top,
-        "scale_ccw_us": servo_model.SERVO_SCALE_US,
+        "scale_ccw_us": AS_BUILT["servo_scale_us"],
         "top_cw_rad_s": top,
-        "scale_cw_us": servo_model.SERVO_SCALE_US,
-        "lag_s": servo_model.SERVO_LAG_S,
+        "scale_cw_us": AS_BUILT["servo_scale_us"],
+        "lag_s": AS_BUILT["servo_lag_s"],
         "motor": {
-            "gain_n_s": servo_model.SERVO_GAIN_N_S,
-            "torque_maximum_n_m": servo_model.SERVO_TORQUE_N_M,
-            "coast_n_s": servo_model.SERVO_COAST_N_S,
-            "coast_maximum_n_m": servo_model.SERVO_COAST_N_M,
+            "gain_n_s": AS_BUILT["servo_gain_n_s"],
+            "torque_maximum_n_m": AS_BUILT["servo_torque_n_m"],
+            "coast_n_s": AS_BUILT["servo_coast_n_s"],
+            "coast_maximum_n_m": AS_BUILT["servo_coast_n_m"],
         },
     }
     return struct("servo_motor_parameters", where, changes, usual)

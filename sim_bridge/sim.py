@@ -27,7 +27,7 @@ from sim_bridge import saved
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
-from sim_bridge.robots import imperfections, switches
+from sim_bridge.robots.imperfections import Draw, applied, body_parameters
 from sim_bridge.robots.outline import collision_outline
 from sim_bridge.robots.wiring import done, join
 from sim_bridge.vehicle import ENDS, VehicleModel
@@ -75,8 +75,8 @@ class Member:
 
     board: EmulatedBoard | None
     description: robots.RobotDescription
+    """with the imperfections that it was added with"""
     pose: Pose
-    without: tuple[str, ...]
     model: VehicleModel | None
     """of a robot without a board"""
 
@@ -164,18 +164,20 @@ class Sim:
         pose: Pose | None = None,
         number: int | None = None,
         without: Sequence[str] = (),
+        imperfections: Mapping[str, float] | None = None,
     ) -> SimRobot:
         """Puts a robot at `pose` (x, y, heading; m, m, rad), or where the arena says.
 
         `number` is its name in the run and the key of its noise and its imperfections: the next one if None.
-        `without`: its imperfections that are switched off (robots/switches.py). `board` is None for a robot whose
-        description has none: it gets motor signals, and gives readings once every world step.
+        `without`: its imperfections that are switched off, `imperfections`: magnitudes of others by name
+        (robots/imperfections.py). `board` is None for a robot whose description has none: it gets motor signals, and
+        gives readings once every world step.
 
         Raises:
             ArenaError: that place is not free.
             RobotError: a description that is none of a robot without a board.
-            BoardError: the number is taken or negative, there are too many robots, no such imperfection, or the
-                simulation runs already.
+            BoardError: the number is taken or negative, there are too many robots, an imperfection is none or out of
+                its range, or the simulation runs already.
         """
         if self.cycle:
             raise BoardError("the simulation runs already; expected all of its robots before")
@@ -183,8 +185,7 @@ class Sim:
             raise BoardError(
                 f"got {shown(board)} and {shown(description)}; expected a board or None, and a description"
             )
-        if isinstance(without, str) or not all(isinstance(name, str) for name in without):
-            raise BoardError(f"without is {shown(without)}; expected a list of names")
+        description = applied(description, without, imperfections, noise=self.noise)
         if number is None:
             number = max(self.members, default=-1) + 1
         number = whole("robot number", number, BoardError, least=0, most=NUMBER_MAXIMUM)
@@ -199,9 +200,9 @@ class Sim:
             raise BoardError(f"robot {description.name!r} {has}; expected one that fits what it is added with")
         pose = self.arena.start if pose is None else checked_pose(f"arena {self.arena.name}: a robot's pose", pose)
         if board is None:
-            self._add_vehicle(number, description, pose, without)
+            self._add_vehicle(number, description, pose)
         else:
-            self._add_robot(number, board, description, pose, without)
+            self._add_robot(number, board, description, pose)
         return self.robot(number)
 
     def _add_robot(
@@ -210,34 +211,31 @@ class Sim:
         board: EmulatedBoard,
         description: robots.RobotDescription,
         pose: Pose,
-        without: Sequence[str],
     ) -> None:
-        draw = imperfections.Draw(self.seed, self.noise, number, description.unit, without)
+        draw = Draw(self.seed, self.noise, number, description.unit, description.imperfections)
         corners = description.body.outline_m
         outline = collision_outline(f"robot {description.name!r}: body.outline_m", corners) if corners else ffi.NULL
         self._outlines.append(outline)  # bodies in C point to them
-        body = imperfections.body_parameters(description.body, draw, outline)
+        body = body_parameters(description.body, draw, outline)
         status = lib.sim_add_robot(self.handle, number, board.address, body, *pose)
         self._check_place(status, pose)
         done(status, f"the {board.description}")
-        self.members[number] = Member(board, description, pose, tuple(without), None)
+        self.members[number] = Member(board, description, pose, None)
         self._take(board)
-        join(self.handle, number, switches.idealised(description, without), draw)
+        join(self.handle, number, description, draw)
 
     def _take(self, board: EmulatedBoard) -> None:
         """From now on this simulation runs it."""
         me = weakref.ref(self)
         board.is_in_use = lambda: (sim := me()) is not None and sim._handle is not None
 
-    def _add_vehicle(
-        self, number: int, description: robots.RobotDescription, pose: Pose, without: Sequence[str]
-    ) -> None:
-        model = vehicle_model(description, dt=self._step_cycles / CLOCK_HZ, noise=self.noise, without=without)
+    def _add_vehicle(self, number: int, description: robots.RobotDescription, pose: Pose) -> None:
+        model = vehicle_model(description, dt=self._step_cycles / CLOCK_HZ, noise=self.noise)
         status = lib.sim_add_vehicle(self.handle, number, model.handle, *pose)
         self._check_place(status, pose)
         done(status, f"robot {description.name!r}")
         model.in_use = True
-        self.members[number] = Member(None, description, pose, tuple(without), model)
+        self.members[number] = Member(None, description, pose, model)
 
     def _check_place(self, status: int, pose: Pose) -> None:
         if status == lib.SIM_NOT_FREE:
@@ -418,7 +416,7 @@ class Sim:
             for number, member in self.members.items():
                 board = None if member.board is None else member.board.again()
                 try:
-                    fresh.add(board, member.description, pose=member.pose, number=number, without=member.without)
+                    fresh.add(board, member.description, pose=member.pose, number=number)
                 except Exception:
                     if board is not None:
                         board.close()
@@ -450,7 +448,7 @@ class Sim:
                 saved.SavedRobot(
                     number=number,
                     name=member.description.name,
-                    built=saved.fingerprint_of(member.description, member.pose, member.without),
+                    built=saved.fingerprint_of(member.description, member.pose),
                     firmware="" if member.board is None else member.board.firmware,
                     waiting=lib.sim_waiting(self.handle, number),
                 )

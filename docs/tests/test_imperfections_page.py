@@ -1,4 +1,4 @@
-"""docs/reference/imperfections.md says what the code has: every parameter, its value, and its switch."""
+"""docs/reference/imperfections.md has every row of the table of imperfections; without all of them a robot is ideal."""
 
 from __future__ import annotations
 
@@ -12,88 +12,61 @@ import pytest
 import boebot
 from boebot.description.robots import load_robot
 from boebot.devices.device import Sensor, VehicleDevice, kinds
-from sim_bridge.robots import imperfections
-from sim_bridge.robots.switches import switches
+from boebot.imperfections import Imperfection, imperfections, switches
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "reference" / "imperfections.md").read_text()
-NUMBER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?(?:e-?\d+)?)( %)?")
+PAGE = (ROOT / "docs" / "reference" / "imperfections.md").read_text(encoding="utf-8")
 HEADERS = "\n".join(path.read_text() for path in sorted((ROOT / "sim_bridge" / "world").rglob("*.h")))
-Row = tuple[tuple[str, ...], list[float], str]
+KINDS = {kind.__struct_config__.tag: kind for kind in kinds()}
 
 
-def rows() -> list[Row]:
-    """Parameters, the numbers of nominal value and spread, and what is said of switching it off, of each row."""
-    found = []
-    for line in PAGE.splitlines():
-        cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if not line.startswith("| ") or "`" not in line:
-            continue
-        parameter = next(index for index, cell in enumerate(cells) if cell.startswith("`"))
-        values = " ".join(cells[1 : parameter - 1])  # between what it is and where it is from
-        numbers = [float(number) / (100 if percent else 1) for number, percent in NUMBER.findall(values)]
-        off = cells[parameter + 1] if len(cells) > parameter + 1 else ""
-        found.append((tuple(re.findall(r"`([\w.]+)`", cells[parameter])), numbers, off))
-    return found
+def line(row: Imperfection) -> str:
+    """The row as the page has it."""
+    value = "–" if row.value is None else f"{row.value:g}"
+    off = f"`{row.switch}`" + (f": {row.neutral:g}" if row.neutral else "") if row.switch else "–"
+    cells = (f"`{row.name}`", value, row.unit or "–", row.what, row.drawn or "–", off, row.source)
+    return f"| {' | '.join(cells)} |"
 
 
-KINDS = {kind.__name__: kind for kind in (Sensor, *kinds())}
+def without_board(row: Imperfection) -> bool:
+    return all(issubclass(KINDS.get(kind, object), VehicleDevice) for kind in row.of)
 
 
-CONSTANTS = imperfections.parameters()
+def test_the_page_has_the_table() -> None:
+    """Robots with a board and their bodies first; then those without one."""
+    rows = sorted(imperfections().values(), key=without_board)
+    assert [said for said in PAGE.splitlines() if said.startswith("| `")] == [line(row) for row in rows]
 
 
-def value(name: str) -> tuple[float, ...]:
-    """Of a parameter in the code, as a tuple."""
-    if name.startswith("supply."):
-        return (float(getattr(load_robot("shieldbot").supply, name.removeprefix("supply."))),)
-    if "." in name:
-        struct, key = name.split(".")
-        fields = {field.name: field.default for field in msgspec.structs.fields(KINDS[struct])}
-        return (float(fields[key]),)
-    if name in CONSTANTS:
-        found = CONSTANTS[name]
-        return found if isinstance(found, tuple) else (float(found),)
-    (defined,) = re.findall(rf"^#define {name} ([\d.e-]+)", HEADERS, re.MULTILINE)
-    return (float(defined),)
+def test_the_page_has_every_switch() -> None:
+    assert set(switches()) == {row.switch for row in imperfections().values() if row.switch}
+    assert all(len(name) <= 20 and len(what) <= 80 for name, what in switches().items())
 
 
-ROWS = rows()
+def test_defaults_are_those_of_the_keys_in_robots_files() -> None:
+    """What a robot's own file says has its default there, in the device; the table must not say another."""
+    noisy = set()
+    for row in imperfections().values():
+        for kind in (KINDS[of] for of in row.of if row.key and of in KINDS):
+            (field,) = (field for field in msgspec.structs.fields(kind) if field.name == row.key)
+            assert field.default == row.value, row.name
+            noisy.add(f"{kind.__name__}.{row.key}")
+    for kind in KINDS.values():
+        if issubclass(kind, VehicleDevice):
+            keys = [field.name for field in msgspec.structs.fields(kind)]
+            assert {f"{kind.__name__}.{key}" for key in keys if re.match("sigma|miss|bias", key)} <= noisy
+    sensors = {tag for tag, kind in KINDS.items() if issubclass(kind, Sensor)}
+    assert set(imperfections()["sensor_period_s"].of) == sensors - {"odometer"}
 
 
-@pytest.mark.parametrize(("names", "numbers", "off"), ROWS, ids=[row[0][0] for row in ROWS])
-def test_row_says_what_the_code_has(names: tuple[str, ...], numbers: list[float], off: str) -> None:
-    assert [pytest.approx(part) for name in names for part in value(name)] == numbers
-
-
-def test_every_parameter_has_one_row() -> None:
-    named = [name for names, _, _ in ROWS for name in names]
-    constants = CONSTANTS.keys() - {"RPM", "NO_PIN"}
-    noisy = {
-        f"{struct.__name__}.{field.name}"
-        for struct in KINDS.values()
-        if issubclass(struct, VehicleDevice)
-        for field in msgspec.structs.fields(struct)
-        if re.match("sigma|miss|bias", field.name)
-    }
-    assert len(named) == len(set(named)) and constants | noisy <= set(named)
-
-
-@pytest.mark.parametrize(("names", "numbers", "off"), ROWS, ids=[row[0][0] for row in ROWS])
-def test_row_names_its_switch(names: tuple[str, ...], numbers: list[float], off: str) -> None:
-    """And the neutral value of what the switch sets, where that is not 0; no other switch sets anything of the row."""
-    pairs = [(name, switch.neutral) for name, switch in switches().items()]
-    switched = {name: neutral[key] for name, neutral in pairs for key in names if key in neutral}
-    if off in ("", "–"):
-        assert not switched
-        return
-    said = re.fullmatch(r"`(\w+)`(?:, noise)?(?:: ([\d.]+))?", off)
-    assert said is not None and switched == {said[1]: float(said[2] or 0)}
-
-
-def test_everything_switched_has_a_row() -> None:
-    named = {name for names, _, _ in ROWS for name in names}
-    assert {key for switch in switches().values() for key in switch.neutral} <= named
+def test_the_page_has_what_the_simulator_keeps_fixed() -> None:
+    for name in ("SERVO_MOTOR_HOLD_S", "SUPPLY_ERRATIC_V", "SUPPLY_RESET_V"):
+        (value,) = re.findall(rf"^#define {name} ([\d.]+)", HEADERS, re.MULTILINE)
+        assert f"{float(value):g} " in PAGE.partition("## Fixed")[2]
+    supply = load_robot("shieldbot").supply
+    assert supply is not None
+    for key in ("full_v", "empty_v", "capacity_as", "resistance_ohm", "drop_out_v"):
+        assert f"`supply.{key}`: {getattr(supply, key):g}" in PAGE.replace("\n", " ")
 
 
 def test_a_robot_without_any_imperfection_drives() -> None:

@@ -53,7 +53,8 @@ class BoardRequest:
     pins: bool = False  # record the edges of an emulated board's pins
     saveable: bool = True  # the simulation can be saved
     noise: bool = True
-    without: Sequence[str] = ()  # imperfections of this robot that are switched off; names: `imperfections`
+    without: Sequence[str] = ()  # imperfections of this robot that are switched off, by name
+    imperfections: Mapping[str, float] = field(default_factory=dict)  # magnitudes of others, by name
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -210,15 +211,6 @@ VehicleFactory = Callable[[BoardRequest], VehicleSession]
 """The same of the group `boebot.vehicles`: opens a robot without a board."""
 
 
-@runtime_checkable
-class HasSwitches(Protocol):
-    """A board factory whose robots' imperfections can be switched off."""
-
-    @property
-    def switches(self) -> Mapping[str, str]:
-        """Names that `BoardRequest.without` may have, with a line each."""
-
-
 class SharedWorld(Protocol):
     """Several robots in one simulated world, opened. Time passes only in `advance`: a session that waits calls who
     turns the clock, and goes on once its robot has woken."""
@@ -319,12 +311,6 @@ def board_kinds() -> list[str]:
     return sorted(point.name for point in entry_points(group=BOARDS_GROUP))
 
 
-def imperfections() -> dict[str, str]:
-    """What of a simulated robot can be switched off, with a line each; empty without a simulator."""
-    factories = (_load(point.load, point.name) for point in entry_points(group=BOARDS_GROUP))
-    return next((dict(factory.switches) for factory in factories if isinstance(factory, HasSwitches)), {})
-
-
 def open_board(url: str, request: BoardRequest) -> BoardSession:
     """Opens the board that `url` names.
 
@@ -336,8 +322,8 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
         factory: BoardFactory = _load(point.load, url)
         return factory(request)
     if is_live(url):
-        if request.without:
-            raise BoardError(f"nothing can be switched off of the robot at {url!r}: that is for simulated runs")
+        if request.without or request.imperfections:
+            raise BoardError(f"the robot at {url!r} is as it is built: imperfections are for simulated runs")
         if request.start_pose is not None:
             raise BoardError(f"the robot at {url!r} starts where it stands: a pose is for simulated runs")
         transport = open_port(url, _default_baud(request.robot))

@@ -8,10 +8,10 @@ import pytest
 
 from boebot import behaviors
 from boebot.arenas import arena_names
-from boebot.boards import imperfections
 from boebot.brains import bundled
 from boebot.description.robots import robot_names
 from boebot.errors import did_you_mean
+from boebot.imperfections import imperfections, switches
 from command import boebot
 
 
@@ -19,12 +19,22 @@ def test_every_list_has_all_names_and_a_line_of_each(capsys: pytest.CaptureFixtu
     code, out, err = boebot(capsys, "list", "--json")
     assert (code, err) == (0, "")
     listed = json.loads(out)
-    assert list(listed) == ["robots", "arenas", "brains", "behaviors", "experiments", "imperfections"]
+    assert list(listed) == ["robots", "arenas", "brains", "behaviors", "experiments", "imperfections", "switches"]
     names = {kind: [row["name"] for row in rows] for kind, rows in listed.items()}
     assert (names["robots"], names["arenas"], names["brains"]) == (robot_names(), arena_names(), bundled())
-    assert names["imperfections"] == list(imperfections()) and len(imperfections()) > 20
+    assert names["imperfections"] == list(imperfections()) and names["switches"] == list(switches())
     assert set(names["behaviors"]) < set(behaviors.__all__) and "Avoid" in names["behaviors"]
     assert all(row["title"] for rows in listed.values() for row in rows)
+
+
+def test_imperfections_have_their_magnitudes(capsys: pytest.CaptureFixture[str]) -> None:
+    """In the list for people the neutral value stands beside the switch that sets it."""
+    _, out, _ = boebot(capsys, "list", "imperfections")
+    assert "servo_lag_s 0.055 s lag of the speed; without lag: 0 " in " ".join(out.split())
+    rows = json.loads(boebot(capsys, "list", "imperfections", "--json")[1])["imperfections"]
+    (grip,) = (row for row in rows if row["name"] == "tyre_grip")
+    assert (grip["value"], grip["switch"], grip["neutral"], grip["of"]) == (0.7, "slip", 10.0, ["body"])
+    assert next(row for row in rows if row["name"] == "servo_scale_us")["neutral"] is None
 
 
 def test_one_list_alone(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 from boebot.devices.accelerometer import Accelerometer
-from sim_bridge.devices.catalogue import modelled, off
+from sim_bridge.devices.catalogue import modelled
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE
 from sim_bridge.vehicles.model import VehicleModel
-
-SWITCHES = {
-    "accelerometer_errors": off(
-        "the accelerometer has no noise and no bias", "Accelerometer.sigma_m_s2", "Accelerometer.bias_m_s2"
-    ),
-}
 
 ACCELEROMETER = SensorKind(
     "accelerometer",

@@ -8,31 +8,11 @@ from typing import Any
 from boebot.description.robots import Supply
 from boebot.devices.battery import Energy
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import modelled, off
+from sim_bridge.devices.catalogue import modelled
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE
 from sim_bridge.vehicles.model import VehicleModel
-
-BOARD_A = 0.08  # (chosen)
-SERVO_IDLE_A = 0.015  # (data)
-SERVO_RUN_A_S_M = 0.74  # free-running: 140 mA at top speed (data)
-SERVO_A_PER_N_M = 3.7  # 1 A at stall (chosen)
-BATTERY_NOISE_V = 0.005
-
-SWITCHES = {
-    "battery_sag": off(
-        "the pack keeps its voltage under load, the regulator drops none", "supply.resistance_ohm", "supply.drop_out_v"
-    ),
-    "battery_load": off(
-        "nothing draws current: the pack stays full",
-        "BOARD_A",
-        "SERVO_IDLE_A",
-        "SERVO_RUN_A_S_M",
-        "SERVO_A_PER_N_M",
-    ),
-    "battery_noise": off("the measured battery voltage is exact", "BATTERY_NOISE_V", "Energy.sigma_v"),
-}
 
 
 def _order(values: Mapping[str, Any]) -> str:
@@ -68,15 +48,15 @@ def battery_parameters(supply: Supply, ratio: float = 2.0, draw: Draw = AS_BUILT
                 "capacity_as": supply.capacity_as,
                 "resistance_ohm": supply.resistance_ohm,
                 "drop_out_v": supply.drop_out_v,
-                "board_a": draw["BOARD_A"],
-                "servo_idle_a": draw["SERVO_IDLE_A"],
-                "servo_run_a_s_m": draw["SERVO_RUN_A_S_M"],
-                "servo_a_per_n_m": draw["SERVO_A_PER_N_M"],
+                "board_a": draw["board_a"],
+                "servo_idle_a": draw["servo_idle_a"],
+                "servo_run_a_s_m": draw["servo_run_a_s_m"],
+                "servo_a_per_n_m": draw["servo_a_per_n_m"],
                 "charger_a": supply.charger_a,
                 "unregulated": float(supply.servos == "pack"),
             },
             "divider": 1.0 / ratio,
-            "noise_v": draw["BATTERY_NOISE_V"],
+            "noise_v": draw["battery_noise_v"],
             "charge": supply.charge,
         },
     )

@@ -1,7 +1,7 @@
 """All simulated devices, found in the files of this folder: nothing is listed by hand.
 
-A file has constants in capitals (parameters with their sources, `SWITCHES`, `SensorKind`s), and functions marked by
-`joined` and `modelled` with the kinds of the robot's description that they are for.
+A file has `SensorKind`s in capitals, and functions marked by `joined` and `modelled` with the kinds of the robot's
+description that they are for.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import Any, TypeVar
@@ -17,21 +16,6 @@ from typing import Any, TypeVar
 from sim_bridge.devices.sensor import SensorKind
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-@dataclass(frozen=True)
-class Switch:
-    """An imperfection that can be switched off."""
-
-    what: str
-    """what then is as ideal, in one line"""
-    neutral: Mapping[str, float]
-    """parameter -> neutral value"""
-
-
-def off(what: str, *parameters: str, **others: float) -> Switch:
-    """Of `parameters` the neutral value is 0."""
-    return Switch(what, dict.fromkeys(parameters, 0.0) | others)
 
 
 _JOINED: dict[type, Callable[[Any, Any], Any]] = {}
@@ -82,24 +66,8 @@ def add_to(model: Any, name: str, device: object) -> bool:
     return function is not None
 
 
-def parameters() -> dict[str, float | tuple[float, ...]]:
-    """All constants of the devices, by name."""
-    return {
-        name: value
-        for module in modules()
-        for name, value in vars(module).items()
-        if name.isupper() and not name.startswith("_") and type(value) in (float, int, tuple)
-    }
-
-
 @cache
 def sensor_kinds() -> Mapping[str, SensorKind]:
     """All kinds of sensors of robots without boards, by their name in C."""
     found = [value for module in modules() for value in vars(module).values() if isinstance(value, SensorKind)]
     return {kind.name: kind for kind in sorted(found, key=lambda kind: kind.name)}
-
-
-@cache
-def switches() -> Mapping[str, Switch]:
-    """All imperfections that can be switched off, by name."""
-    return {name: switch for module in modules() for name, switch in getattr(module, "SWITCHES", {}).items()}

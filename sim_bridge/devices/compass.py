@@ -6,30 +6,12 @@ from typing import Any
 
 from boebot.devices.compass import HeadingCompass, MagneticCompass
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge.devices.catalogue import joined, modelled
 from sim_bridge.devices.part import At, Part
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, TURN
 from sim_bridge.vehicles.model import VehicleModel
-
-COMPASS_HORIZONTAL_G = 0.19  # central Europe
-COMPASS_DOWN_G = 0.45
-COMPASS_SIGMA = 0.01  # 2 mG of noise (data)
-COMPASS_BIAS_RAD = 0.05  # of the mounting (chosen)
-COMPASS_IRON = 0.2  # (chosen)
-COMPASS_PER_AMPERE = 0.05  # (chosen)
-
-SWITCHES = {
-    "compass_noise": off("the compass reads the same each time", "COMPASS_SIGMA", "HeadingCompass.sigma_rad"),
-    "compass_bias": off(
-        "no turned mounting, iron or motor current deflects the compass",
-        "COMPASS_BIAS_RAD",
-        "COMPASS_IRON",
-        "COMPASS_PER_AMPERE",
-        "HeadingCompass.bias_rad",
-    ),
-}
 
 COMPASS = SensorKind("compass", {"sigma": NOT_NEGATIVE, "bias": TURN})
 
@@ -53,14 +35,14 @@ def compass_parameters(draw: Draw) -> Any:
         "hmc5883l_parameters *",
         {
             "field": {
-                "sigma": draw["COMPASS_SIGMA"] * on,
-                "bias": draw["COMPASS_BIAS_RAD"] * draw(61, 0),
-                "iron_x": draw["COMPASS_IRON"] * draw(61, 1),
-                "iron_y": draw["COMPASS_IRON"] * draw(61, 2),
-                "current_x": draw["COMPASS_PER_AMPERE"] * draw(61, 3),
-                "current_y": draw["COMPASS_PER_AMPERE"] * draw(61, 4),
+                "sigma": draw["compass_sigma"] * on,
+                "bias": draw["compass_bias_rad"] * draw(61, 0),
+                "iron_x": draw["compass_iron"] * draw(61, 1),
+                "iron_y": draw["compass_iron"] * draw(61, 2),
+                "current_x": draw["compass_per_ampere"] * draw(61, 3),
+                "current_y": draw["compass_per_ampere"] * draw(61, 4),
             },
-            "horizontal_gauss": COMPASS_HORIZONTAL_G,
-            "down_gauss": COMPASS_DOWN_G,
+            "horizontal_gauss": draw["compass_horizontal_g"],
+            "down_gauss": draw["compass_down_g"],
         },
     )

@@ -7,28 +7,12 @@ from typing import Any
 from boebot.devices.infrared import InfraredPair, InfraredProximity
 from sim_bridge._core import ffi
 from sim_bridge.devices.beam import beam_of
-from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge.devices.catalogue import joined, modelled
 from sim_bridge.devices.part import At, Part
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SWITCH
 from sim_bridge.vehicles.model import VehicleModel
-
-INFRARED_RAYS = 5
-INFRARED_HEIGHT_M = 0.06
-INFRARED_DIRECT_M = 2.0  # from where another robot's LED lights the receiver (chosen)
-INFRARED_SPREAD = 0.03  # of the range from burst to burst (chosen)
-INFRARED_FALSE_HIT = 0.001  # per burst (chosen)
-
-SWITCHES = {
-    "infrared_noise": off(
-        "infra-red sensors read the same each time, and never falsely",
-        "INFRARED_SPREAD",
-        "INFRARED_FALSE_HIT",
-        "InfraredProximity.sigma",
-    ),
-    "cross_talk": off("an infra-red receiver sees its own LED only", "INFRARED_DIRECT_M"),
-}
 
 INFRARED_PROXIMITY = SensorKind(
     "infrared_proximity",
@@ -61,13 +45,14 @@ def proximity(device: InfraredProximity, name: str, model: VehicleModel) -> None
 
 def infrared_parameters(pair: InfraredPair, draw: Draw = AS_BUILT) -> Any:
     """The IR pair in C."""
+    height, rays = draw["infrared_height_m"], int(draw["infrared_rays"])
     return ffi.new(
         "infrared_pair_parameters *",
         {
-            "beam": beam_of(pair.position_m, pair.heading_rad, pair.beam_rad, INFRARED_HEIGHT_M, INFRARED_RAYS),
+            "beam": beam_of(pair.position_m, pair.heading_rad, pair.beam_rad, height, rays),
             "range": pair.range_m,
-            "range_sigma": draw["INFRARED_SPREAD"],
-            "false_hit": draw["INFRARED_FALSE_HIT"],
-            "direct": draw["INFRARED_DIRECT_M"],
+            "range_sigma": draw["infrared_spread"],
+            "false_hit": draw["infrared_false_hit"],
+            "direct": draw["infrared_direct_m"],
         },
     )

@@ -7,14 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.laser import Laser
-from sim_bridge.devices.catalogue import modelled, off
+from sim_bridge.devices.catalogue import modelled
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE, TURN, Range
 from sim_bridge.vehicles.model import VehicleModel
-
-SWITCHES = {
-    "laser_noise": off("laser distances are exact", "Laser.sigma"),
-}
 
 
 def _fan(values: Mapping[str, Any]) -> str:

@@ -6,29 +6,12 @@ from typing import Any
 
 from boebot.devices.light import LightSensor, Phototransistor
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge.devices.catalogue import joined, modelled
 from sim_bridge.devices.part import At, Part
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE
 from sim_bridge.vehicles.model import VehicleModel
-
-LIGHT_HEIGHT_M = 0.09
-LIGHT_NEAR_M = 0.05  # d0 of the notes
-LIGHT_AMBIENT = 1.0
-LIGHT_DECAY_S = 0.0015
-LIGHT_MAXIMUM_S = 0.2  # leakage (chosen)
-LIGHT_CHARGE_S = 2.2e-6  # 220 ohm and 10 nF
-LIGHT_THRESHOLD_V = 2.1  # falling, typical for the chip at 5 V (data)
-LIGHT_SPREAD = 0.01  # from reading to reading (chosen)
-LIGHT_GAIN_SPREAD = 0.1  # unit to unit (chosen)
-
-SWITCHES = {
-    "light_noise": off(
-        "light sensors are exact and alike", "LIGHT_SPREAD", "LIGHT_GAIN_SPREAD", "Phototransistor.sigma"
-    ),
-    "ambient_light": off("lamps are the only light", "LIGHT_AMBIENT", "Phototransistor.ambient"),
-}
 
 PHOTOTRANSISTOR = SensorKind(
     "phototransistor",
@@ -71,14 +54,14 @@ def light_parameters(light: LightSensor, side: int, draw: Draw) -> Any:
                 "x": x,
                 "y": y,
                 "heading": light.heading_rad,
-                "height": LIGHT_HEIGHT_M,
-                "near_distance": LIGHT_NEAR_M,
-                "ambient": draw["LIGHT_AMBIENT"],
-                "sigma": draw["LIGHT_SPREAD"] if draw.noise else 0.0,
-                "gain": max(0.1, 1.0 + draw["LIGHT_GAIN_SPREAD"] * draw(71 + side, 0)),
+                "height": draw["light_height_m"],
+                "near_distance": draw["light_near_m"],
+                "ambient": draw["light_ambient"],
+                "sigma": draw["light_spread"] if draw.noise else 0.0,
+                "gain": max(0.1, 1.0 + draw["light_gain_spread"] * draw(71 + side, 0)),
             },
-            "decay_s": LIGHT_DECAY_S,
-            "maximum_s": LIGHT_MAXIMUM_S,
-            "capacitor": {"charge_s": LIGHT_CHARGE_S, "threshold_v": LIGHT_THRESHOLD_V},
+            "decay_s": draw["light_decay_s"],
+            "maximum_s": draw["light_maximum_s"],
+            "capacitor": {"charge_s": draw["light_charge_s"], "threshold_v": draw["light_threshold_v"]},
         },
     )

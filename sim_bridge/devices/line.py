@@ -6,24 +6,12 @@ from typing import Any
 
 from boebot.devices.line import LineSensor, ReflectanceSensor
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge.devices.catalogue import joined, modelled
 from sim_bridge.devices.part import At, Part
 from sim_bridge.devices.sensor import SensorKind
-from sim_bridge.robots.imperfections import Draw
+from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE
 from sim_bridge.vehicles.model import VehicleModel
-
-LINE_DECAY_S = 0.0002  # over a floor that throws all light back (chosen)
-LINE_DARK = 0.01  # leakage and stray light (chosen)
-LINE_SPOT_M = 0.004  # radius, a few millimetres below the sensor (chosen)
-LINE_CHARGE_S = 2.2e-6  # 220 ohm and 10 nF
-LINE_THRESHOLD_V = 2.1  # falling, typical for the chip at 5 V (data)
-LINE_SPREAD = 0.02  # from reading to reading (chosen)
-LINE_GAIN_SPREAD = 0.15  # unit to unit (chosen)
-
-SWITCHES = {
-    "line_noise": off("line sensors are exact and alike", "LINE_SPREAD", "LINE_GAIN_SPREAD", "ReflectanceSensor.sigma")
-}
 
 REFLECTANCE = SensorKind(
     "reflectance", dict.fromkeys(("radius", "dark", "sigma", "gain"), NOT_NEGATIVE), usual={"gain": 1.0}
@@ -41,7 +29,14 @@ def reflectance(device: ReflectanceSensor, name: str, model: VehicleModel) -> No
     """The floor's reflectance."""
     x, y = device.position_m
     model.sensor(
-        "reflectance", name, period=device.period_s, x=x, y=y, radius=device.spot_m, dark=LINE_DARK, sigma=device.sigma
+        "reflectance",
+        name,
+        period=device.period_s,
+        x=x,
+        y=y,
+        radius=device.spot_m,
+        dark=AS_BUILT["line_dark"],
+        sigma=device.sigma,
     )
 
 
@@ -54,12 +49,12 @@ def line_parameters(line: LineSensor, number: int, draw: Draw) -> Any:
             "floor": {
                 "x": x,
                 "y": y,
-                "radius": LINE_SPOT_M,
-                "dark": LINE_DARK,
-                "sigma": draw["LINE_SPREAD"] if draw.noise else 0.0,
-                "gain": max(0.1, 1.0 + draw["LINE_GAIN_SPREAD"] * draw(96 + number, 0)),
+                "radius": draw["line_spot_m"],
+                "dark": draw["line_dark"],
+                "sigma": draw["line_spread"] if draw.noise else 0.0,
+                "gain": max(0.1, 1.0 + draw["line_gain_spread"] * draw(96 + number, 0)),
             },
-            "capacitor": {"charge_s": LINE_CHARGE_S, "threshold_v": LINE_THRESHOLD_V},
-            "decay_s": LINE_DECAY_S,
+            "capacitor": {"charge_s": draw["line_charge_s"], "threshold_v": draw["line_threshold_v"]},
+            "decay_s": draw["line_decay_s"],
         },
     )

@@ -3,14 +3,6 @@
 from __future__ import annotations
 
 from boebot.devices.motor import DcMotor, RegulatedMotor
-from sim_bridge.devices.catalogue import Switch
-
-SWITCHES = {
-    "motor_friction": Switch(
-        "DC motors have no friction, their gear no losses",
-        {"DcMotor.coulomb_friction_n_m": 0.0, "DcMotor.viscous_friction_n_m_s": 0.0, "DcMotor.efficiency": 1.0},
-    ),
-}
 
 
 def dc_parameters(motor: DcMotor) -> dict[str, float]:

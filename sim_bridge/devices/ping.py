@@ -9,25 +9,12 @@ from typing import Any
 from boebot.devices.ping import PingSensor, Sonar
 from sim_bridge._core import ffi
 from sim_bridge.devices.beam import beam_of
-from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge.devices.catalogue import joined, modelled
 from sim_bridge.devices.part import At, Part
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, SWITCH, Range
 from sim_bridge.vehicles.model import VehicleModel
-
-PING_RAYS = 7
-PING_HEIGHT_M = 0.08
-PING_SPREAD = 0.005  # of a reading (chosen)
-PING_MISS = 0.02  # (notes, p = 0.98)
-PING_GRAZING_RAD = 0.785  # surfaces met flatter than this to their normal send nothing back (chosen)
-TEMPERATURE_C = 20.0
-
-SWITCHES = {
-    "ping_noise": off("the distance of an echo is exact", "PING_SPREAD", "Sonar.sigma"),
-    "ping_misses": off("every echo is heard", "PING_MISS", "Sonar.miss"),
-    "specular": off("surfaces send sound back at any angle", PING_GRAZING_RAD=1.57),
-}
 
 
 def _ranges(values: Mapping[str, Any]) -> str:
@@ -68,16 +55,17 @@ def sonar(device: Sonar, name: str, model: VehicleModel) -> None:
 
 def ping_parameters(ping: PingSensor, draw: Draw = AS_BUILT) -> Any:
     """The Ping))) in C."""
+    height, rays = draw["ping_height_m"], int(draw["ping_rays"])
     return ffi.new(
         "sonar_parameters *",
         {
-            "beam": beam_of(ping.position_m, ping.heading_rad, ping.beam_rad, PING_HEIGHT_M, PING_RAYS),
+            "beam": beam_of(ping.position_m, ping.heading_rad, ping.beam_rad, height, rays),
             "range_minimum": ping.range_min_m,
             "range_maximum": ping.range_max_m,
-            "sigma": draw["PING_SPREAD"],
-            "miss": draw["PING_MISS"],
-            "grazing_cosine": math.cos(draw["PING_GRAZING_RAD"]),
-            "temperature": TEMPERATURE_C,
+            "sigma": draw["ping_spread"],
+            "miss": draw["ping_miss"],
+            "grazing_cosine": math.cos(draw["ping_grazing_rad"]),
+            "temperature": draw["temperature_c"],
             "absorption": 1,
         },
     )

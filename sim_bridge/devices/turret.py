@@ -7,15 +7,9 @@ from typing import Any
 
 from boebot.devices.turret import PositionServo
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices.catalogue import joined, off
+from sim_bridge.devices.catalogue import joined
 from sim_bridge.devices.part import At, Part
 from sim_bridge.robots.imperfections import Draw
-
-TURRET_CENTRE_SPREAD_US = 10.0  # (chosen)
-
-SWITCHES = {
-    "turret_centre": off("the turret looks straight ahead at its centre pulse", "TURRET_CENTRE_SPREAD_US"),
-}
 
 
 @joined(PositionServo)
@@ -33,5 +27,5 @@ def turret_parameters(turret: PositionServo, draw: Draw) -> Any:
     gain = turret.gain_us_per_rad
     motor.mount = math.copysign(1.0, gain)
     motor.us_per_rad = abs(gain)
-    motor.centre_us = turret.centre_us + draw["TURRET_CENTRE_SPREAD_US"] * draw(76, 0)
+    motor.centre_us = turret.centre_us + draw["turret_centre_spread_us"] * draw(76, 0)
     return out

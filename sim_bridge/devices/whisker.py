@@ -6,19 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.whisker import TouchWhisker, WhiskerSwitch
-from sim_bridge._core import ffi, lib
-from sim_bridge.devices.catalogue import joined, modelled, off
+from sim_bridge._core import ffi
+from sim_bridge.devices.catalogue import joined, modelled
 from sim_bridge.devices.part import At, Part
 from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.model import VehicleModel
-
-WHISKER_HEIGHT_M: float = lib.WHISKER_HEIGHT_M
-WHISKER_BOUNCE_S = 0.0015  # mean; 0.5 to 10 ms with a long tail (chosen)
-
-SWITCHES = {
-    "bounce": off("whiskers close and open once", "WHISKER_BOUNCE_S"),
-}
 
 
 def _length(values: Mapping[str, Any]) -> str:
@@ -44,6 +37,5 @@ def touch(device: TouchWhisker, name: str, model: VehicleModel) -> None:
 
 def whisker_parameters(whisker: WhiskerSwitch, draw: Draw = AS_BUILT) -> Any:
     """The whisker in C."""
-    return ffi.new(
-        "whisker_parameters *", [*whisker.root_m, *whisker.tip_m, WHISKER_HEIGHT_M, draw["WHISKER_BOUNCE_S"]]
-    )
+    contacts = draw["whisker_height_m"], draw["whisker_bounce_s"]
+    return ffi.new("whisker_parameters *", [*whisker.root_m, *whisker.tip_m, *contacts])

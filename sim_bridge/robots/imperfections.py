@@ -1,50 +1,40 @@
 """What a built robot is like: its body and tyres, and one robot drawn from the spreads of its devices by seed.
 
-What each device does not do ideally is in its file in sim_bridge/devices. Sources are named beside the values:
-"data" is a manufacturer's or published measurement, "chosen" is ours and to be measured. Without noise every part is
-nominal; what else can be switched off, and by which name, is in switches.py.
+What each device does not do ideally is in its file in sim_bridge/devices; all of it is one table,
+docs/reference/imperfections.md, with the sources. Without noise every part is nominal.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import msgspec
+
+from boebot.arguments import shown
 from boebot.description import robots
+from boebot.errors import BoardError
+from boebot.imperfections import checked, idle, imperfections, switched_off
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices import catalogue
-from sim_bridge.robots import switches
-
-SPIN_INERTIA_KG_M2 = 4e-4  # of a slipping wheel: the servo's rotor behind its gear of about 1:250 (chosen)
-TYRE_SLIP = 1  # beyond that coefficient they slip; 0: wheels always roll
-TYRE_GRIP = 0.7  # friction coefficient of a rubber tyre, along and across (chosen)
-
-
-@cache
-def parameters() -> dict[str, Any]:
-    """All parameters of body and devices, by name."""
-    own = {"SPIN_INERTIA_KG_M2": SPIN_INERTIA_KG_M2, "TYRE_SLIP": TYRE_SLIP, "TYRE_GRIP": TYRE_GRIP}
-    return own | catalogue.parameters()
-
 
 _DRAW = 1000  # the draws that make a robot have other device numbers
 
 
 class Draw:
     """Draws one robot's peculiarities: always the same ones for the same unit and device; of a robot that says no unit,
-    for the same seed, robot and device. `draw["SERVO_LAG_S"]` is a parameter as this robot has it."""
+    for the same seed, robot and device. `draw["servo_lag_s"]` is a magnitude as this robot has it."""
 
     def __init__(
-        self, seed: int, noise: bool, robot: int = 0, unit: int | None = None, without: Iterable[str] = ()
+        self,
+        seed: int,
+        noise: bool,
+        robot: int = 0,
+        unit: int | None = None,
+        magnitudes: Mapping[str, float] | None = None,
     ) -> None:
-        """`unit`: the robot's serial number, whose peculiarities no seed changes; 0: nominal throughout. `without`:
-        names of switches.py.
-
-        Raises:
-            BoardError: there is no such name.
-        """
-        self._neutral = switches.neutral(without)
+        """`unit`: the robot's serial number, whose peculiarities no seed changes; 0: nominal throughout. `magnitudes`:
+        those that are not as in the table."""
+        self._magnitudes = magnitudes or {}
         self._seed, self.noise, self._robot, self._unit = seed & (2**64 - 1), noise, robot, unit
 
     def __call__(self, device: int, what: int) -> float:
@@ -57,32 +47,70 @@ class Draw:
         value: float = lib.noise_normal(self._seed, self._robot, _DRAW + device, what)
         return value
 
-    def own(self, name: str, given: float | None) -> float:
-        """The same, `given` by a robot itself unless that is None."""
-        return self[name] if given is None or name in self._neutral else given
-
     def __getitem__(self, name: str) -> float:
-        """A parameter of the body or of a device, or its neutral value if what it belongs to is switched off."""
-        value: float = self._neutral.get(name, parameters()[name])
-        return value
+        """A magnitude of the table, or what this robot has in its place."""
+        usual = imperfections()[name].value
+        assert usual is not None, "a robot's file has it"
+        return self._magnitudes.get(name, usual)
 
 
 AS_BUILT = Draw(0, noise=False)
-"""Nothing is drawn, and nothing switched off."""
+"""Nothing is drawn, and everything as in the table."""
+
+
+def applied(
+    robot: robots.RobotDescription, without: Sequence[str] = (), given: Any = None, *, noise: bool = True
+) -> robots.RobotDescription:
+    """The robot as a run wants it: the neutral values of what is switched off and the magnitudes that are `given` take
+    the place of its own, in its devices, body, supply and `imperfections`.
+
+    Raises:
+        BoardError: there is no such name; a magnitude is out of its range, is switched off as well, or changes nothing
+            of this robot.
+    """
+    if isinstance(without, str) or not all(isinstance(name, str) for name in without):
+        raise BoardError(f"without is {shown(without)}; expected a list of names")
+    table = imperfections()
+    off, asked = switched_off(without), checked({} if given is None else given)
+    for name in asked.keys() & off.keys():
+        by = table[name].switch if table[name].switch in without else name
+        raise BoardError(
+            f"imperfections: {name} is {asked[name]:g}, but without {by} makes it {off[name]:g}; expected one of them"
+        )
+    values = off | asked
+    changed = msgspec.structs.replace(
+        robot,
+        body=_replaced("body", robot.body, values),
+        supply=_replaced("supply", robot.supply, values),
+        device={name: _replaced(str(one.__struct_config__.tag), one, values) for name, one in robot.device.items()},
+        imperfections=robot.imperfections | {name: value for name, value in values.items() if not table[name].key},
+    )
+    for name in asked:
+        if fault := idle(name, changed, noise=noise):
+            near = [row.name for row in table.values() if row.switch and row.switch == table[name].switch]
+            others = [other for other in near if not idle(other, changed, noise=noise)]
+            hint = f"; expected {' or '.join(others)}" if others else ""
+            raise BoardError(f"imperfections: {name} changes nothing: {fault}{hint}")
+    return changed
+
+
+def _replaced(owner: str, struct: Any, values: Mapping[str, float]) -> Any:
+    """A table or device of a robot's description with those of the values that belong to it."""
+    rows = [row for name in values if owner in (row := imperfections()[name]).of and row.key]
+    return msgspec.structs.replace(struct, **{row.key: values[row.name] for row in rows}) if rows and struct else struct
 
 
 def body_parameters(body: robots.Body, draw: Draw = AS_BUILT, outline: Any = ffi.NULL) -> Any:
     """The body in C. `outline`: its collision outline in C, which must outlive what is made of it; NULL: a circle."""
     tyres = {
-        "grip": draw.own("TYRE_GRIP", body.tyre_grip),
-        "spin_inertia": SPIN_INERTIA_KG_M2,
-        "slip": int(draw.own("TYRE_SLIP", body.tyre_slip)),
+        "spin_inertia": draw["spin_inertia_kg_m2"],
+        "slip": 1 if body.tyre_slip is None else int(body.tyre_slip),
     }
     return ffi.new("body_parameters *", body_numbers(body) | {"outline": outline} | tyres)
 
 
 def body_numbers(body: robots.Body) -> dict[str, float]:
-    """Masses, lengths and damping of the body, by their names in C (SI units)."""
+    """Masses, lengths, damping and grip of the body, by their names in C (SI units)."""
     return {
         "mass": body.mass_kg,
         "inertia": body.inertia_kg_m2,
@@ -93,4 +121,5 @@ def body_numbers(body: robots.Body) -> dict[str, float]:
         "wheel_inertia": body.wheel_inertia_kg_m2,
         "linear_damping": body.linear_damping_n_s_m,
         "angular_damping": body.angular_damping_n_m_s,
+        "grip": AS_BUILT["tyre_grip"] if body.tyre_grip is None else body.tyre_grip,
     }

@@ -20,7 +20,6 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.code_places import watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins, PinRecorder
-from sim_bridge.robots.switches import switches
 from sim_bridge.sessions.opening import InWorld, Wait, alone, drain, new_sim
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sessions.without_board import DirectSession, add_vehicle
@@ -146,7 +145,6 @@ class BoardKind:
     def __init__(self, name: str, find: Callable[[str], Path], make: Callable[[Path], EmulatedBoard]) -> None:
         """`find`: the bundled firmware for a pin map; `make`: a board with some firmware."""
         self.name = name
-        self.switches = {name: switch.what for name, switch in switches().items()}
         self._find, self._make = find, make
 
     def __call__(self, request: BoardRequest) -> SimSession:
@@ -176,9 +174,16 @@ class BoardKind:
         find = self._find
         board = self._make(find(request.robot.pin_map) if request.image is None else image_file(request.image))
         try:
-            return sim.add(board, request.robot, pose=request.start_pose, without=request.without)
+            return sim.add(
+                board,
+                request.robot,
+                pose=request.start_pose,
+                without=request.without,
+                imperfections=request.imperfections,
+            )
         except Exception:
-            board.close()
+            if not board.is_in_use():  # else the simulation's end is the board's
+                board.close()
             raise
 
 

@@ -77,9 +77,11 @@ def add_vehicle(sim: Sim, request: BoardRequest) -> SimRobot:
     Raises:
         RobotError: its description is none of such a robot.
         ArenaError: its place is not free.
-        BoardError: no such imperfection.
+        BoardError: an imperfection is none, is out of its range, or changes nothing of this robot.
     """
-    return sim.add(None, request.robot, pose=request.start_pose, without=request.without)
+    return sim.add(
+        None, request.robot, pose=request.start_pose, without=request.without, imperfections=request.imperfections
+    )
 
 
 class DirectKind:

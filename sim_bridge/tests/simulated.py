@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -106,10 +106,11 @@ def scripted(
     seed: int = 1,
     step_cycles: int = 16_000,
     without: Sequence[str] = (),
+    imperfections: Mapping[str, float] | None = None,
 ) -> Scripted:
     """A robot on a script board, in an empty field if no arena is given."""
     sim = Sim(arena_of() if arena is None else arena, noise=noise, seed=seed, step_cycles=step_cycles)
-    return add_scripted(sim, robot, pose, without=without)
+    return add_scripted(sim, robot, pose, without=without, imperfections=imperfections)
 
 
 def add_scripted(
@@ -118,11 +119,13 @@ def add_scripted(
     pose: tuple[float, float, float] | None = None,
     number: int | None = None,
     without: Sequence[str] = (),
+    imperfections: Mapping[str, float] | None = None,
 ) -> Scripted:
     """One more robot, on another script board."""
     script, board = script_board()
     description = load_robot("shieldbot") if robot is None else robot
-    return Scripted(sim.add(board, description, pose=pose, number=number, without=without), script)
+    added = sim.add(board, description, pose=pose, number=number, without=without, imperfections=imperfections)
+    return Scripted(added, script)
 
 
 def distance_to_segments(arena: Arena, x: float, y: float) -> float:

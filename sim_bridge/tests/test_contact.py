@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from boebot.description.robots import load_robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices import servo as servo_model
+from sim_bridge.robots.imperfections import AS_BUILT
 from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World, constant, outline_of
 from sim_bridge.tests.simulated import arena_of, square
 
@@ -341,4 +342,4 @@ def test_default_robot_within_the_contact_guard() -> None:
     """V dt < radius / 2 (section 3.4) without splitting a step, for the kit's own robot and step."""
     body = load_robot("shieldbot").body
     assert body.wheel_speed_maximum_m_s * 0.001 < body.radius_m / 2
-    assert servo_model.SERVO_TOP_RPM * servo_model.RPM * body.wheel_radius_m > body.wheel_speed_maximum_m_s
+    assert AS_BUILT["servo_top_rpm"] * servo_model.RPM * body.wheel_radius_m > body.wheel_speed_maximum_m_s

@@ -118,8 +118,8 @@ def test_a_robot_with_a_board_has_its_outline(tmp_path: Path) -> None:
     robot = load_robot(file_of(tmp_path, "shieldbot", *lines))
     parameters = imperfections.body_parameters(robot.body)
     assert (parameters.grip, parameters.slip) == (0.3, 0)
-    off = imperfections.Draw(1, True, without=["slip"])
-    assert imperfections.body_parameters(robot.body, off).grip == 10.0
+    off = imperfections.applied(robot, ["slip"])
+    assert imperfections.body_parameters(off.body).grip == 10.0
     plain = imperfections.body_parameters(load_robot("shieldbot").body)
     assert (plain.grip, plain.slip) == (0.7, 1)
     sim = Sim(arena_of(outline=square(0, 0, 2)), noise=False)

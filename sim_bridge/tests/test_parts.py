@@ -148,7 +148,7 @@ def test_units_differ_by_seed_and_keep_their_nature() -> None:
 
     assert unit(1, 0) == unit(1, 0)
     assert len({unit(seed, side) for seed in range(5) for side in (0, 1)}) == 10
-    spread = np.std([unit(seed, 0) for seed in range(400)]) / (servo_model.SERVO_TOP_RPM * RPM)
+    spread = np.std([unit(seed, 0) for seed in range(400)]) / (imperfections.AS_BUILT["servo_top_rpm"] * RPM)
     assert spread == pytest.approx(math.hypot(0.025, 0.015), rel=0.15)
 
 
@@ -215,17 +215,17 @@ def test_quadrature_tells_the_direction(forward: bool) -> None:
     assert (count > 50) == forward
 
 
-def bouncing(monkeypatch: pytest.MonkeyPatch, *, noise: bool) -> list[tuple[int, int]]:
+def bouncing(*, noise: bool) -> list[tuple[int, int]]:
     """A turning wheel's edges, at each of which the sensor goes back and forth up to three times."""
-    monkeypatch.setitem(imperfections.parameters(), "ENCODER_BOUNCES", 3)
-    robot = scripted(noise=noise, without=("servo_spread", "servo_centre"))
+    jittery = msgspec.structs.replace(load_robot("shieldbot"), imperfections={"encoder_bounces": 3.0})
+    robot = scripted(robot=jittery, noise=noise, without=("servo_spread", "servo_centre"))
     robot.pulses(2.0, {LEFT: 1600, RIGHT: 1400})
     robot.run(2.0)
     return edges(robot, 16)
 
 
-def test_encoder_bounces(monkeypatch: pytest.MonkeyPatch) -> None:
-    changes = bouncing(monkeypatch, noise=True)
+def test_encoder_bounces() -> None:
+    changes = bouncing(noise=True)
     gaps = np.diff([cycle for cycle, _ in changes])
     within = gaps < 1 * MS  # the wheel's own edges are 20 ms apart
     assert gaps[within].min() > 0 and gaps[within].max() <= 40 * US + 2
@@ -234,8 +234,8 @@ def test_encoder_bounces(monkeypatch: pytest.MonkeyPatch) -> None:
     assert set(sizes) == {1, 3, 5, 7}
 
 
-def test_without_noise_no_encoder_bounces(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert np.diff([cycle for cycle, _ in bouncing(monkeypatch, noise=False)]).min() > 10 * MS
+def test_without_noise_no_encoder_bounces() -> None:
+    assert np.diff([cycle for cycle, _ in bouncing(noise=False)]).min() > 10 * MS
 
 
 # ---- whisker ---------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ import pytest
 import boebot
 from boebot import Member
 from boebot.arenas import Arena, ArenaDescription, Patch
-from boebot.boards import BoardRequest, imperfections, open_board
+from boebot.boards import BoardRequest, open_board
 from boebot.description import robots
 from boebot.description.robots import load_robot
 from boebot.devices.accelerometer import Accelerometer
@@ -31,6 +31,7 @@ from boebot.devices.ping import PingSensor, Sonar
 from boebot.devices.servo import ContinuousServo
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError
+from boebot.imperfections import imperfections, switched_off, switches
 from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge._core import lib
@@ -42,7 +43,6 @@ from sim_bridge.devices import servo as servo_model
 from sim_bridge.devices import turret as turret_model
 from sim_bridge.robots import imperfections as parts
 from sim_bridge.robots.imperfections import Draw
-from sim_bridge.robots.switches import switches
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, square
 from sim_bridge.vehicle import Vehicle
@@ -57,7 +57,7 @@ SEEDS = range(1, 21)
 
 
 def drawn(seed: int, *without: str) -> Draw:
-    return Draw(seed, True, without=without)
+    return Draw(seed, True, magnitudes=parts.applied(SHIELDBOT, without).imperfections)
 
 
 def servo(seed: int, *without: str) -> Any:
@@ -91,8 +91,8 @@ def field(draw: Draw) -> Any:
     return compass_model.compass_parameters(draw).field
 
 
-def body(draw: Draw) -> Any:
-    return parts.body_parameters(SHIELDBOT.body, draw)
+def body(*without: str) -> Any:
+    return parts.body_parameters(parts.applied(SHIELDBOT, without).body)
 
 
 UNITS: list[tuple[str, Callable[[Draw], tuple[float, ...]], tuple[float, ...]]] = [
@@ -107,7 +107,6 @@ UNITS: list[tuple[str, Callable[[Draw], tuple[float, ...]], tuple[float, ...]]] 
         lambda draw: tuple(getattr(field(draw), key) for key in ("bias", "iron_x", "iron_y", "current_x", "current_y")),
         (0.0,) * 5,
     ),
-    ("slip", lambda draw: (body(draw).slip,), (0.0,)),
 ]
 
 
@@ -142,7 +141,7 @@ def test_without_lag_only_the_regulators_loop_is_left() -> None:
     robot.pulses(0.2, {LEFT: 1700, RIGHT: 1300})
     robot.run(0.2)
     mass, alpha = SHIELDBOT.body.mass_kg, SHIELDBOT.body.linear_damping_n_s_m
-    gain = 2 * lib.body_a(body(drawn(1))) * 1.2
+    gain = 2 * lib.body_a(body()) * 1.2
     truth = robot.robot.truth()
     steady = TOP * math.tanh(200 / 78.5) * WHEEL * gain / (gain + alpha)
     missing = steady - truth["speed"][(truth["time"] > 0.045) & (truth["time"] < 0.085)]
@@ -182,15 +181,14 @@ def test_without_slip_ice_is_like_any_floor() -> None:
     assert rolled > 2 * x
 
 
-def test_encoders_see_each_edge_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(parts.parameters(), "ENCODER_MISSED", 0.2)
-    monkeypatch.setitem(parts.parameters(), "ENCODER_EXTRA", 0.2)
+def test_encoders_see_each_edge_once() -> None:
+    poor = msgspec.structs.replace(SHIELDBOT, imperfections={"encoder_missed": 0.2, "encoder_extra": 0.2})
     device = SHIELDBOT.device["encoder_left"]
     assert isinstance(device, SingleEncoder)
     pin = pin_number(device.pin)
 
     def off(*without: str) -> float:
-        robot = scripted(noise=True, without=without)
+        robot = scripted(robot=poor, noise=True, without=without)
         robot.pulses(3.0, {LEFT: 1600, RIGHT: 1400})
         robot.run(3.0)
         turned = robot.robot.body().wheel_left / (2 * math.pi) * device.edges_per_turn
@@ -217,16 +215,15 @@ def infrared_sees(distance: float, seed: int, *without: str) -> bool:
     px, py = x * math.cos(heading) - y * math.sin(heading), x * math.sin(heading) + y * math.cos(heading)
     wall = y + distance
     arena = arena_of([(-2, wall), (2, wall), (2, wall + 0.1), (-2, wall + 0.1)])
-    robot = scripted(arena, pose=(-px, y - py, heading), noise=True, seed=seed, without=without)
+    poor = msgspec.structs.replace(SHIELDBOT, imperfections={"infrared_spread": 0.3, "infrared_false_hit": 0.3})
+    robot = scripted(arena, poor, pose=(-px, y - py, heading), noise=True, seed=seed, without=without)
     robot.burst(1 * MS, LED)
     robot.run(0.005)
     return len(robot.inputs(RECEIVER)) > 1
 
 
 @pytest.mark.unsanitized
-def test_infrared_range_is_sharp(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(parts.parameters(), "INFRARED_SPREAD", 0.3)
-    monkeypatch.setitem(parts.parameters(), "INFRARED_FALSE_HIT", 0.3)
+def test_infrared_range_is_sharp() -> None:
     near = {infrared_sees(0.195, seed, "infrared_noise") for seed in SEEDS}
     far = {infrared_sees(0.205, seed, "infrared_noise") for seed in SEEDS}
     assert (near, far) == ({True}, {False})
@@ -253,7 +250,8 @@ def test_only_the_robot_that_switches_it_off_is_spared_cross_talk() -> None:
 
 
 def echo_us(arena: Arena, seed: int, *without: str) -> float:
-    robot = scripted(arena, pose=(0, 0, 0), noise=True, seed=seed, without=without)
+    deaf = msgspec.structs.replace(SHIELDBOT, imperfections={"ping_miss": 0.5})
+    robot = scripted(arena, deaf, pose=(0, 0, 0), noise=True, seed=seed, without=without)
     robot.edge(1 * MS, PING, 1)
     robot.edge(1 * MS + 5 * US, PING, 2)
     robot.run(0.03)
@@ -262,9 +260,8 @@ def echo_us(arena: Arena, seed: int, *without: str) -> float:
 
 
 @pytest.mark.unsanitized
-def test_echoes_are_exact_and_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_echoes_are_exact_and_heard() -> None:
     """t = 2 d / c with c = 343.5 m/s at 20 degrees Celsius; 18.5 ms where none is heard."""
-    monkeypatch.setitem(parts.parameters(), "PING_MISS", 0.5)
     wall = arena_of([(1.06, -3), (1.2, -3), (1.2, 3), (1.06, 3)])
     exact = pytest.approx(2 / 343.5 * 1e6, abs=0.1)
     assert all(echo_us(wall, seed, "ping_noise", "ping_misses") == exact for seed in SEEDS)
@@ -316,8 +313,9 @@ def test_supply_is_ideal() -> None:
 
 def test_battery_is_measured_exactly() -> None:
     def noise_v(*without: str) -> float:
-        assert SHIELDBOT.supply is not None
-        return float(battery_model.battery_parameters(SHIELDBOT.supply, 2.0, drawn(1, *without)).noise_v)
+        assert BOEBOT.supply is not None
+        magnitudes = parts.applied(BOEBOT, without).imperfections
+        return float(battery_model.battery_parameters(BOEBOT.supply, 2.0, Draw(1, True, magnitudes=magnitudes)).noise_v)
 
     assert noise_v("battery_noise") == 0.0 < noise_v()
 
@@ -409,18 +407,13 @@ class Both:
 # ---- whole runs ------------------------------------------------------------------------------------------------------
 
 
-def test_every_switch_changes_something_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of constants: the part with the switch off is the part of a module in which they are neutral."""
-    monkeypatch.setitem(parts.parameters(), "ENCODER_BOUNCES", 1)  # none, unless somebody says so
-    constants = {key for switch in switches().values() for key in switch.neutral if "." not in key}
-    for name, switch in switches().items():
-        draw = drawn(1, name)
-        assert switch.neutral
-        for key in constants:
-            expected = switch.neutral.get(key, parts.parameters()[key])
-            assert draw[key] == expected, (name, key)
-        for key in switch.neutral.keys() & constants:
-            assert draw[key] != parts.parameters()[key], (name, key)
+def test_every_switch_sets_its_rows() -> None:
+    table = imperfections()
+    assert {row.switch for row in table.values() if row.switch} == set(switches())
+    for name in switches():
+        neutral = switched_off([name])
+        assert neutral.keys() == {row.name for row in table.values() if row.switch == name}
+        assert all(table[key].fault(value) == "" for key, value in neutral.items())
 
 
 def bend(result: RunResult) -> float:
@@ -450,7 +443,7 @@ def test_one_robot_of_several() -> None:
 @pytest.mark.parametrize("robot", ["shieldbot", "arsim"])
 def test_unknown_names_get_a_sentence(robot: str) -> None:
     with pytest.raises(
-        BoardError, match=r"no imperfection 'slipp' to switch off; expected some of .*sampling; did you mean 'slip'\?$"
+        BoardError, match=r"no imperfection 'slipp' to switch off; .*list switches.*; did you mean 'slip'\?$"
     ):
         boebot.run("wander", robot=robot, seconds=1, without=("slip", "slipp"))
     for wrong in ("slip", 3, [3]):
@@ -459,10 +452,5 @@ def test_unknown_names_get_a_sentence(robot: str) -> None:
 
 
 def test_a_real_robot_keeps_its_own() -> None:
-    with pytest.raises(BoardError, match="nothing can be switched off"):
+    with pytest.raises(BoardError, match="is as it is built: imperfections are for simulated runs"):
         open_board("/dev/nowhere", BoardRequest(robot=SHIELDBOT, without=("slip",)))
-
-
-def test_the_host_knows_the_names() -> None:
-    assert imperfections() == {name: switch.what for name, switch in switches().items()}
-    assert all(len(name) <= 20 and len(switch.what) <= 80 for name, switch in switches().items())

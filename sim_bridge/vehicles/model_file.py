@@ -7,7 +7,7 @@ devices are those in boebot/devices.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,8 +20,7 @@ from boebot.devices.motor import DcMotor, Motor, RegulatedMotor
 from boebot.errors import RobotError
 from sim_bridge.devices.catalogue import add_to
 from sim_bridge.devices.motor import dc_parameters, regulated_parameters
-from sim_bridge.robots import imperfections
-from sim_bridge.robots.switches import idealised
+from sim_bridge.robots.imperfections import applied, body_numbers
 from sim_bridge.vehicles.checked_structs import FINITE, number
 from sim_bridge.vehicles.model import SIDES, VehicleModel
 
@@ -35,26 +34,25 @@ def vehicle_model(
     noise: bool = True,
     ends_at_collision: bool = False,
     without: Sequence[str] = (),
+    imperfections: Mapping[str, float] | None = None,
 ) -> VehicleModel:
     """The model of a robot without a board: a bundled name, a .toml file, or its description.
 
-    Touching something does not end a run, as with `boebot run`, unless `ends_at_collision`. `without`: names of
-    robots/switches.py.
+    Touching something does not end a run, as with `boebot run`, unless `ends_at_collision`. `without` and
+    `imperfections` as of `boebot.run`.
 
     Raises:
         RobotError: no such robot, one with a board, or a parameter outside its range.
-        BoardError: no such imperfection.
+        BoardError: an imperfection is none, is out of its range, or changes nothing of this robot.
     """
     described = robot if isinstance(robot, robots.RobotDescription) else robots.load_robot(_file(robot))
     if described.has_board:
         raise RobotError(f"robot {described.name!r} is driven by its board; expected one with board = 'none'")
-    described = idealised(described, without)
-    draw = imperfections.Draw(0, noise, without=without)
-    body = _body(described.body) | {"grip": draw.own("TYRE_GRIP", described.body.tyre_grip)}
+    described = applied(described, without, imperfections, noise=noise)
+    body: dict[str, Any] = body_numbers(described.body)
     if described.scheme == "arsim":
         body["axis_half_track"] = body["half_track"] / 2  # as its UpdateMotorAxisAngularSpeed has it
-    if described.body.tyre_slip:
-        body["slip"] = int(draw["TYRE_SLIP"])
+    body["slip"] = int(described.body.tyre_slip or 0)
     if described.body.outline_m:
         body["outline_m"] = described.body.outline_m
     model = VehicleModel(body, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
@@ -72,10 +70,6 @@ def _file(robot: Any) -> str | Path:
     return robot
 
 
-def _body(body: robots.Body) -> dict[str, Any]:
-    return imperfections.body_numbers(body) | {"grip": imperfections.TYRE_GRIP}
-
-
 def _drive(model: VehicleModel, robot: robots.RobotDescription) -> None:
     match tuple(robot.device[f"motor_{side}"] for side in SIDES):
         case (DcMotor() as left, DcMotor() as right):
@@ -91,7 +85,7 @@ def _drive(model: VehicleModel, robot: robots.RobotDescription) -> None:
 # ---- the notes' default robot ----------------------------------------------------------------------------------------
 
 ARSIM: Final = robots.load_robot("arsim")
-ARSIM_BODY: Final = _body(ARSIM.body)
+ARSIM_BODY: Final = body_numbers(ARSIM.body)
 """Its body, for models with other drives and sensors."""
 
 

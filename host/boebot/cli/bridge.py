@@ -43,6 +43,7 @@ def bridge(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
+    imperfection: options.Imperfections = None,
     json: options.Json = False,
 ) -> None:
     """Put a board on a CAN bus: every message both ways, until Ctrl-C."""
@@ -57,7 +58,13 @@ def bridge(
     name = None if can is None else BusName.parse(can)
     description = load_robot(robot)
     request = BoardRequest(
-        robot=description, arena=arena, seed=seed, realtime=True, record=False, without=options.names(without)
+        robot=description,
+        arena=arena,
+        seed=seed,
+        realtime=True,
+        record=False,
+        without=options.names(without),
+        imperfections=options.magnitudes(imperfection),
     )
     with contextlib.ExitStack() as stack:
         session = open_board(board, request)

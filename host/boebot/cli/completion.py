@@ -42,6 +42,13 @@ def boards(incomplete: str) -> list[str]:
     return [*_beginning(incomplete, ("native", "avr", "direct")), *_files(incomplete)]
 
 
+def imperfections(incomplete: str) -> list[str]:
+    """Names of imperfections, for a value to follow."""
+    from boebot import imperfections as table
+
+    return [f"{name}=" for name in _beginning(incomplete, table.imperfections())]
+
+
 def one_of(*names: str) -> Complete:
     """These names."""
     return lambda incomplete: _beginning(incomplete, names)

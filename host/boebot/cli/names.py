@@ -1,5 +1,5 @@
 """`boebot list WHAT`: what there is, with a line for each: robots, arenas, brains, behaviors,
-experiments, imperfections.
+experiments, imperfections, and switches that take them away.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import typer
 
 from boebot import behaviors
 from boebot.arenas import arena_names, load_arena
-from boebot.boards import imperfections
 from boebot.brain.process import MotorBehavior
 from boebot.brains import bundled_files
 from boebot.cli import completion, options, output
 from boebot.description.robots import load_robot, robot_names
 from boebot.errors import did_you_mean
+from boebot.imperfections import imperfections, switches
 
 Row = dict[str, Any]
-KINDS = ("robots", "arenas", "brains", "behaviors", "experiments", "imperfections")
+KINDS = ("robots", "arenas", "brains", "behaviors", "experiments", "imperfections", "switches")
 
 
 def list_names(
@@ -52,6 +52,8 @@ def list_names(
 
 
 def _print(rows: Sequence[Row]) -> None:
+    if "neutral" in rows[0]:
+        rows = [_in_short(row) for row in rows]
     table = output.empty_table()
     titles = [title for title in rows[0] if title != "source"]  # of an experiment; it is long
     for title in titles:
@@ -98,7 +100,24 @@ def _experiments() -> list[Row]:
 
 
 def _imperfections() -> list[Row]:
-    return [{"name": name, "title": what} for name, what in imperfections().items()]
+    return [
+        {"name": row.name, "value": row.value, "unit": row.unit, "title": row.what, "drawn": row.drawn}
+        | {"switch": row.switch, "neutral": row.neutral if row.switch else None, "source": row.source}
+        | {"of": list(row.of), "least": row.least, "most": row.most, "whole": row.whole}
+        for row in imperfections().values()
+    ]
+
+
+def _in_short(row: Row) -> Row:
+    """An imperfection in three columns."""
+    value = "by its file" if row["value"] is None else f"{row['value']:g} {row['unit']}"
+    drawn = f", drawn for each {row['drawn']}" if row["drawn"] else ""
+    off = f"; without {row['switch']}: {row['neutral']:g}" if row["switch"] else ""
+    return {"name": row["name"], "value": value, "title": f"{row['title']}{drawn}{off}"}
+
+
+def _switches() -> list[Row]:
+    return [{"name": name, "title": what} for name, what in switches().items()]
 
 
 _ROWS: dict[str, Callable[[], list[Row]]] = {
@@ -108,4 +127,5 @@ _ROWS: dict[str, Callable[[], list[Row]]] = {
     "behaviors": _behaviors,
     "experiments": _experiments,
     "imperfections": _imperfections,
+    "switches": _switches,
 }

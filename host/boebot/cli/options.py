@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from boebot.cli import completion, quantity
+from boebot.errors import BoebotError
 
 SETTINGS: dict[str, Any] = {
     "pretty_exceptions_enable": False,
@@ -62,7 +63,17 @@ Without = Annotated[
     typer.Option(
         "--without",
         metavar="NAME,...",
-        help="Switch off imperfections of simulated robots; `boebot list imperfections` names them.",
+        help="Switch off imperfections of simulated robots; `boebot list switches` names them.",
+    ),
+]
+Imperfections = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--imperfection",
+        metavar="NAME=VALUE",
+        autocompletion=completion.imperfections,
+        help="Give an imperfection of simulated robots another magnitude, as in servo_lag_s=80ms; again for each "
+        "further one; `boebot list imperfections` names them.",
     ),
 ]
 RobotNumber = Annotated[
@@ -102,6 +113,31 @@ ViewPort = Annotated[
         "--view-port", metavar="PORT", min=0, max=65535, help="With --view: port of the page, on loopback. Else any."
     ),
 ]
+
+
+def magnitudes(given: list[str] | None) -> dict[str, float]:
+    """Of "NAME=VALUE", with the unit of the imperfection or another.
+
+    Raises:
+        BoebotError: there is no such imperfection, or that is no magnitude of it.
+    """
+    if not given:
+        return {}
+    from boebot.imperfections import checked, imperfections  # here: the list of all commands needs none of it
+
+    table = imperfections()
+    found: dict[str, float] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals or name in found:
+            wrong = "twice" if equals else "without a value"
+            raise BoebotError(f"--imperfection has {name!r} {wrong}; expected NAME=VALUE, once for each name")
+        unit = table[name].unit if name in table else ""
+        try:
+            found[name] = quantity.parse(value, unit)
+        except BoebotError as error:
+            raise BoebotError(f"--imperfection {name}: {error}") from None
+    return checked(found, "--imperfection")
 
 
 def names(text: str | None) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ _KINDS: tuple[tuple[str, dict[str, Decimal]], ...] = (
     ("length", {"m": Decimal(1), "cm": Decimal("1e-2"), "mm": Decimal("1e-3")}),
     ("angle", {"rad": Decimal(1), "deg": Decimal(math.pi) / 180}),
     ("voltage", {"V": Decimal(1), "mV": Decimal("1e-3")}),
+    ("share or number", {"": Decimal(1), "%": Decimal("1e-2")}),
 )
 _FORM = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan) ?([^\d\s.]*)")
 
@@ -37,7 +38,7 @@ def parse(text: str, unit: str) -> float:
     if match is None or (match[2] and match[2] not in factors):
         others = ", ".join(sorted(factors.keys() - {unit}))
         said = f", or with another unit: {others}" if others else ""
-        raise BoebotError(f"{text!r} is no {kind}; expected a number, in {unit}{said}")
+        raise BoebotError(f"{text!r} is no {kind}; expected a number{unit and f', in {unit}'}{said}")
     number = Decimal(match[1])
     return float(number * factors[match[2]] / factors[unit]) if match[2] else float(number)
 

@@ -91,6 +91,7 @@ def run(
             "several robots of each, or of one: 2:avoid.turn=0.4.",
         ),
     ] = None,
+    imperfection: options.Imperfections = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
     step_timeout: Annotated[
         float | None,
@@ -142,7 +143,7 @@ def run(
         raise typer.BadParameter("--trust goes with --again DIR", context)
     if not brain:
         raise typer.BadParameter("expected a BRAIN, or --again DIR", context)
-    ideal = options.names(without)
+    ideal, imperfect = options.names(without), options.magnitudes(imperfection)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     assigned = _assigned(parameters or [], count)
@@ -155,6 +156,7 @@ def run(
                 period=period,
                 without=ideal,
                 parameters=assigned[index],
+                imperfections=imperfect,
             )
             for index in range(count)
         ],

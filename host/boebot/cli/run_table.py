@@ -83,13 +83,14 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
     """Name and words of each."""
     table = result.table()
     where = f" in {table['arena']}" if table["arena"] else ""
-    without = f", without {table['without']}" if table["without"] else ""
+    changed = f", without {table['without']}" if table["without"] else ""
+    changed += f", with {table['imperfections']}" if table["imperfections"] else ""
     faster = f", {result.real_time_factor:.3g} times real time" if result.real_time_factor else ""
     way = result.way_in_words()
     if (error_m := result.odometry_error) is not None:
         way.append(f"odometry off by {error_m:.2f} m at the end")
     return [
-        ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{without}"),
+        ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{changed}"),
         ("time", f"{result.run_time:g} s{faster}"),
         ("way", ", ".join(way)),
         ("brain", _brain(result, table)),

@@ -27,6 +27,7 @@ def serve(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
+    imperfection: options.Imperfections = None,
     view: options.ServedView = False,
     view_port: options.ViewPort = None,
     json: options.Json = False,
@@ -43,7 +44,13 @@ def serve(
     description = load_robot(robot)
     check_board(on, description)
     request = BoardRequest(
-        robot=description, arena=arena, seed=seed, realtime=True, record=view, without=options.names(without)
+        robot=description,
+        arena=arena,
+        seed=seed,
+        realtime=True,
+        record=view,
+        without=options.names(without),
+        imperfections=options.magnitudes(imperfection),
     )
 
     def announce(url: str) -> None:

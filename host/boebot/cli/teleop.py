@@ -108,6 +108,7 @@ def teleop(
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
     without: options.Without = None,
+    imperfection: options.Imperfections = None,
     seconds: Annotated[
         float, typer.Option(metavar="TIME", parser=quantity.parser("s"), help="End by itself after this time.")
     ] = float("inf"),
@@ -135,6 +136,7 @@ def teleop(
                 seed=seed,
                 realtime=True,
                 without=options.names(without),
+                imperfections=options.magnitudes(imperfection),
             )
             with watched.view(view=view, speed=None, port=view_port) as page:
                 if page is None:

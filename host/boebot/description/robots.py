@@ -23,6 +23,7 @@ from boebot.devices.encoder import WheelEncoder
 from boebot.devices.equipment import RENAMED
 from boebot.devices.motor import Motor
 from boebot.errors import RobotError, did_you_mean
+from boebot.imperfections import imperfections, unknown
 from boebot.robot import Robot
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -103,6 +104,8 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     unit: Annotated[int, msgspec.Meta(ge=0, lt=1 << 32)] | None = None
     """serial number of a simulated robot: what its parts are like is drawn by it and stays from run to run, whatever
     the seed; 0: nominal. Without one each seed draws another robot."""
+    imperfections: dict[str, float] = {}
+    """magnitudes of a simulated robot that are not as usual, by name (docs/reference/imperfections.md)"""
 
     @property
     def has_board(self) -> bool:
@@ -142,6 +145,7 @@ def load_robot(robot: str | Path) -> RobotDescription:
         place = f"body.outline_m{fault.partition(' ')[0].rstrip(':')}"
         raise RobotError(f"{toml_files.where(table, path.name, place)}: body.outline_m{fault}")
     _check_devices(description, table, path.name)
+    _check_imperfections(description, table, path.name)
     if description.has_board:
         if description.scheme != "kit":
             at = f"{toml_files.where(table, path.name, 'scheme')}: scheme"
@@ -231,6 +235,19 @@ def _check_devices(robot: RobotDescription, table: dict[str, Any], file: str) ->
             raise RobotError(f"{toml_files.where(table, file, key)}: {key}{fault[1]}")
 
 
+def _check_imperfections(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
+    """Refuses names and magnitudes that are none, and what other keys of the file say."""
+    known = imperfections()
+    for name, value in robot.imperfections.items():
+        at = f"{toml_files.where(table, file, f'imperfections.{name}')}: imperfections.{name}"
+        if name not in known:
+            raise RobotError(f"{at}: {unknown(name)}")
+        if (row := known[name]).key:
+            raise RobotError(f"{at} is said elsewhere in a robot's file; expected {row.key} of {' or '.join(row.of)}")
+        if fault := row.fault(value):
+            raise RobotError(f"{at}{fault}")
+
+
 def _check_pins(robot: RobotDescription, file: str) -> None:
     """Refuses devices that cannot share a pin or a unit of the chip (ATmega328P data sheet), naming both."""
     pin_owner: dict[int, str] = {}
@@ -270,6 +287,8 @@ def _check_vehicle(robot: RobotDescription, file: str) -> None:
         )
     if robot.pin_map:
         raise RobotError(f"{file}: pin_map is {robot.pin_map!r}, but a robot without a board has no pins")
+    if robot.unit is not None:
+        raise RobotError(f"{file}: unit is {robot.unit}, but nothing of a robot without a board is drawn by it")
     for name, device in robot.device.items():
         if not isinstance(device, VehicleDevice):
             kind = device.__struct_config__.tag

@@ -40,6 +40,12 @@ class Odometer(Sensor, tag="odometer", frozen=True, kw_only=True):
     NAMES: ClassVar[tuple[str, ...]] = ("odometer",)
     COLUMNS: ClassVar = (("x", "m", 5), ("y", "m", 5), ("heading", "rad", 5))
 
+    def fault(self) -> tuple[str, str] | None:
+        """See `Device`."""
+        if not self.period_s:
+            return None
+        return "period_s", f" is {self.period_s:g}; expected none, as an odometer adds up the way of every step"
+
     def reader(self, place: Place) -> Reader:
         """See `Device`."""
         where, first = place.where, place.where.start

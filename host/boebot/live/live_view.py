@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
-from boebot.boards import imperfections
-from boebot.errors import BoebotError, did_you_mean
+from boebot.errors import BoebotError
+from boebot.imperfections import switched_off, switches
 from boebot.live import messages
 from boebot.live.audience import Audience
 from boebot.live.chunks import EACH_S, Chunks, OfRun
@@ -58,7 +58,6 @@ class LiveView:
             BoebotError: the port is taken.
         """
         self._show = show
-        self._imperfections = imperfections()  # now: that takes longer than many steps of a run
         self._speed = speed
         self._pace = Pace(speed)
         self._controls: Controls | None = None
@@ -92,9 +91,7 @@ class LiveView:
 
     def asked(self, page: int, what: messages.Asked) -> None:
         """See `Stage`. Once the run has ended, only another one can be asked for."""
-        for name in getattr(what, "without", ()):
-            if name not in self._imperfections:
-                raise BoebotError(f"there is no imperfection {name!r}{did_you_mean(name, self._imperfections)}")
+        switched_off(getattr(what, "without", ()))
         with self._changing:
             if self._controls is not None and (not self._has_ended or isinstance(what, messages.Restart)):
                 self._controls.heard(page, what)
@@ -208,9 +205,7 @@ class LiveView:
             "can": sorted(self._controls.can),
             "seed": request.seed,
             "seconds": None if self._robots[0].task.seconds == float("inf") else self._robots[0].task.seconds,
-            "imperfections": [
-                {"name": name, "text": text, "off": name in off} for name, text in self._imperfections.items()
-            ],
+            "imperfections": [{"name": name, "text": text, "off": name in off} for name, text in switches().items()],
             "robots": [{"parameters": _sliders(robot)} for robot in self._robots],
         }
 

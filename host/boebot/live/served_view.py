@@ -165,6 +165,7 @@ class ServedView:
             run_time=0.0,
             wall_time=0.0,
             without=request.without,
+            imperfections=request.imperfections,
         )
 
     def _first_message(self, chunks: Chunks, session: BoardSession) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from boebot.errors import BoebotError
+from boebot.imperfections import switched_off
 from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
 from boebot.record.result import RunResult, TogetherResult
@@ -91,5 +92,13 @@ def _ended(view: LiveView, result: RunResult | TogetherResult, *, waits: bool) -
 
 
 def _afresh(request: Request, wanted: messages.Restart) -> Request:
-    members = [replace(member, without=tuple(wanted.without)) for member in request.members]
+    off = switched_off(wanted.without)
+    members = [
+        replace(
+            member,
+            without=tuple(wanted.without),
+            imperfections={name: value for name, value in (member.imperfections or {}).items() if name not in off},
+        )
+        for member in request.members
+    ]
     return replace(request, seed=wanted.seed, members=members)

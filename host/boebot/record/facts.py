@@ -53,6 +53,7 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     watchdog_resets: list[WatchdogReset]
     counters: dict[str, int | float | None]
     without: list[str]
+    imperfections: dict[str, float]
     odometry_source: str | None
     long_steps: int
     longest_step: float

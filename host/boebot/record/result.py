@@ -59,7 +59,8 @@ class RunResult(FormerNames):
         lost_frames, bad_frames: telemetry frames that never came; frames that came damaged.
         run_time: length of the run by the board's clock. wall_time: by the wall clock.
         link: what the two ends of the link counted, "host" and "board".
-        without: imperfections of the simulated robot that were switched off.
+        without: imperfections of the simulated robot that were switched off. imperfections: magnitudes of others that
+            the run was given, by name; those of the robot's file are in `robot`.
         odometry_source: what the brain's own poses came from, where it kept any: "odometer", "encoders", or "commands"
             where the robot has neither.
         notices: what the user should know, in sentences.
@@ -101,6 +102,7 @@ class RunResult(FormerNames):
     counters: dict[str, float] = field(default_factory=dict)
     layout: Layout | None = None
     without: Sequence[str] = ()
+    imperfections: Mapping[str, float] = field(default_factory=dict)
     brain_names: BrainNames | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     made_of: Mapping[str, Any] | None = None
@@ -343,6 +345,7 @@ class RunResult(FormerNames):
                 "arena": self.plan.name if self.has_truth else self.arena,
                 "seed": self.seed,
                 "without": ", ".join(self.without) or None,
+                "imperfections": ", ".join(f"{name} {size:.10g}" for name, size in self.imperfections.items()) or None,
                 "run_time_s": round(self.run_time, 3),
                 "true_distance_m": _rounded(self.true_distance, 3),
                 "odometry_distance_m": _rounded(self.odometry_distance, 3),

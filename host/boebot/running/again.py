@@ -173,6 +173,7 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
             period=said["period"],
             without=said["without"],
             parameters=result.parameters,
+            imperfections=said["imperfections"],
         )
         for result, said in zip(run.results, asked["members"], strict=True)
     ]

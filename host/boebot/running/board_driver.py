@@ -433,6 +433,7 @@ class BoardDriver:
             watchdog_resets=watchdog_resets,
             counters=dict(self.session.counters()),
             without=self.task.request.without,
+            imperfections=self.task.request.imperfections,
             brain_names=BrainNames.of(self.task.brain.brain),
             parameters=self.task.parameters,
             made_of=self.task.made_of,

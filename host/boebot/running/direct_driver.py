@@ -112,6 +112,7 @@ class DirectDriver:
             counters=dict(self.session.counters()),
             layout=self.session.layout,
             without=request.without,
+            imperfections=request.imperfections,
             brain_names=BrainNames.of(self.task.brain.brain),
             parameters=self.task.parameters,
             made_of=self.task.made_of,

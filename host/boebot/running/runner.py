@@ -17,9 +17,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from boebot.boards import BoardSession, VehicleSession, open_board, open_vehicle
+from boebot.boards import BoardSession, VehicleSession, is_live, open_board, open_vehicle
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
+from boebot.imperfections import notices
 from boebot.record.recording import Recording
 from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
@@ -49,6 +50,7 @@ def run(
     period: float | None = None,
     progress: Progress | None = None,
     without: Sequence[str] = (),
+    imperfections: Mapping[str, float] | None = None,
     pose: tuple[float, float, float] | None = None,
     step_timeout: float | None = None,
     force_timing: bool = False,
@@ -67,6 +69,7 @@ def run(
         period: s from step to step of the brain. None: the brain's PERIOD, or 0.05.
         without: imperfections of the simulated robot that are switched off, such as ("slip", "bounce");
             docs/reference/imperfections.md names them.
+        imperfections: magnitudes of others by name, such as {"servo_lag_s": 0.08}; that page has names and units.
         arena: bundled name or .toml file. None: the simulator's own choice. Of no meaning on a real robot.
         on: what robots with boards run on: "native", "avr", or, for a single one, a port: "/dev/ttyACM0",
             "serial:PORT", "socket://HOST:PORT"; "direct" where no robot has a board. None: native or direct.
@@ -97,6 +100,7 @@ def run(
         pose=pose,
         period=period,
         without=without,
+        imperfections=imperfections,
         arena=arena,
         on=on,
         seconds=seconds,
@@ -286,6 +290,8 @@ def result_of(driver: Driver, task: Task, times: StepTimes, error: BaseException
     result.notices += [*task.brain.notices, *driver.robot.showing.notices]
     result.longest_step, result.long_steps = times.longest, times.long
     result.unrealisable = task.unrealisable
+    if not is_live(task.on):
+        result.notices += notices(task.request.robot, task.request.without)
     if task.unrealisable is not None:
         result.notices.append(f"forced: {task.unrealisable}")
     return result

@@ -16,6 +16,7 @@ from boebot.brain.composition import described
 from boebot.brains import LoadedBrain
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError
+from boebot.imperfections import checked
 from boebot.robot import Equipment
 from boebot.running.board_driver import check_time_to_live
 from boebot.running.brain_parameters import in_force, parameters
@@ -52,6 +53,7 @@ class Member(_NamesFiles):
             docs/reference/imperfections.md names them.
         parameters: of its brain of processes, by name, for this run, such as {"avoid.turn": 0.4}
             (docs/how-to/several-behaviors.md).
+        imperfections: magnitudes of others by name, such as {"servo_lag_s": 0.08}; that page has names and units.
     """
 
     brain: object = "wander"
@@ -61,6 +63,7 @@ class Member(_NamesFiles):
     period: float | None = None
     without: Sequence[str] = ()
     parameters: Mapping[str, Any] | None = None
+    imperfections: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,10 +97,19 @@ class Request(_NamesFiles):
         period: float | None = None,
         without: Sequence[str] = (),
         parameters: Mapping[str, Any] | None = None,
+        imperfections: Mapping[str, float] | None = None,
         **others: Any,
     ) -> Request:
         """Of one robot: what a `Member` has, and `others` of the attributes above."""
-        member = Member(brain=brain, robot=robot, pose=pose, period=period, without=without, parameters=parameters)
+        member = Member(
+            brain=brain,
+            robot=robot,
+            pose=pose,
+            period=period,
+            without=without,
+            parameters=parameters,
+            imperfections=imperfections,
+        )
         return cls(members=[member], **others)
 
     def check(self) -> None:
@@ -140,6 +152,7 @@ class Request(_NamesFiles):
                     "seed": task.brain_seed,
                     "period": task.period_s,
                     "without": list(task.request.without),
+                    "imperfections": dict(task.request.imperfections),
                 }
                 for task in tasks
             ],
@@ -205,6 +218,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         pins=request.pins,
         start_pose=_pose(member.pose),
         without=_names("without", member.without),
+        imperfections={} if member.imperfections is None else checked(member.imperfections),
     )
     return Task(
         brain=loaded,

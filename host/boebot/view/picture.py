@@ -133,6 +133,8 @@ def _caption(result: RunResult) -> list[str]:
     parts.append(f"seed {result.seed}")
     if result.without:
         parts.append(f"without {counted(len(result.without), 'imperfection', 'imperfections')}")
+    if result.imperfections:
+        parts.append(f"{counted(len(result.imperfections), 'imperfection', 'imperfections')} set")
     return [*parts, *brief(result.error)]
 
 
