@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
@@ -65,12 +66,13 @@ def test_parameters_that_are_set_are_those_of_a_brain_made_with_them() -> None:
         [near()],
     )
     brain = mind()
-    plain = boebot.run(brain, seconds=20)
-    changed = boebot.run(brain, seconds=20, parameters=VALUES)
-    assert changed.hash == boebot.run(made, seconds=20).hash != plain.hash
-    assert changed.parameters == VALUES and changed.made_of == boebot.run(made, seconds=0.1).made_of
-    assert boebot.run(brain, seconds=20).hash == plain.hash
+    wall: dict[str, Any] = {"arena": "room", "pose": (0.4, 1.0, math.pi), "seconds": 3}  # before one: both drive
+    plain = boebot.run(brain, **wall)
+    changed = boebot.run(brain, **wall, parameters=VALUES)
     assert changed.table()["behavior_switches"] > 0
+    assert changed.hash == boebot.run(made, **wall).hash != plain.hash
+    assert changed.parameters == VALUES and changed.made_of == boebot.run(made, seconds=0.1).made_of
+    assert boebot.run(brain, **wall).hash == plain.hash
 
 
 @pytest.mark.parametrize("value", [np.float64(0.25), np.float32(0.25), np.array(0.25)])
@@ -222,7 +224,7 @@ def test_a_utility_that_is_changed_in_a_run_counts_and_is_repeated(tmp_path: Pat
     """By --again and by replay. Avoid's utility is raised above wander's, whatever is near."""
     deeds = [(2.0, Parameter("avoid.utility.b", 2.0)), (3.0, Parameter("avoid.utility.tau", 0.05))]
     values = {"wander.turn_probability": 0.01}
-    run = kept(tmp_path, Request.single(mind(), seconds=4, parameters=values), Slid(deeds))
+    run = kept(tmp_path, Request.single(mind(), "arsim", seconds=4, parameters=values), Slid(deeds))
     record = run.brain_record
     assert record is not None
     before, after = record.utility_of("avoid")[record.time < 2.0], record.utility_of("avoid")[record.time > 3.5]
@@ -235,7 +237,7 @@ def test_a_utility_that_is_changed_in_a_run_counts_and_is_repeated(tmp_path: Pat
 
 
 def test_a_brain_that_came_from_no_file_is_repeated(tmp_path: Path) -> None:
-    run = kept(tmp_path, Request.single(mind(), seconds=4, parameters=VALUES))
+    run = kept(tmp_path, Request.single(mind(), "arsim", seconds=4, parameters=VALUES))
     assert run.made_of is not None and run.parameters == VALUES
     assert run.made_of["process"]["wander"]["turn_probability"] == 0.00777
     assert again(recorded(tmp_path)).is_equal

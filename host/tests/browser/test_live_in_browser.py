@@ -84,6 +84,9 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
         process.communicate()
 
 
+SLIDER = "sliders.find(one => one.parameter.name === '%s')"
+
+
 @pytest.fixture(scope="module")
 def url(watched: Watched) -> str:
     """Of a run with a moving shape, a brain of processes and parameters, which many tests interfere with."""
@@ -300,10 +303,13 @@ def test_moving_shape_is_dragged(page: Page) -> None:
 
 
 def test_parameters_are_sliders(page: Page) -> None:
-    name, least, most = page.evaluate("[sliders[0].parameter.name, +sliders[0].input.min, +sliders[0].input.max]")
-    value = least + 0.3 * (most - least)
-    page.locator("#parameters input").first.fill(str(value))
-    wait_for(page, f"Math.abs(state.robots[0].parameters['{name}'] - {value}) < 1e-6 * Math.max(1, Math.abs({value}))")
+    """Those of utilities are in a list that opens."""
+    page.locator("#parameters summary").click()
+    for name in ("wander.forward", "wander.utility.b"):
+        least, most = page.evaluate(f"(({{input}}) => [+input.min, +input.max])({SLIDER % name})")
+        value = least + 0.3 * (most - least)
+        page.get_by_label(name, exact=True).fill(str(value))
+        wait_for(page, f"Math.abs(state.robots[0].parameters['{name}'] - {value}) < 1e-6")
 
 
 @pytest.mark.soak

@@ -193,7 +193,10 @@ function makeParameters() {
   const list = (live && live.robots[runs.indexOf(run)]?.parameters) || [];
   hide("parameters", !can.has("parameters") || !list.length);
   sliders = list.map(makeSlider);
-  $("parameters").replaceChildren($("parameters").querySelector("h2"), ...sliders.map(one => one.whole));
+  const utilities = element("details", {}, element("summary", { textContent: "Utilities" }));
+  $("parameters").replaceChildren($("parameters").querySelector("h2"));
+  for (const { parameter, whole } of sliders) (parameter.name.includes(".utility.") ? utilities : $("parameters")).append(whole);
+  $("parameters").append(utilities);
 }
 function makeSlider(parameter) {
   const range = parameter.least != null && parameter.most != null,
