@@ -7,7 +7,6 @@ import zlib
 import schema
 
 DIRECTIONS = ("to_board", "to_host")
-CRC21_POLYNOMIAL = 0x1DBF6F
 
 
 def values_header(spec: schema.Schema) -> str:
@@ -21,14 +20,16 @@ def values_header(spec: schema.Schema) -> str:
     for name, flags in spec.flags.items():
         lines += ["", f"/* {flags.doc} */"]
         lines += [
-            f"#define {name.upper()}_{bit.upper()} (1u << {i})" + c_comment(flags.docs.get(bit, ""))
+            f"#define {name.upper()}_{bit.upper()} (1{'u' if i < 16 else 'ul'} << {i})"
+            + c_comment(flags.docs.get(bit, ""))
             for i, bit in enumerate(flags.bits)
         ]
     for name, enum in spec.enum.items():
         lines += ["", f"/* {enum.doc} */", "enum {"]
+        names = enum.values if name == "task" else [value.upper() for value in enum.values]  # TASK_name, for tasks.def
         lines += [
-            f"  {name.upper()}_{value.upper()} = {i}," + c_comment(enum.docs.get(value, ""))
-            for i, value in enumerate(enum.values)
+            f"  {name.upper()}_{own} = {i}," + c_comment(enum.docs.get(value, ""))
+            for i, (own, value) in enumerate(zip(names, enum.values, strict=True))
         ]
         lines += [f"  {name.upper()}_COUNT"]
         lines += ["};"]

@@ -56,7 +56,8 @@ def pins_header(spec: schema.Schema, robot: robot_files.Robot) -> str:
         f"#define DEVICES_BUILT {devices_built(spec, robot)}",
     ]
     lines += ["", "/* Defaults of the parameters, in counts of their scale. */"]
-    lines.append(f"#define DEFAULT_DEVICES {devices_default(spec, robot)}")
+    on = devices_default(spec, robot)
+    lines += [f"#define DEFAULT_{name.upper()} {on >> i & 0xFFFF}" for name, i in spec.devices_parameters.items()]
     for p in spec.parameter:
         if p.default_from:
             lines.append(f"#define DEFAULT_{p.name.upper()} {default_counts(p, robot)}")

@@ -31,7 +31,8 @@ def python_module(spec: schema.Schema) -> str:
     devices = spec.flags["devices"]
     lines += ["", "", "# The robot's device behind each bit.", "DEVICE_OF_BIT: dict[Devices, str] = {"]
     lines += [f'    Devices.{bit.upper()}: "{name}",' for bit, name in zip(devices.bits, devices.device, strict=True)]
-    lines += ["}"]
+    lines += ["}", "# The parameters that hold these flags, 16 bits each, and the first bit of each."]
+    lines += [f"DEVICES_PARAMETERS = {spec.devices_parameters}"]
     lines += [
         "",
         "",
@@ -90,7 +91,8 @@ def python_message(message: schema.Message) -> list[str]:
         comment = field.comment
         kind = "bytes" if field.text_length else "int"
         shadows = "  # type: ignore[assignment]" if hasattr(tuple, field.name) else ""
-        lines.append(f"    {field.name}: {kind}{shadows}" + (f"  # {comment}" if comment else ""))
+        default = " = 0" if field.name == "padding" else ""
+        lines.append(f"    {field.name}: {kind}{default}{shadows}" + (f"  # {comment}" if comment else ""))
     if not message.fields:
         lines.append("    pass")
     return [

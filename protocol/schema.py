@@ -33,6 +33,11 @@ NOT_ON_THE_WIRE = (
 )
 MINORS = 16
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
+DEVICES = {
+    "devices": 0,
+    "more_devices": 16,
+}  # parameters that hold 16 of the devices flags each, and the first of these
+PADDING = "so that this message is not as long as one of the handshake"
 
 # wire type -> (size in bytes, C type, struct letter, least, greatest)
 INTEGERS: dict[str, tuple[int, str, str, int, int]] = {
@@ -158,8 +163,8 @@ class Parameter:
     type: str
     unit: str
     doc: str
-    min: int
-    max: int
+    min: int = 0
+    max: int = 0
     scale: float = 1.0
     default: int | None = None
     default_from: str = ""
@@ -207,6 +212,11 @@ class Schema:
         """The messages to one side."""
         return [message for message in self.message if message.direction == direction]
 
+    @property
+    def devices_parameters(self) -> dict[str, int]:
+        """Those of DEVICES that it has."""
+        return {p.name: DEVICES[p.name] for p in self.parameter if p.name in DEVICES}
+
 
 def _base_flags(flags: dict[str, Flags]) -> dict[str, Any]:
     return {name: (some.type, some.bits[: len(some.bits) - len(some.since)]) for name, some in flags.items()}
@@ -241,7 +251,12 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path.name}: no valid TOML: {error}") from None
-    schema: Schema = _with_tasks(_converted(Schema, table, path.name))
+    return checked(table, path.name)
+
+
+def checked(table: dict[str, Any], place: str) -> Schema:
+    """The schema that a table of TOML says; see `load`."""
+    schema = _with_device_ranges(_with_tasks(_converted(Schema, table, place)))
     _unique("message", [m.name for m in schema.message], [m.id for m in schema.message])
     _unique("parameter", [p.name for p in schema.parameter], [p.id for p in schema.parameter])
     if [p.id for p in schema.parameter] != list(range(len(schema.parameter))):
@@ -265,6 +280,7 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
                 raise ValueError(f"message {message.name}: field {field.name} names unknown flags {field.flags!r}")
             if field.enum and field.enum not in schema.enum:
                 raise ValueError(f"message {message.name}: field {field.name} names unknown enum {field.enum!r}")
+    _pad(schema)
     for message in schema.message:
         alike = {m.delivery for m in schema.of_direction(message.direction) if m.length == message.length}
         if message.delivery == "handshake" and alike != {"handshake"}:
@@ -330,8 +346,34 @@ def _keys(kind: Any) -> tuple[dict[str, Any], list[str]]:
     return typing.get_type_hints(kind), required
 
 
+def _with_device_ranges(schema: Schema) -> Schema:
+    """The ranges of the parameters that hold the devices flags follow from these."""
+    bits = len(schema.flags["devices"].bits)
+    wanted = [name for name, first in DEVICES.items() if first < bits]
+    if bits > 32 or list(schema.devices_parameters) != wanted:
+        raise ValueError(
+            f"flags devices has {bits} bits; expected 32 at most, 16 each in the parameters {' and '.join(wanted)}"
+        )
+    every = (1 << bits) - 1
+    ranges = {name: every >> first & 0xFFFF for name, first in schema.devices_parameters.items()}
+    parameters = [dataclasses.replace(p, max=ranges.get(p.name, p.max)) for p in schema.parameter]
+    return dataclasses.replace(schema, parameter=parameters)
+
+
+def _pad(schema: Schema) -> None:
+    """Gives a byte more to a message that is as long as one of the handshake that stands before it: else a wrong bit in
+    the id would change the checksum's seed and nothing more."""
+    taken: set[tuple[str, int]] = set()
+    for message in schema.message:
+        if message.delivery == "handshake":
+            taken.add((message.direction, message.length))
+        elif (message.direction, message.length) in taken:
+            end = len(message.fields) - (2 if message.delivery == "set_point" else 0)
+            message.fields.insert(end, Field("padding", "u8", max=0, doc=PADDING))
+
+
 def _with_tasks(schema: Schema) -> Schema:
-    tasks = re.findall(r"^TASK\((\w+),", TASKS.read_text(encoding="utf-8"), re.MULTILINE)
+    tasks = list(dict.fromkeys(re.findall(r"^TASK\((\w+),", TASKS.read_text(encoding="utf-8"), re.MULTILINE)))
     enums = {
         name: dataclasses.replace(
             enum, values=enum.values + [enum.each_task.format(task) for task in tasks], tasks=len(tasks)

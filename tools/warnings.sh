@@ -20,7 +20,7 @@ compile() {
 # Most files of the firmware are the same for all pin maps: a file is compiled once for each text that the preprocessor
 # makes of it.
 touch "$lists/texts"
-for pin_map in $(grep -o 'PIN_MAP_[A-Z_]*' platformio.ini | sort -u); do
+for pin_map in $(grep -o 'PIN_MAP_[A-Z0-9_]*' platformio.ini | sort -u); do
   touch "$lists/$pin_map"
   for source in $(find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c); do
     text="$source $(gcc -E -P -D$pin_map -Ifirmware/src "$source" | cksum)"

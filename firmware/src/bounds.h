@@ -2,7 +2,7 @@
  *
  *   LOOP_BOUND(passes);     in a loop's body: the most passes each time that the loop is entered
  *   LOOP_CYCLES(cycles);    in the body of a loop that waits for a time: it takes at most these cycles, and then the pass
- *                           that is under way; interrupts come on top
+ *                           that is under way; interrupts come on top. In one that sleeps the time asleep is among them
  *
  * On the AVR each is a row of the section .boebot.loops, which is not loaded: three little-endian words of 32 bits, the
  * address in the body, passes, cycles; all ones: not said. Elsewhere they are nothing. `boebot timing` holds what the

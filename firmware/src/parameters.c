@@ -51,9 +51,6 @@ static int32_t decoded(uint16_t kept, parameter_range range) {
   return (int16_t)range.minimum < 0 ? (int32_t)(int16_t)kept : (int32_t)kept;
 }
 
-/* Only devices that the pin map has can be switched on. */
-static bool are_devices(uint16_t value) { return (value & (uint16_t)~DEVICES_BUILT) == 0; }
-
 static bool is_baud_rate(uint16_t value) {
   for (uint8_t i = 0; i < BAUD_RATES; i++) {
     if (value == hal_table_word(&baud_rates[i])) {
@@ -69,8 +66,12 @@ static bool is_allowed(uint8_t parameter, uint16_t kept, parameter_range range) 
     return false;
   }
   switch (parameter) {
-    case PARAMETER_DEVICES:
-      return are_devices(kept);
+    case PARAMETER_DEVICES: /* only those that the pin map has can be switched on */
+      return (kept & (uint16_t)~DEVICES_BUILT) == 0;
+#ifdef PARAMETER_MORE_DEVICES
+    case PARAMETER_MORE_DEVICES:
+      return (kept & (uint16_t) ~(DEVICES_BUILT >> 16)) == 0;
+#endif
     case PARAMETER_BAUD_RATE:
       return is_baud_rate(kept);
     default:
@@ -106,9 +107,17 @@ uint8_t parameters_set(uint8_t parameter, int32_t value) {
   return ANSWER_STATUS_OK;
 }
 
-bool parameters_device_on(uint16_t device) { return (values[PARAMETER_DEVICES] & device) != 0; }
+device_set parameters_devices(void) {
+#ifdef PARAMETER_MORE_DEVICES
+  return (device_set)values[PARAMETER_MORE_DEVICES] << 16 | values[PARAMETER_DEVICES];
+#else
+  return values[PARAMETER_DEVICES];
+#endif
+}
 
-bool parameters_device_in_use(uint16_t device) {
+bool parameters_device_on(device_set device) { return (parameters_devices() & device) != 0; }
+
+bool parameters_device_in_use(device_set device) {
   return parameters_device_on(device) && (has_host_come || values[PARAMETER_FALLBACK_AT_START] != 0);
 }
 

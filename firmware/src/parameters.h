@@ -29,12 +29,20 @@ int32_t parameters_get(uint8_t parameter);
 /* Returns an ANSWER_STATUS_...; the value changes only on ANSWER_STATUS_OK. */
 uint8_t parameters_set(uint8_t parameter, int32_t value);
 
-/* Whether a device (DEVICES_... bit) is switched on. */
-bool parameters_device_on(uint16_t device);
+/* DEVICES_... bits: one parameter has 16 of them, and where there are more, a second one has the others. */
+#ifdef PARAMETER_MORE_DEVICES
+typedef uint32_t device_set;
+#else
+typedef uint16_t device_set;
+#endif
+
+/* The devices that are switched on, and whether one is. */
+device_set parameters_devices(void);
+bool parameters_device_on(device_set device);
 
 /* Whether it may also drive its pins: only after a host has opened a session, as other devices may be wired to the board,
  * or where the board's own brain may begin by itself. */
-bool parameters_device_in_use(uint16_t device);
+bool parameters_device_in_use(device_set device);
 void parameters_host_has_come(void);
 
 /* All values as they are kept, PARAMETER_COUNT of them: an i16 in two's complement. */

@@ -55,7 +55,7 @@ void reset_start(void) {
   if (cause == RESET_CAUSE_UNKNOWN) {
     cause = cause_by_record(own, whole);
   }
-  if (cause == RESET_CAUSE_WATCHDOG && whole && own->running <= TASKS) {
+  if (cause == RESET_CAUSE_WATCHDOG && whole && own->running <= TASK_COUNT) {
     cause = (uint8_t)(RESET_CAUSE_WATCHDOG + own->running);
   }
   own->running = 0;

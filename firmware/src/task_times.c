@@ -5,12 +5,12 @@
 #include "reset.h"
 #include "tasks.h"
 
-static uint16_t longest[TASKS];
+static uint16_t longest[TASK_COUNT];
 static uint32_t began;  /* clock_now() */
 static uint8_t running; /* the task that runs */
 
 void task_times_start(void) {
-  for (uint8_t task = 0; task < TASKS; task++) {
+  for (uint8_t task = 0; task < TASK_COUNT; task++) {
     longest[task] = 0;
   }
 }
@@ -30,4 +30,4 @@ void task_has_ended(void) {
   reset_note_running(0);
 }
 
-uint16_t task_times_longest(uint8_t task) { return task < TASKS ? longest[task] : 0; }
+uint16_t task_times_longest(uint8_t task) { return task < TASK_COUNT ? longest[task] : 0; }

@@ -3,19 +3,14 @@
 #ifndef TASKS_H
 #define TASKS_H
 
+#include "generated/values.h" /* TASK_..., their numbers: the same in all images, also in those that do not have all tasks */
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 #define TASK(name, period, phase, budget) void name##_task(void) __attribute__((noinline));
 #include "tasks.def"
-
-/* Their numbers, in the order of tasks.def. */
-enum {
-#define TASK(name, period, phase, budget) TASK_##name,
-#include "tasks.def"
-  TASKS
-};
 
 /* The constants that the analysis needs; who defines one asserts that it is the same. */
 enum {

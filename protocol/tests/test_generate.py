@@ -4,14 +4,18 @@ frames agree with independent libraries."""
 from __future__ import annotations
 
 import ast
+import importlib.util
 import json
 import shutil
 import subprocess
 import sys
+import tomllib
 import venv
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from cobs import cobs
 
@@ -22,7 +26,9 @@ PROTOCOL = Path(__file__).resolve().parents[1]
 ROOT = PROTOCOL.parent
 sys.path.insert(0, str(PROTOCOL))
 
+import c_headers  # noqa: E402
 import pin_headers  # noqa: E402
+import python_module  # noqa: E402
 import reference_frame  # noqa: E402
 import robot_files  # noqa: E402
 import schema  # noqa: E402
@@ -173,28 +179,164 @@ def test_hash_ignores_explanations_and_sees_layout(tmp_path: Path) -> None:
     assert schema.load(file).hash != schema.load().hash
 
 
-def test_hash_ignores_what_a_minor_version_adds(tmp_path: Path) -> None:
+def free_id(spec: schema.Schema) -> int:
+    """Of a message to the host that there is not."""
+    return next(number for number in range(255, 0, -1) if number not in {message.id for message in spec.message})
+
+
+def test_hash_ignores_what_a_minor_version_adds() -> None:
     """A message, a parameter, flags and values at the end; without `since` each would be another version."""
-    original = (PROTOCOL / "messages.toml").read_text()
-    count = len(schema.load().parameter)
-    added = {
-        "minor = 1": "minor = 2",
-        '\n[[parameter]]\nname = "devices"': '\n[[message]]\nname = "more"\nid = 0x9E\ndirection = "to_host"\n'
-        'delivery = "telemetry"\ndoc = ""\nsince = 2\nfields = [{ name = "x", type = "u8" }]\n'
-        '\n[[parameter]]\nname = "devices"',
-        '"latched_again", "busy"]': '"latched_again", "busy", "tired"]\nsince = { tired = 2 }',
-        "max = 4095": "max = 8191",
-    }
-    text = original
-    for before, after in added.items():
-        assert text.count(before) == 1, before
-        text = text.replace(before, after)
-    text += f'\n[[parameter]]\nname = "mood"\nid = {count}\ntype = "u16"\nunit = ""\ndoc = ""\nmin = 0\nmax = 1\n'
-    file = tmp_path / "messages.toml"
-    file.write_text(text + "since = 2\n")
-    spec, ours = schema.load(file), schema.load()
+    table = tomllib.loads((PROTOCOL / "messages.toml").read_text())
+    table["flags"]["of_a_test"] = {"doc": "", "type": "u8", "bits": ["glad"]}
+    table["enum"]["of_a_test"] = {"doc": "", "values": ["glad"]}
+    ours, later = schema.checked(table, ""), deepcopy(table)
+    minor = later["minor"] = ours.minor + 1
+    since: list[tuple[dict[str, Any], Any]] = []
+    for kind, names in (("flags", "bits"), ("enum", "values")):
+        later[kind]["of_a_test"][names].append("tired")
+        since.append((later[kind]["of_a_test"], {"tired": minor}))
+    free = free_id(ours)
+    message = {"name": "added_by_a_test", "id": free, "direction": "to_host", "delivery": "telemetry", "doc": ""}
+    parameter = {"name": "added_by_a_test", "id": len(ours.parameter), "type": "u16", "unit": "", "doc": "", "max": 1}
+    since += [(message | {"fields": [{"name": "x", "type": "u8"}]}, minor), (parameter, minor)]
+    later["message"].append(since[-2][0])
+    later["parameter"].append(since[-1][0])
+    for added, value in since:
+        added["since"] = value
+    spec = schema.checked(later, "")
     assert spec.hash == ours.hash and spec.version_byte == ours.version_byte + 1
     assert [spec.message_hash(m) for m in ours.message] == [ours.message_hash(m) for m in ours.message]
-    for mark in ("since = { tired = 2 }", "since = 2\nfields", "since = 2\n"):
-        file.write_text((text + "since = 2\n").replace(mark, mark.partition("fields")[1]))
-        assert schema.load(file).hash != ours.hash, mark
+    for added, value in since:
+        del added["since"]
+        assert schema.checked(later, "").hash != ours.hash, added
+        added["since"] = value
+
+
+def executed(path: Path) -> Any:
+    """The module of a file, beside the one of its name."""
+    spec = importlib.util.spec_from_file_location(f"another_{path.stem}", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def output(clone: Path, source: str, *more: Path) -> list[str]:
+    """What a program prints that is compiled for robot lab of the clone."""
+    program = clone / "program.c"
+    program.write_text(f"#include <stdio.h>\n{source}")
+    firmware = clone / "firmware" / "src"
+    command = ["gcc", "-DPIN_MAP_LAB", f"-I{firmware}", "-o", program.with_suffix(""), program, *more]
+    subprocess.run([str(word) for word in command], check=True)
+    return subprocess.run([program.with_suffix("")], capture_output=True, text=True, check=True).stdout.splitlines()
+
+
+def grown(clone: Path, robot: str) -> Any:
+    """The Python module of the messages, as the clone's generator makes it; robot lab is `robot` and a table."""
+    head, _, device = robot.partition("\n")
+    (clone / "protocol" / "robots" / "lab.toml").write_text(
+        f'extends = "{head}"\nname = "lab"\npin_map = "lab"\n{device}'
+    )
+    done = run_generator(sys.executable, clone)
+    assert (done.returncode, done.stderr) == (0, "")
+    return executed(clone / "host" / "boebot" / "link" / "messages.py")
+
+
+def test_tasks_that_only_some_images_have_are_numbered_once(clone: Path) -> None:
+    """Boe-Bot has a buzzer and no line sensors: of its own tasks `second` would be the one before."""
+    tasks = clone / "firmware" / "src" / "tasks.def"
+    text = tasks.read_text()
+    assert text.count("\n#ifdef PIN_LINE_LEFT\nTASK(line, ") == 1
+    behind = text.index("#endif", text.index("TASK(line, ")) + len("#endif")
+    tasks.write_text(f"{text[:behind]}\n#ifdef PIN_BUZZER\nTASK(second, 8, 5, 100)\n#endif{text[behind:]}")
+    messages = grown(clone, "boebot")
+    source = """
+#include "generated/values.h"
+#include "pins.h"
+#include "tasks.h"
+#define SHOW(name, number) printf("%s %d %d\\n", name, number, RESET_CAUSE_WATCHDOG + 1 + number);
+#define TASK(name, period, phase, budget) SHOW(#name, TASK_##name)
+int main(void) {
+#include "tasks.def"
+}
+"""
+    of_image = output(clone, source)
+    cause = messages.ResetCause
+    of_host = [f"{t.name.lower()} {int(t)} {int(cause[f'WATCHDOG_IN_{t.name}'])}" for t in messages.Task]
+    assert of_host[-1].startswith("second ") and of_image == [row for row in of_host if not row.startswith("line ")]
+
+
+def test_a_second_parameter_holds_more_devices(clone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Devices 17 and 18, of which robot lab has the last, on the board and on the host."""
+    toml, flags = clone / "protocol" / "messages.toml", schema.load().flags["devices"]
+    names = [f"extra{i}" for i in range(18 - len(flags.bits))]
+    table = (
+        f'doc = ""\ntype = "u32"\nbits = {json.dumps(flags.bits + names)}\ndevice = {json.dumps(flags.device + names)}'
+    )
+    old = toml.read_text().partition("[flags.devices]\n")[2].partition("\n\n")[0]
+    number = len(schema.load().parameter)
+    more = f'\n[[parameter]]\nname = "more_devices"\nid = {number}\ntype = "u16"\nunit = "flags"\ndoc = ""\n'
+    toml.write_text(toml.read_text().replace(old, table) + more)
+    messages = grown(clone, f"boebot\n[device.{names[-1]}]\n")
+    others = messages.PARAMETERS["devices"]
+    assert (others.id, others.maximum, messages.PARAMETERS["more_devices"].maximum) == (0, 0xFFFF, 0b11)
+    source = f"""
+#include "generated/values.h"
+#include "parameters.h"
+#define LAST DEVICES_{names[-1].upper()}
+#define LAST_BUT_ONE DEVICES_{names[-2].upper()}
+int main(void) {{
+  parameters_start();
+  const unsigned long usual = parameters_u16(PARAMETER_DEVICES);
+  printf("%d %d\\n", parameters_devices() == (LAST | usual), parameters_device_on(LAST));
+  printf("%d\\n", parameters_set(PARAMETER_MORE_DEVICES, LAST_BUT_ONE >> 16) == ANSWER_STATUS_OUT_OF_RANGE);
+  printf("%d\\n", parameters_set(PARAMETER_MORE_DEVICES, 0) == ANSWER_STATUS_OK);
+  printf("%d %d\\n", parameters_devices() == usual, parameters_device_on(LAST));
+}}
+"""
+    assert output(clone, source, clone / "firmware" / "src" / "parameters.c") == ["1 1", "1", "1", "1 0"]
+    monkeypatch.setitem(sys.modules, "boebot.link.messages", messages)
+    host = executed(ROOT / "host" / "boebot" / "description" / "board_parameters.py")
+    usual = load_robot("boebot")
+    robot = msgspec.structs.replace(usual, device={**usual.device, names[-1]: usual.device["buzzer"]})
+    values = host.parameters_of(robot)
+    assert (values["devices"], values["more_devices"]) == (parameters_of(usual)["devices"], 0b10)
+    boards = (values, {"devices": 0.0}, {"more_devices": 0.0})  # the second one is an older board's
+    found = [(host.adapted(robot, board).has(names[-1]), host.adapted(robot, board).has("buzzer")) for board in boards]
+    assert found == [(True, True), (True, False), (False, True)]
+
+
+def test_a_message_as_long_as_one_of_the_handshake_is_padded_at_both_ends(tmp_path: Path) -> None:
+    table = tomllib.loads((PROTOCOL / "messages.toml").read_text())
+    text = {"name": "text", "type": "text[8]"}  # as long as `description`
+    table["message"].append(
+        {
+            "name": "remark",
+            "id": free_id(schema.load()),
+            "direction": "to_host",
+            "delivery": "telemetry",
+            "doc": "",
+            "fields": [text],
+        }
+    )
+    spec = schema.checked(table, "messages.toml")
+    (tmp_path / "messages.py").write_text(python_module.python_module(spec))
+    remark = executed(tmp_path / "messages.py").Remark
+    said = remark(b"12345678")
+    assert said.pack() == b"12345678\0" and remark.unpack(said.pack()) == said
+    (tmp_path / "messages.h").write_text(c_headers.messages_header(spec))
+    source = '#include "messages.h"\n_Static_assert(sizeof(msg_remark) == 9 && MSG_REMARK_LENGTH == 9, "padded");\n'
+    command = ["gcc", "-x", "c", "-fsyntax-only", f"-I{tmp_path}", f"-I{ROOT / 'firmware' / 'src'}", "-"]
+    subprocess.run(command, input=source, text=True, check=True)
+
+
+def test_every_pin_map_is_compiled_by_the_check_of_warnings(tmp_path: Path) -> None:
+    """By the names that the script finds; one may have digits."""
+    line = next(line for line in (ROOT / "tools" / "warnings.sh").read_text().splitlines() if "grep -o" in line)
+    maps = [robot_files.Robot("", {"board": "uno", "pin_map": name}) for name in ("lab", "lab-2b", "mk3")]
+    macros = [pin_headers.pin_map_macro(robot) for robot in maps]
+    flags = "".join(f"build_flags = ${{avr.flags}} -D{macro} -O1\n" for macro in macros)
+    (tmp_path / "platformio.ini").write_text(flags)
+    command = f'{line} echo "$pin_map"; done'
+    found = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert found.stdout.split() == macros

@@ -15,6 +15,7 @@ from dataclasses import dataclass, fields
 from itertools import count
 from math import gcd, prod
 
+from boebot.description.board_parameters import devices_values
 from boebot.description.robots import RobotDescription
 from boebot.devices.compass import MagneticCompass
 from boebot.devices.device import pin_number
@@ -226,7 +227,8 @@ def prepare(bench: Bench, robot: RobotDescription, scenario: str) -> Line:
     line = Line(bench)
     line.open()
     devices = built(robot) & {"everything": ~DEVICES(0), "faults": FAULT_DEVICES}.get(scenario, FIGURE_DEVICES)
-    line.set("devices", int(devices))
+    for name, value in devices_values(devices).items():
+        line.set(name, int(value))
     line.set("infrared_period", 2)
     line.set("infrared_sweep", 1)
     line.set("encoder_gap", 0)  # these edges do not bounce

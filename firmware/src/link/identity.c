@@ -60,7 +60,7 @@ bool identity_send_hello(void) {
       .boot_counter = storage_boot_counter(),
       .reset_cause = reset_cause(),
       .parameters_saved = storage_parameters_loaded(),
-      .devices = parameters_u16(PARAMETER_DEVICES),
+      .devices = parameters_devices(),
   };
   put_text(hello.robot, sizeof hello.robot, robot, sizeof robot);
   return send_message(MSG_HELLO_ID, &hello, sizeof hello);

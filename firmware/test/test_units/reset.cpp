@@ -58,7 +58,7 @@ TEST_CASE("a watchdog reset is reported with the task that ran, and with none be
   for (const uint8_t chip : {RESET_CAUSE_WATCHDOG, RESET_CAUSE_UNKNOWN}) { /* the latter behind such a bootloader */
     memory_bench bench;
     bench.power_on();
-    for (uint8_t task = 0; task < TASKS; task++) {
+    for (uint8_t task = 0; task < TASK_COUNT; task++) {
       bench.run(memory_bench::TICK);
       task_begins(task);
       reset_on_watchdog();
@@ -90,7 +90,7 @@ TEST_CASE("a task that ran at a reset of another cause is not reported, nor at t
 
 TEST_CASE("a number that is no task's is not believed") {
   memory_bench bench;
-  for (const int number : {TASKS + 1, 255}) {
+  for (const int number : {TASK_COUNT + 1, 255}) {
     bench.power_on();
     reset_note_running(static_cast<uint8_t>(number));
     bench.reset(RESET_CAUSE_WATCHDOG);

@@ -48,7 +48,8 @@ def info(
                 device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None
             ],
         }
-        parameters = {name: round(link.parameters.get(name), 6) for name in link.parameters.names if name != "devices"}
+        names = [name for name in link.parameters.names if name not in messages.DEVICES_PARAMETERS]
+        parameters = {name: round(link.parameters.get(name), 6) for name in names}
         telemetry = _latest(link)
     values["supply_v"] = telemetry.supply / 1000 or None
     values["latch"] = _name(messages.Latch, telemetry.latch)

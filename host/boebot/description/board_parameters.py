@@ -14,7 +14,7 @@ import msgspec
 from boebot.description.robots import RobotDescription
 from boebot.devices.infrared import InfraredSchedule
 from boebot.link.link import Link
-from boebot.link.messages import DEVICE_OF_BIT, PARAMETERS, Devices
+from boebot.link.messages import DEVICE_OF_BIT, DEVICES_PARAMETERS, PARAMETERS
 
 # parameter -> the keys of the description that it stands for besides its `default_from`
 _ALSO = {"encoder_counts": ("encoder_right.edges_per_turn",), "infrared_sweep": ("infrared.sweep",)}
@@ -22,7 +22,7 @@ _ALSO = {"encoder_counts": ("encoder_right.edges_per_turn",), "infrared_sweep": 
 
 def parameters_of(robot: RobotDescription) -> dict[str, float]:
     """The parameters that the robot's description settles, in their units."""
-    values: dict[str, float] = {"devices": sum(int(bit) for bit, device in DEVICE_OF_BIT.items() if robot.has(device))}
+    values = devices_values(sum(bit for bit, device in DEVICE_OF_BIT.items() if robot.has(device)))
     for parameter, spec in PARAMETERS.items():
         owner, _, key = spec.default_from.partition(".")
         if owner == "robot":
@@ -35,6 +35,11 @@ def parameters_of(robot: RobotDescription) -> dict[str, float]:
     if isinstance(schedule, InfraredSchedule) and robot.has("infrared_left"):
         values["infrared_sweep"] = float(schedule.sweep)
     return values
+
+
+def devices_values(devices: int) -> dict[str, float]:
+    """The parameters that switch these devices on, and no others."""
+    return {name: float(devices >> first & 0xFFFF) for name, first in DEVICES_PARAMETERS.items()}
 
 
 def configure(link: Link, robot: RobotDescription) -> RobotDescription:
@@ -71,6 +76,6 @@ def adapted(robot: RobotDescription, values: Mapping[str, float]) -> RobotDescri
                 devices[owner] = msgspec.structs.replace(devices[owner], **{key: kind(round(value, 9))})
     for bit, left in DEVICE_OF_BIT.items():
         for owner in {left, left.replace("_left", "_right")} & set(devices):
-            if not Devices(int(values.get("devices", bit))) & bit:
+            if not all(int(values.get(name, held)) & int(held) == held for name, held in devices_values(bit).items()):
                 devices[owner] = msgspec.structs.replace(devices[owner], on=False)
     return msgspec.structs.replace(robot, body=body, device=devices)
