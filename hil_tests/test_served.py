@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -133,6 +135,26 @@ def test_step_that_outlasts_its_set_points_ends_the_run_with_its_place(native_pt
     )
     assert len(done.stderr.splitlines()) == 1
     assert 0.49 < float(rows[-1]["time_s"]) < 0.6, "up to the step that did not end"
+
+
+def test_host_that_slept_ends_its_run_when_it_wakes(native_pty: str, tmp_path: Path) -> None:
+    """As a laptop that is closed and opened: for longer than the board keeps its session."""
+    (tmp_path / "brain.py").write_text(
+        "def step(robot):\n    robot.drive(0.5, 0.5)\n    if robot.time > 0.2:\n        print('drives', flush=True)\n"
+    )
+    command = [*BOEBOT, "run", str(tmp_path / "brain.py"), "--on", native_pty, "--seconds", "20"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as client:
+        assert client.stdout is not None
+        assert any(line.startswith("drives") for line in client.stdout)
+        client.send_signal(signal.SIGSTOP)
+        time.sleep(1.1)
+        client.send_signal(signal.SIGCONT)
+        _, errors = client.communicate(timeout=20)
+    assert client.returncode == 1 and re.fullmatch(
+        rf"boebot: this program stood still for 1\.\d s, as when a computer sleeps; expected 0\.75 s at most: "
+        rf"the board at {re.escape(native_pty)} has stopped its motors meanwhile\n",
+        errors,
+    )
 
 
 def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp_path: Path) -> None:

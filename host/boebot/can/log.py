@@ -392,8 +392,8 @@ class _LogReader:
                 lacks = "set-points" if tick in times else f"the telemetry of tick {tick}, which a set-point answers"
                 if place == 0:
                     raise BoebotError(f"{path} begins with a gap: it lacks {lacks}")
-                where = f"has a gap after tick {before} ({times[before]:.2f} s): it lacks {lacks}"
-                gap = GapError(f"{path} {where}; {count - place} of {count} commands are behind it")
+                behind = f"lacks {lacks}; {count - place} of {count} commands are behind it"
+                gap = GapError(f"{path} has a gap after tick {before} ({times[before]:.2f} s): it {behind}")
                 count = place
                 break
         last = ticks[count - 1]

@@ -5,8 +5,8 @@ has reached the next multiple of n, and its command goes out at once. On a live 
 board in this process time stands still while the brain thinks; but where such a run is paced, a step that took longer
 than the period was late, as it would be on a live board: that time passes before its command goes out.
 
-A board that was reset, or has ended the session because the host was silent, is configured and armed again, and the
-run goes on.
+A board that was reset is configured and armed again, and the run goes on; so it does after a session that the line, or
+a long step of the brain, has cost. But a host that slept ends its run when it wakes: who knows where the robot is then.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ _READY_TRIES = 10  # sessions that may end, one after another, before the board 
 _ARM_TRIES = 5  # latchings that may come between telemetry and arming: late copies of an earlier stop
 _PERIODS_TO_LIVE = 3  # telemetry periods that a set-point lives at least (PROTOCOL.md, "Delivery")
 _BYTES_TO_LIVE = 300
+_NAPS = 4  # in a session's time-out: no wait is longer. Who stands still for less than 3 of them keeps the session
 _LINE_SHARE = 4  # messages of slow devices fill a quarter of the line at most (PROTOCOL.md, "Delivery")
 # How long before telemetry is expected to look for it. Live, in ticks: one reading that came late does not make all
 # later ones late. On a simulated line of known rate a look that finds earlier bytes ends at once where the line is
@@ -58,6 +59,13 @@ _TICK = reader(messages.Telemetry, "tick")
 _UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
 _SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
 _NOT_YET = 1 << 32  # no tick is later
+
+
+def host_clock() -> float:
+    """Time (s) that goes on while the computer sleeps, where the system has such a clock; else the monotonic one."""
+    if not hasattr(wall, "clock_gettime"):
+        return wall.monotonic()
+    return wall.clock_gettime(getattr(wall, "CLOCK_BOOTTIME", wall.CLOCK_MONOTONIC))
 
 
 def message_ticks(devices_period: int, byte_s: float, tick_s: float) -> int:
@@ -290,18 +298,27 @@ class BoardDriver:
         on_time = not transport.realtime and link.line.known_byte_s > 0
         early_s = _LOOK_EARLY_BYTES * link.line.known_byte_s if on_time else _LOOK_EARLY * tick_s
         awaited = -1  # the tick that was looked for
-        started_s = received_s = look_s = transport.now()
+        started_s = received_s = now_s = look_s = transport.now()
+        nap_s = link.session.time_out_s / _NAPS if transport.realtime else math.inf
+        awake_s, took_s = host_clock(), 0.0  # as of `now_s`; the brain's step since then
         wait_until_s = received_s + (period + 1) * tick_s
         started = next_progress = wall.perf_counter()
         meanwhile: list[Received] = []  # what came during a late step of a paced run
         while True:
-            received = meanwhile + poll(look_s, wait_until_s)
+            received = meanwhile + poll(look_s, min(wait_until_s, now_s + nap_s))
             meanwhile = []
-            now_s = link.polled_s
+            stood_s = host_clock() - awake_s - (took_s if took_s <= self.step_limit.seconds else 0.0)
+            if stood_s > (_NAPS - 1) * nap_s:
+                raise BoardError(
+                    f"this program stood still for {stood_s:.1f} s, as when a computer sleeps; expected "
+                    f"{(_NAPS - 1) * nap_s:g} s at most: the board at {transport.name} has stopped its motors meanwhile"
+                )
+            now_s, took_s = link.polled_s, 0.0
             if link.counts.sessions != self._session:
                 received = self._in_new_session(received)
                 equipment = self.equipment
                 now_s = transport.now()
+            awake_s = host_clock()
             restarted = link.counts.board_resets != self.resets
             if not received:
                 if now_s - received_s > silence_s + period * tick_s:
@@ -349,7 +366,8 @@ class BoardDriver:
                 robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
                 shown = wall.perf_counter()
                 yield time_s
-                if paced and (took_s := wall.perf_counter() - shown) > self.period_s:
+                took_s = wall.perf_counter() - shown  # if more than the limit, this program stood still, too
+                if paced and took_s > self.period_s:
                     meanwhile = poll(received_s + took_s, received_s + took_s)
                 if robot.latched or self._halted:
                     self._apply_emergency_stop()
