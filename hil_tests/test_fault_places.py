@@ -18,6 +18,7 @@ from boebot import resources
 from boebot.cli import main
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
+from boebot.record.reading import read_run, robots_of
 from hil_tests.test_faults import JUMP_TO_ITSELF, planted
 from sim_bridge.tests.symbols import entry_of, find_symbol
 from sim_bridge.timing.measure import run
@@ -53,7 +54,6 @@ FAULTS = {
     STACK: r"the stack overflows: it reaches 0x0[3-6][0-9A-F]{2}, variables end below 0x0[3-6][0-9A-F]{2}",
     INVALID: "the program reached the invalid instruction 0x0001",
     WILD: "the program goes to 0x7000, but ends at 0x[345][0-9A-F]{3}",
-    NULL: "the program jumps to its start without a reset",
 }
 
 
@@ -163,6 +163,18 @@ def test_a_fault_ends_the_run_with_its_source_line(
     where = rf"at address 0x[0-9A-F]{{4}} in cycle \d+ {place}"
     assert re.search(rf"the emulated ATmega328P crashed at 0\.\d+ s: {FAULTS[number]} {where}", error), error
     assert "Traceback" not in error
+
+
+def test_a_null_pointer_that_is_called_is_told_with_its_source_line(
+    tmp_path: Path, command: Callable[..., tuple[object, str]], variants: Variants
+) -> None:
+    """The program begins anew, as on the robot; the run says where that came from, and so does its record."""
+    out = tmp_path / "out"
+    _, error = command(variants.one(NULL, tmp_path), "--out", str(out))
+    told = rf"the program jumps to its start at address 0x[0-9A-F]{{4}} in cycle \d+ {variants.place(NULL)}: legal, but"
+    assert len(re.findall(told, error)) == 1, error
+    result = robots_of(read_run(out))[1]
+    assert [notice for notice in result.notices if re.match(told, notice)] != []
 
 
 def test_a_program_that_hangs_at_each_opening_is_given_up(

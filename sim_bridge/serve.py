@@ -73,6 +73,7 @@ def carry(
     line = LineToBoard(session)
     baud = None
     brisk_until = look_at = 0.0
+    noted = 0
     said = bytearray()  # by the board, since somebody looked last
     while running():
         for event in port.look():
@@ -84,6 +85,9 @@ def carry(
             session.transport.set_baud(now)
             baud = now
         sim.run(pace.due())  # first: bytes that came meanwhile reach the board at the end of that time
+        for sentence in (notes := session.notes())[noted:]:
+            visit(Visit("notes", "the board", sentence))
+        noted = len(notes)
         if line.carry(port):
             brisk_until = time.monotonic() + BRISK_FOR_S
         if data := session.robot.receive():

@@ -149,6 +149,10 @@ class BoardSession(Protocol):
     def watchdog_resets(self) -> Sequence[WatchdogReset]:
         """Those so far, oldest first; empty where nobody sees into the board."""
 
+    def notes(self) -> Sequence[str]:
+        """Sentences on what the board's program asked for that the board does not do as the chip would, or the chip
+        not as it seems, each with its place, once; empty where nobody sees into the board."""
+
     def close(self) -> None:
         """Closes the board."""
 
@@ -238,14 +242,14 @@ class TogetherFactory(Protocol):
 
 
 class Visit(NamedTuple):
-    """What a client of a served robot did."""
+    """What a client of a served robot did, or what its board notes (`BoardSession.notes`)."""
 
     what: str
-    """"came", "went" or "refused"."""
+    """"came", "went", "refused" or "notes"."""
     client: str
-    """Its address, or the process that has opened the pseudo-terminal."""
+    """Its address, or the process that has opened the pseudo-terminal; "the board"."""
     why: str = ""
-    """Why it was refused or had to go."""
+    """Why it was refused or had to go; the note."""
 
 
 class Server(Protocol):
@@ -264,8 +268,9 @@ class Server(Protocol):
     ) -> None:
         """Serves an emulated board of that kind at real-time pace until `running()` is false: on a new pty,
         or on TCP port `tcp` of loopback (0: any free one). Calls `announce(url)` once clients may open that
-        URL, `visit` when one comes, goes or is refused, and `look` about 20 times a second with the session and what
-        the board has sent since; it returns at once, since the robot waits meanwhile."""
+        URL, `visit` when one comes, goes or is refused or the board notes something, and `look` about 20 times a
+        second with the session and what the board has sent since; it returns at once, since the robot waits
+        meanwhile."""
 
 
 class LiveSession:
@@ -299,6 +304,10 @@ class LiveSession:
 
     def watchdog_resets(self) -> Sequence[WatchdogReset]:
         """Nobody sees into a real board; in which task it hung it says itself."""
+        return ()
+
+    def notes(self) -> Sequence[str]:
+        """A real board does what it does."""
         return ()
 
     def close(self) -> None:

@@ -708,6 +708,9 @@ class InProcess:
     def watchdog_resets(self) -> list[WatchdogReset]:
         return []
 
+    def notes(self) -> list[str]:
+        return []
+
     def close(self) -> None:
         self.closed = True
 

@@ -65,6 +65,22 @@ typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channe
 
 #define BOARD_WATCHDOG_LOG "watchdog log" /* a board_watchdog_log */
 
+#define BOARD_NOTES "notes" /* a board_notes */
+#define BOARD_NOTES_MAXIMUM 64u
+
+/* Something that the program asked for and did not get, because it is not built or the chip does not give it so, or
+ * something legal that is seldom meant: once per run, where it happened first. */
+typedef struct {
+  uint64_t cycle;
+  uint32_t address; /* byte address in flash of the instruction */
+  const char *does, *what, *why;
+} board_note;
+
+typedef struct {
+  board_note notes[BOARD_NOTES_MAXIMUM]; /* oldest first */
+  size_t count;
+} board_notes;
+
 /* What a cell of the EEPROM holds after the supply failed while it was being written. */
 typedef enum {
   BOARD_DAMAGE_ERASED, /* 0xFF */

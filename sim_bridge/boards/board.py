@@ -158,6 +158,16 @@ class BoardMemory(ABC):
             return []
         return [(int(log.resets[i].cycle), int(log.resets[i].address)) for i in range(log.count)]
 
+    def notes(self, since: int = 0) -> list[tuple[int, int, str, str]]:
+        """Cycle, address (bytes), what the program did there and why that is not what it seems (board.h): each once,
+        oldest first, without the first `since`; empty where nobody sees into the board."""
+        log, text = self._memory_lib.board_notes_of(self._board), self._memory_ffi.string
+        if log == self._memory_ffi.NULL:
+            return []
+        found = (log.notes[i] for i in range(since, log.count))
+        words = ((note, *(text(part).decode() for part in (note.does, note.what, note.why))) for note in found)
+        return [(note.cycle, note.address, f"{does} {what}", why) for note, does, what, why in words]
+
 
 def check_range(what: str, address: int, count: int, size: int) -> None:
     """Raises ValueError where those are no addresses of a memory of that size."""

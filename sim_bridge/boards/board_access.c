@@ -108,3 +108,5 @@ uint8_t *board_memory(board *self) { return self->op->extension(self, BOARD_DATA
 board_eeprom *board_eeprom_of(board *self) { return self->op->extension(self, BOARD_EEPROM); }
 
 const board_watchdog_log *board_watchdog_log_of(board *self) { return self->op->extension(self, BOARD_WATCHDOG_LOG); }
+
+const board_notes *board_notes_of(board *self) { return self->op->extension(self, BOARD_NOTES); }

@@ -66,5 +66,6 @@ board_eeprom *board_eeprom_of(board *self);
 
 /* NULL on a board that has no watchdog. */
 const board_watchdog_log *board_watchdog_log_of(board *self);
+const board_notes *board_notes_of(board *self);
 
 #endif

@@ -40,6 +40,15 @@ def with_place(fault: str, elf: Path | None, address: int, z: int = 0) -> str:
     return f"{fault} {where}".rstrip()
 
 
+def note_sentences(notes: Sequence[tuple[int, int, str, str]], elf: Path | None) -> list[str]:
+    """For people: the notes of a board (`BoardMemory.notes`), with places by the image's file."""
+    found = places(elf, [address for _, address, _, _ in notes]) if notes else {}
+    return [
+        f"the program {does} at address 0x{address:04X} in cycle {cycle} {found.get(address, '')}".rstrip() + f": {why}"
+        for cycle, address, does, why in notes
+    ]
+
+
 def watchdog_resets(log: Sequence[tuple[int, int]], elf: Path | None) -> list[WatchdogReset]:
     """What the log of a board's watchdog says (`BoardMemory.watchdog_log`), with places by the image's file."""
     found = places(elf, [address for _, address in log]) if log else {}

@@ -25,10 +25,11 @@ class EmulatedBoard:
         keep: Any = None,
         firmware: bytes = b"",
         elf: Path | None = None,
+        assumed: str = "",
         again: Callable[[], EmulatedBoard] | None = None,
     ) -> None:
         """`release` frees the board, `again` makes one more like it; `firmware` is what it runs, `elf` the file
-        that says where in the source an address comes from.
+        that says where in the source an address comes from, `assumed` what it does not say and was assumed.
 
         Raises:
             BoardError: the board was built for another version of this package.
@@ -37,6 +38,7 @@ class EmulatedBoard:
         self.description = description
         self.firmware = hashlib.sha256(firmware).hexdigest()
         self.elf = elf
+        self.assumed = assumed
         self._release: Callable[[], None] | None = release
         self._free = weakref.finalize(self, release)  # for one that is dropped; at the exit its world may still hold it
         self._free.atexit = False
@@ -152,6 +154,7 @@ def avr_board(image: Path) -> EmulatedBoard:
         keep=board,
         firmware=image.read_bytes(),
         elf=image,
+        assumed=board.assumed_chip,
         again=lambda: avr_board(image),
     )
 

@@ -17,7 +17,7 @@ from boebot.devices.uart import Uart
 from boebot.errors import BoardError
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.code_places import watchdog_resets
+from sim_bridge.boards.code_places import note_sentences, watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins, PinRecorder
 from sim_bridge.sessions.opening import InWorld, Wait, alone, drain, new_sim
@@ -101,6 +101,7 @@ class SimSession(InWorld):
         self.transport.set_baud(self.transport.baud)
         self._shared = shared
         self._closed = False
+        self._notes: list[str] = []
 
     def drain(self, *, ended: bool = False) -> Group:
         """See `boebot.boards.BoardSession`."""
@@ -124,6 +125,12 @@ class SimSession(InWorld):
             "load": board["executed_cycles"] / cycle if cycle else 0.0,
             "true_supply_v": self.robot.supply_voltage,
         }
+
+    def notes(self) -> list[str]:
+        """See `boebot.boards.BoardSession`."""
+        self._notes += note_sentences(self.board.notes(since=len(self._notes)), self.robot.board.elf)
+        assumed = self.robot.board.assumed
+        return [assumed, *self._notes] if assumed else list(self._notes)
 
     def watchdog_resets(self) -> list[WatchdogReset]:
         """Where the watchdog of an emulated ATmega328P found the program; none of a board without one."""

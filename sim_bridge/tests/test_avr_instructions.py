@@ -148,8 +148,13 @@ def test_bad_opcode_is_a_crash_until_the_next_reset() -> None:
 WILD_JUMPS = ["ijmp", "icall", "push r30\n push r31\n ret", "push r30\n push r31\n reti", "jmp 0x7F00", "call 0x7F00"]
 
 
-@pytest.mark.parametrize("jump", WILD_JUMPS)
-@pytest.mark.parametrize(("address", "what"), [(0x7F00, "goes to 0x7F00, but ends at"), (0, "jumps to its start")])
+@pytest.mark.parametrize(
+    ("jump", "address", "what"),
+    [
+        *((jump, 0x7F00, "goes to 0x7F00, but ends at") for jump in WILD_JUMPS),
+        *((jump, 0, "returns to its start") for jump in WILD_JUMPS if "ret" in jump),
+    ],
+)
 def test_a_jump_to_where_no_instruction_is_is_a_crash(jump: str, address: int, what: str) -> None:
     jump = jump.replace("0x7F00", str(address))
     source = f"main: ldi r30, lo8({address // 2})\n ldi r31, hi8({address // 2})\n {jump}\n last: nop"

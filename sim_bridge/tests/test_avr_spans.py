@@ -294,7 +294,6 @@ JUMPS = "main: ldi r30, 0\n ldi r31, 0x30\n ijmp"
     [
         (RECURSES, {}, "the stack overflows: it reaches 0x01FE"),
         (JUMPS, {}, "the program goes to 0x6000, but ends at 0x"),
-        ("main: ldi r30, 0\n ldi r31, 0\n ijmp", {}, "jumps to its start"),
         ("main: pop r24\n rjmp main", {}, "the stack pointer leaves the memory: 0x0900"),
         (HANGS, {"patience": 1000}, "the program hangs: it has not slept for 1000 cycles"),
         ("main: nop\n .word 0x0001", {}, "the invalid instruction 0x0001"),

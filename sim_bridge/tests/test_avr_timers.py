@@ -455,3 +455,85 @@ def test_timer_0_interrupt_makes_a_tone_on_any_pin(frequency: int, clock_select:
     halves = gaps(edges_of(machine.board.log(), 4)[2:])
     assert len(halves) >= 10
     assert set(halves) == {divider * (top + 1)}
+
+
+# ---- where the phase-correct modes turn (15.7.4, 16.9.4, 16.9.5) ----
+
+Writes = list[tuple[str, int]]
+
+
+def place(register: str) -> str:
+    """Its address in the data space; avr_program.PREAMBLE has those of IN and OUT without the 0x20 in front of them."""
+    return f"{register} + 0x20" if "0" in register or register == "GTCCR" else register
+
+
+def writes(rows: Writes) -> str:
+    """Code that writes registers, 3 cycles each."""
+    return "".join(f" ldi r24, {value}\n sts {place(name)}, r24\n" for name, value in rows)
+
+
+def turning(timer: int, mode: int, before: Writes, behind: Writes, changes: dict[int, Writes]) -> list[int]:
+    """The count, once in each count of 64 cycles, of a timer that starts at 0. Written is something before its mode is
+    set and behind it, and behind the samples of some numbers."""
+    clock = (mode & 12) << 1 | 3
+    setting = [(f"TCCR{timer}A", mode & 3), (f"TCCR{timer}B", clock & ~3)]
+    code = "main:\n ldi r26, 0\n ldi r27, 2\n" + writes([*before, *setting, *behind, ("GTCCR", 1)])
+    code += writes([(f"TCCR{timer}B", clock)])
+    for number in range(SAMPLES):
+        change = changes.get(number, [])
+        code += f" lds r24, {place('TCNT0' if timer == 0 else 'TCNT1L')}\n st X+, r24\n" + writes(change)
+        code += f" .rept {64 - 4 - 3 * len(change)}\n nop\n .endr\n"
+    machine = Machine(code + "1: rjmp 1b")
+    machine.board.run(64 * (SAMPLES + 2))
+    return list(machine.avr.data(0x200, SAMPLES))
+
+
+SAMPLES = 14
+PHASE, PHASE_AND_FREQUENCY, PHASE_ICR = 5, 9, 10  # of timer 0, of timer 1, of timer 1
+
+
+def top_1(value: int) -> Writes:
+    return [("OCR1AH", 0), ("OCR1AL", value)]
+
+
+COUNT_0: Writes = [("TCNT1H", 0), ("TCNT1L", 0)]
+TURNS = {
+    # OCR0A is taken over at TOP: the way down begins where the old top was, the way up ends at the new one (16.9.4)
+    "lowered": (0, PHASE, [("OCR0A", 4)], [], {2: [("OCR0A", 3)]}, [0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2, 3, 2, 1]),
+    "raised": (0, PHASE, [("OCR0A", 4)], [], {2: [("OCR0A", 6)]}, [0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2, 3, 4, 5]),
+    "lowered on the way down": (
+        *(0, PHASE, [("OCR0A", 3)], [], {4: [("OCR0A", 2)]}),
+        [0, 1, 2, 3, 2, 1, 0, 1, 2, 3, 2, 1, 0, 1],
+    ),
+    # the direction changes where the count equals TOP: beyond it, it goes on to MAX
+    "beyond": (0, PHASE, [("OCR0A", 4)], [], {2: [("TCNT0", 252)]}, [0, 1, 2, 253, 254, 255, 0, 1, 2, 3, 4, 3, 2, 1]),
+    "beyond, on the way down": (
+        *(0, PHASE, [("OCR0A", 4)], [], {5: [("TCNT0", 9)]}),
+        [0, 1, 2, 3, 4, 3, 8, 7, 6, 5, 4, 3, 2, 1],
+    ),
+    "ICR1 missed": (1, PHASE_ICR, [], [("ICR1H", 0), ("ICR1L", 5)], {3: [("ICR1L", 2)]}, list(range(14))),
+    # taken over at BOTTOM; that is also where a program puts the count
+    "at rest": (1, PHASE_AND_FREQUENCY, [], [*top_1(4), *COUNT_0], {}, [0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2, 3, 4, 3]),
+    "set to 0": (
+        *(1, PHASE_AND_FREQUENCY, top_1(6), [], {3: [*top_1(2), *COUNT_0]}),
+        [0, 1, 2, 3, 1, 2, 1, 0, 1, 2, 1, 0, 1, 2],
+    ),
+    "not before BOTTOM": (
+        *(1, PHASE_AND_FREQUENCY, top_1(4), [], {2: top_1(2)}),
+        [0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2, 1, 0, 1],
+    ),
+}
+
+
+@pytest.mark.parametrize("what", TURNS)
+def test_turns_of_the_phase_correct_modes(what: str) -> None:
+    timer, mode, before, behind, changes, counts = TURNS[what]
+    assert turning(timer, mode, before, behind, changes) == counts
+
+
+def test_a_top_of_zero_that_is_raised_is_left() -> None:
+    counts = turning(0, PHASE, [], [], {3: [("OCR0A", 3)]})
+    assert counts[:4] == [0, 0, 0, 0]
+    start = counts.index(1)
+    assert start <= 5
+    assert counts[start:] == [1, 2, 3, 2, 1, 0, 1, 2, 3, 2][: len(counts) - start]

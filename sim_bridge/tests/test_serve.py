@@ -8,6 +8,8 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import serial
@@ -18,6 +20,7 @@ from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.transport import Transport
 from sim_bridge.serve import Look, serve
+from sim_bridge.tests.avr_program import assemble
 
 pytestmark = pytest.mark.wall_clock
 
@@ -143,6 +146,24 @@ def test_what_cannot_be_served_is_told() -> None:
             serve("native", request(), tcp=taken, announce=print, visit=print, running=lambda: False)
     with pytest.raises(BoardError, match="no emulated board 'toaster'"):
         serve("toaster", request(), tcp=0, announce=print, visit=print, running=lambda: False)
+
+
+def test_what_the_board_notes_is_told_while_it_is_served(tmp_path: Path) -> None:
+    image = tmp_path / "program.elf"
+    image.write_bytes(assemble("main: ldi r24, 0x51\n out SPCR, r24\n1: rjmp 1b"))
+    visits: list[Visit] = []
+    begun = time.monotonic()
+    serve(
+        "avr",
+        replace(request(), image=str(image)),
+        tcp=0,
+        announce=lambda _: None,
+        visit=visits.append,
+        running=lambda: not visits and time.monotonic() < begun + 5,
+    )
+    (note,) = visits
+    assert (note.what, note.client) == ("notes", "the board")
+    assert note.why.startswith("the program writes to SPCR at address 0x")
 
 
 def test_somebody_looks_where_the_robot_is() -> None:

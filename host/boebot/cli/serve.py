@@ -13,7 +13,7 @@ from boebot.cli import options, output, streams, watched
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 
-_WORDS = {"came": "came; the board is reset", "went": "went", "refused": "was refused"}
+_WORDS = {"came": "came; the board is reset", "went": "went", "refused": "was refused", "notes": "notes"}
 
 
 def serve(

@@ -447,7 +447,7 @@ class BoardDriver:
             wall_time=elapsed_s,
             identity=self.identity,
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
-            notices=[*self.notices, *hangs.sentences(watchdog_resets)],
+            notices=[*self.notices, *self.session.notes(), *hangs.sentences(watchdog_resets)],
             watchdog_resets=watchdog_resets,
             counters=dict(self.session.counters()),
             without=self.task.request.without,

@@ -235,7 +235,7 @@ def _board_driver(session: BoardSession, task: Task) -> Driver:
     try:
         return BoardDriver(session, task)
     except BoebotError as error:
-        for sentence in hangs.sentences(session.watchdog_resets()):
+        for sentence in (*session.notes(), *hangs.sentences(session.watchdog_resets())):
             error.add_note(sentence)
         raise
 

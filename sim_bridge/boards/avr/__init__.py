@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from avr_timing.errors import AnalysisError
+from avr_timing.image.chip import assumed_chip
 from boebot import resources
 from boebot.errors import BoardError
 from boebot.files import regular
@@ -64,14 +66,24 @@ def _extension() -> Any:
 
 class AvrBoard:
     """An emulated Arduino Uno. `pointer` is its `board *` as an integer, valid until `close` or the end of this
-    object: the user of the pointer keeps this object.
+    object: the user of the pointer keeps this object. `assumed_chip`: a sentence where the image does not say for which
+    chip it is, or "".
     """
 
     def __init__(self, elf: bytes, path: Path) -> None:
-        """Powers on a board whose flash holds the program of an ELF file, which is at `path`."""
+        """Powers on a board whose flash holds the program of an ELF file, which is at `path`.
+
+        Raises:
+            BoardError: it is no such file, or one for another chip.
+        """
         extension = _extension()
         self._ffi, self._lib = extension.ffi, extension.lib
         self.elf = path
+        self._board = self._ffi.NULL
+        try:
+            self.assumed_chip = assumed_chip(f"the firmware image {path}", elf)
+        except AnalysisError as refused:
+            raise BoardError(str(refused)) from None
         error = self._ffi.new("char[]", ERROR_SIZE)
         self._board = self._lib.avr_board_create(elf, len(elf), error, ERROR_SIZE)
         if self._board == self._ffi.NULL:

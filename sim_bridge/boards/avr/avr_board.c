@@ -19,10 +19,6 @@ void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param) {
   avr_register_io_read(b->avr, address, read, param);
 }
 
-void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param) {
-  avr_register_io_write(b->avr, address, write, param);
-}
-
 void on_bit_write(avr_board *b, uint16_t address, avr_io_write_bit_t write, void *param) {
   avr_register_io_bit_write(b->avr, address, write, param);
 }
@@ -72,15 +68,9 @@ void add_flag_register(avr_board *b, uint16_t address, const uint8_t vectors[8])
 
 /* MCUSR: flags can only be cleared. */
 static void write_reset_flags(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  (void)param;
+  if (value & ~avr->data[address])
+    note(param, avr->pc, "writes 1 to", "MCUSR", "its flags can only be cleared (11.9.1)");
   avr->data[address] &= value;
-}
-
-static void ignore_write(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  (void)avr;
-  (void)address;
-  (void)value;
-  (void)param;
 }
 
 /* ---- construction ---- */
@@ -103,8 +93,8 @@ void mx8_init(struct avr_t *avr) {
   b->io.ioctl = on_request;
   avr_flash_init(avr, &chip->selfprog);
   avr_register_io(avr, &b->io);
+  registers_init(b);
   on_write(b, REG_MCUSR, write_reset_flags, b);
-  on_write(b, RESERVED_RAMPZ, ignore_write, b);
   pins_init(b);
   timers_init(b);
   usart_init(b);
@@ -195,6 +185,7 @@ static void *extension(board *self, const char *name) {
   if (!strcmp(name, BOARD_EEPROM)) return &b->eeprom.face;
   if (!strcmp(name, AVR_BOARD_FLASH)) return b->avr->flash;
   if (!strcmp(name, BOARD_WATCHDOG_LOG)) return &b->watchdog_history.log;
+  if (!strcmp(name, BOARD_NOTES)) return &b->notes;
   if (!strcmp(name, BOARD_FAULT_ADDRESS)) {
     return b->crashed && b->fault_address != NO_ADDRESS ? &b->fault_address : NULL;
   }

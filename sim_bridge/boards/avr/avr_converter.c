@@ -1,6 +1,6 @@
 /* avr_converter.c: the analog-to-digital converter (24): 13 clocks of the converter for a conversion, 25 for the first
  * one after it was enabled; the input is held 1.5 (13.5) clocks after the start. Channel and reference are those at the
- * first of these clocks. Single conversions and free running; a program that selects another trigger is stopped.
+ * first of these clocks. Single conversions and free running; no other trigger comes.
  *
  * The reference is AVCC, at the supply, or the band gap; nothing is joined to AREF, which reads as AVCC. The band gap as
  * input (channel 14) is good 70 us after it was selected (29.5, the longest start-up time), until then too low.
@@ -29,6 +29,16 @@ enum {
 static uint64_t clock_cycles(const avr_board *b) {
   unsigned setting = b->avr->data[REG_ADCSRA] & ADPS;
   return UINT64_C(1) << (setting ? setting : 1);
+}
+
+static void note_missing(avr_board *b) {
+  const uint8_t selection = b->avr->data[REG_ADMUX], channel = selection & MUX;
+  if (channel >= BOARD_ANALOG_COUNT && channel < MUX_BAND_GAP) {
+    note(b, b->avr->pc, "converts", "a channel without pin", "the temperature sensor is not built: it reads 0 V");
+  }
+  if (!(selection & REFS)) {
+    note(b, b->avr->pc, "converts with", "the reference AREF", "nothing is joined to it: it is at the supply");
+  }
 }
 
 /* A conversion that was asked for at `cycle`. */
@@ -85,7 +95,7 @@ void converter_due(avr_board *b, uint64_t cycle) {
   set_due(b, DUE_CONVERTER, NEVER);
   if (!c->locked) c->result = (uint16_t)(b->avr->data[REG_ADMUX] & ADLAR ? c->sample << 6 : c->sample);
   raise_flag(b, VECTOR_ADC);
-  if (*control & ADATE) {
+  if ((*control & ADATE) && !(b->avr->data[REG_ADCSRB] & ADTS)) {
     start(b, cycle - 1); /* at this very edge */
   } else {
     *control &= (uint8_t)~ADSC;
@@ -116,10 +126,10 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
     c->enabled_at = cycle;
     c->first = true;
   }
-  if ((value & ADATE) && (avr->data[REG_ADCSRB] & ADTS)) refuse(b, "a trigger of the ADC");
   if (converting) {
     avr->data[address] |= ADSC; /* writing 0 does not stop it */
   } else if (value & ADSC) {
+    note_missing(b);
     start(b, cycle);
   }
 }
@@ -129,15 +139,6 @@ static void write_selection(avr_t *avr, avr_io_addr_t address, uint8_t value, vo
   uint64_t cycle = begin_access(b) + 1;
   if ((avr->data[address] & MUX) != MUX_BAND_GAP) b->converter.band_gap_from = cycle;
   avr->data[address] = value;
-}
-
-/* Which trigger starts conversions by itself, once ADATE is set. */
-static void write_trigger(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  begin_access(b);
-  avr->data[address] = value;
-  const uint8_t armed = ADEN | ADATE;
-  if ((value & ADTS) && (avr->data[REG_ADCSRA] & armed) == armed) refuse(b, "a trigger of the ADC");
 }
 
 static uint8_t read_low(avr_t *avr, avr_io_addr_t address, void *param) {
@@ -168,7 +169,6 @@ void converter_reset(avr_board *b) {
 void converter_init(avr_board *b) {
   on_read(b, REG_ADCSRA, read_control, b);
   on_write(b, REG_ADCSRA, write_control, b);
-  on_write(b, REG_ADCSRB, write_trigger, b);
   on_write(b, REG_ADMUX, write_selection, b);
   on_read(b, REG_ADCL, read_low, b);
   on_read(b, REG_ADCH, read_high, b);

@@ -22,6 +22,8 @@
 enum { EEPM = 0x30, EERIE = 0x08, EEMPE = 0x04, EEPE = 0x02, EERE = 0x01 };
 enum { MODE_ERASE_AND_WRITE = 0x00, MODE_ERASE = 0x10, MODE_WRITE = 0x20 }; /* EEPM */
 
+static const char BUSY[] = "it is dropped: a write is under way (8.6.3)";
+
 static uint8_t result_of(uint8_t mode, uint8_t old, uint8_t value) {
   if (mode == MODE_ERASE) return 0xFF;
   return mode == MODE_WRITE ? old & value : value;
@@ -72,6 +74,9 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
     start_write(b, mode, cycle + 1);
     return;
   }
+  if ((value & EEPE) && !e->writing)
+    note(b, avr->pc, "sets", "EEPE", "it is dropped: EEMPE was not set just before (8.6.3)");
+  if ((value & EERE) && e->writing) note(b, avr->pc, "sets", "EERE", BUSY);
   if ((value & EEMPE) && (e->writing || !(value & EEPE))) e->armed_until = cycle + 1 + ARMED_CYCLES;
   if ((value & EERE) && !e->writing) {
     e->data = e->cells[e->selected];
@@ -82,12 +87,12 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
 static void write_address(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
   avr_board *b = param;
   eeprom_state *e = &b->eeprom;
-  (void)avr;
   begin_access(b);
-  if (e->writing) return;
   unsigned high = address == REG_EEARH ? value & (BOARD_EEPROM_SIZE / 256u - 1u) : e->selected >> 8;
   unsigned low = address == REG_EEARH ? e->selected & 0xFFu : value;
-  e->selected = (uint16_t)(high << 8 | low);
+  const uint16_t selected = (uint16_t)(high << 8 | low);
+  if (e->writing && selected != e->selected) note(b, avr->pc, "writes to", "EEAR", BUSY);
+  if (!e->writing) e->selected = selected;
 }
 
 static uint8_t read_address(avr_t *avr, avr_io_addr_t address, void *param) {

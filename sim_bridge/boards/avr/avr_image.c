@@ -14,13 +14,9 @@
 
 #define ELF_HEADER_SIZE 52u
 #define SEGMENT_HEADER_SIZE 32u
-#define MACHINE_AVR 83u
-#define ARCHITECTURE_MASK 0x7Fu
-#define ARCHITECTURE_AVR5 5u /* that of the ATmega328P */
 #define SEGMENT_LOAD 1u
 #define SEGMENT_EXECUTABLE 1u
 #define DATA_BASE 0x800000u
-#define RAM_BEGIN 0x100u
 #define EEPROM_BASE 0x810000u
 #define BOOT_BEGIN 0x7000u /* of the largest boot section */
 
@@ -54,23 +50,19 @@ static void heed_segment(avr_board *b, const uint8_t *segment) {
     b->code_end = address + length;
   }
   uint32_t begin = place - DATA_BASE;
-  if (begin < BOARD_DATA_SIZE && size < BOARD_DATA_SIZE - begin && begin + size > b->lowest_stack) {
-    b->lowest_stack = (uint16_t)(begin + size);
+  if (begin < BOARD_DATA_SIZE && size < BOARD_DATA_SIZE - begin && begin + size > b->variables_end) {
+    b->variables_end = (uint16_t)(begin + size);
   }
 }
 
 bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size_t error_size) {
-  if (!is_elf(elf, size) || half(elf + 18) != MACHINE_AVR) {
-    snprintf(error, error_size, "it is not an ELF file for AVR");
-    return false;
-  }
-  if ((word(elf + 36) & ARCHITECTURE_MASK) != ARCHITECTURE_AVR5) {
-    snprintf(error, error_size, "it was built for another AVR than the ATmega328P");
+  if (!is_elf(elf, size)) {
+    snprintf(error, error_size, "it is not an ELF file");
     return false;
   }
   uint32_t table = word(elf + 28), entry_size = half(elf + 42), entries = half(elf + 44);
   bool loaded = false;
-  b->lowest_stack = RAM_BEGIN;
+  b->variables_end = RAM_BEGIN;
   for (uint32_t i = 0; i < entries; i++) {
     uint64_t at = table + (uint64_t)i * entry_size;
     if (entry_size < SEGMENT_HEADER_SIZE || at + SEGMENT_HEADER_SIZE > size) {
@@ -98,7 +90,7 @@ bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size
   if (begin >= BOOT_BEGIN && begin < b->code_end) {
     b->avr->reset_pc = begin;
   } else {
-    b->code_begin = 1; /* nobody jumps to 0 but a reset */
+    b->code_begin = 1; /* who jumps to 0 has no reset */
   }
   if (!loaded) snprintf(error, error_size, "it holds no program");
   return loaded;

@@ -13,9 +13,10 @@
 #include "avr_parts.h"
 #include "sim_core.h"
 
-#define RAM_BEGIN 0x100u
 #define REG_SPMCSR 0x57u
 #define SP 0x5Du
+#define ERASED 0xFFFFu
+#define FRAME_WORDS 12u /* from IN to OUT where a function makes room for its variables */
 
 enum { Y = 28, Z = 30 };
 
@@ -129,24 +130,50 @@ static inline bool skips(const uint8_t *data, unsigned opcode, unsigned kind) {
 
 static inline uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
+/* Whether OUT SPL at `at` makes the stack grow, as the functions of gcc do for their variables (IN Rd, SPL; a
+ * subtraction; OUT SPL, Rd), and does not choose another one, whose pointer is loaded. */
+static bool grows_stack(const uint8_t *flash, uint32_t at) {
+  unsigned opcode = word_at(flash, at), source = D;
+  for (unsigned words = 1; words <= FRAME_WORDS && 2 * words <= at; words++) {
+    opcode = word_at(flash, at - 2 * words);
+    unsigned kind = avr_kinds[opcode];
+    bool loads = kind == LDI || kind == LD || kind == LDD || kind == LDS || kind == POP;
+    if ((loads || kind == IN_STACK) && (kind == LDI ? H : D) == source) return kind == IN_STACK;
+  }
+  return false;
+}
+
 /* A stack pointer that is not where it may be has gone wrong only behind an instruction that leaves it whole: a program
  * writes it in two halves, the upper one first (avr-libc, gcc), and what is between them says nothing. */
-static void check_stack_behind(avr_board *b, uint32_t at) {
+static void check_stack_behind(avr_board *b, uint32_t at, uint32_t before) {
   uint32_t pointer = word_at(b->avr->data, SP);
-  if (pointer + 1u >= b->lowest_stack && pointer < BOARD_DATA_SIZE) return;
+  bool may_be_there = pointer + 1u >= b->lowest_stack && pointer < BOARD_DATA_SIZE;
+  if (may_be_there && b->lowest_stack == b->variables_end) return;
   unsigned opcode = at < AVR_BOARD_FLASH_SIZE ? word_at(b->avr->flash, at) : 0;
-  if (moves_whole_stack(opcode)) check_stack(b, at);
+  if (may_be_there) { /* and was elsewhere */
+    if (sets_stack(opcode) && pointer + 1u >= b->variables_end) b->lowest_stack = b->variables_end;
+  } else if (moves_whole_stack(opcode)) {
+    check_stack(b, at, sets_stack(opcode) ? !grows_stack(b->avr->flash, at) : before + 1u < b->lowest_stack);
+  }
 }
 
 /* That at `pc`, which then is the next one's address. False: the core is to stop behind it. `until` may come nearer by it. */
 static bool uncommon(avr_board *b, uint32_t *pc, uint64_t *until) {
   avr_t *avr = b->avr;
   avr->run_cycle_count = 1; /* one instruction; what wants the core to stop makes it 0 */
-  uint32_t at = *pc;
-  *pc = (uint32_t)avr_run_one(avr);
-  check_stack_behind(b, at);
+  const uint32_t at = *pc, before = word_at(avr->data, SP);
+  const uint16_t lowest = b->lowest_stack;
+  if (at < avr->reset_pc && word_at(avr->flash, at) == ERASED) { /* as the chip does, a cycle a word */
+    note(b, at, "runs through", "erased flash", "no program is there: it goes on into the boot section");
+    *pc = at + 2;
+    avr->cycle++;
+  } else {
+    *pc = (uint32_t)avr_run_one(avr);
+  }
+  check_stack_behind(b, at, before);
   *until = earlier(earlier(*until, b->next_due), next_of_simavr(avr));
-  return avr->run_cycle_count && avr->state == cpu_Running && !avr->interrupt_state && !b->crashed;
+  return lowest == b->lowest_stack && avr->run_cycle_count && avr->state == cpu_Running && !avr->interrupt_state &&
+         !b->crashed;
 }
 
 /* ---- many ---- */

@@ -28,11 +28,15 @@ static inline bool is_two_words(unsigned opcode) {
   return kind == LDS || kind == STS || (opcode & 0xFE0Cu) == 0x940Cu /* JMP, CALL */;
 }
 
+static inline bool is_return(unsigned opcode) { return (opcode & 0xFFEFu) == 0x9508u; /* RET, RETI */ }
+
+static inline bool sets_stack(unsigned opcode) { return (opcode & 0xFE0Fu) == 0xBE0Du; /* OUT SPL, the second half */ }
+
 /* It leaves a stack pointer that is whole: not half of an old and half of a new one. */
 static inline bool moves_whole_stack(unsigned opcode) {
   unsigned kind = avr_kinds[opcode & 0xFFFFu];
-  return kind == PUSH || kind == POP || kind == CALL || kind == RCALL || kind == ICALL || kind == RET ||
-         opcode == 0x9518u /* RETI */ || (opcode & 0xFE0Fu) == 0xBE0Du /* OUT SPL */;
+  return kind == PUSH || kind == POP || kind == CALL || kind == RCALL || kind == ICALL || is_return(opcode) ||
+         sets_stack(opcode);
 }
 
 #endif

@@ -27,6 +27,7 @@
 
 #define NEVER UINT64_MAX
 #define NO_ADDRESS UINT32_MAX
+#define RAM_BEGIN 0x100u
 
 /* From an edge at a pin to the flag or the capture that it causes: synchronizer and edge detector, 2.5 to 3.5 cycles
  * (13.2.1, 17.3). */
@@ -110,6 +111,7 @@ enum {
   REG_ADMUX = 0x7C,
   REG_TWBR = 0xB8,
   REG_TWSR = 0xB9,
+  REG_TWAR = 0xBA,
   REG_TWDR = 0xBB,
   REG_TWCR = 0xBC,
   REG_UCSR0A = 0xC0,
@@ -188,9 +190,11 @@ typedef struct {
   uint32_t compare_written[2]; /* comes into force at once, or in PWM modes at the end of a lap */
   uint32_t capture;            /* ICR1 */
   uint8_t high_byte;           /* TEMP */
-  /* where it is: `position` at cycle `known` */
+  uint16_t open_half; /* address of the byte that was written last, if its other half was not written before it */
+  /* where it is at cycle `known` */
   uint64_t known;
-  uint32_t position;  /* in its lap: counts up from 0; in phase-correct modes on to twice the top */
+  uint32_t count;     /* TCNTn */
+  bool falling;       /* in phase-correct modes: on its way down */
   bool match_blocked; /* the count was written: no compare match at the next count (17.10.4) */
   uint8_t output_level[2];
 } timer_state;
@@ -338,6 +342,12 @@ typedef struct {
 
 #define FLAG_REGISTERS 5
 
+/* What a write to a register does. */
+typedef struct {
+  avr_io_write_t write; /* NULL: it is kept */
+  void *param;
+} register_write;
+
 typedef struct avr_board {
   board base;
   avr_t *avr;
@@ -352,15 +362,18 @@ typedef struct avr_board {
   uint8_t reset_wanted; /* bits 1 << board_reset_cause */
   bool crashed;
   char fault[160];
-  uint32_t fault_address;        /* of the instruction that crashed the board, or NO_ADDRESS */
-  uint32_t code_begin;           /* no jump leads to what is below, */
-  uint32_t code_end;             /* no instruction of the image stands from here on */
-  uint16_t lowest_stack;         /* lowest address in data memory that the stack may write: behind the variables */
-  bool one_by_one;               /* each instruction by itself, and by simavr's core */
+  uint32_t fault_address; /* of the instruction that crashed the board, or NO_ADDRESS */
+  uint32_t code_begin;    /* a jump to what is below is a soft reset, */
+  uint32_t code_end;      /* no instruction of the image stands from here on */
+  uint16_t variables_end; /* in data memory */
+  uint16_t lowest_stack;  /* lowest address that the stack may write: there, or lower as long as it is elsewhere */
+  bool one_by_one;        /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   board_counters counters;
   flag_register flag_registers[FLAG_REGISTERS];
   uint8_t flag_register_count;
+  register_write built_write[0x100]; /* by address, of registers in the table of avr_registers.c */
+  board_notes notes;
   uint64_t timer_base[2]; /* when the prescalers were reset: timers 0 and 1, timer 2 */
   port_state port[PORT_COUNT];
   change_queue driven_edges;
@@ -389,10 +402,9 @@ void interrupts_changed(avr_board *b); /* after a change of `raised` or `enabled
 void want_reset(avr_board *b, board_reset_cause cause);
 /* The board stops; `address` is that of the instruction to blame, the rest says what it did, without place and time. */
 void crash_at(avr_board *b, uint32_t address, const char *format, ...) __attribute__((format(printf, 3, 4)));
-/* The board stops if the instruction at `address` has moved the stack pointer to where it may not be. */
-void check_stack(avr_board *b, uint32_t address);
-/* The program asks for a thing that is not built: the board stops, and says so. */
-void refuse(avr_board *b, const char *what);
+/* The board stops if the instruction at `address` has moved the stack pointer to where it may not be. `set`: the program
+ * has set it to where it is, which may be among the variables; else it has grown there. */
+void check_stack(avr_board *b, uint32_t address, bool set);
 void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to be called by an access */
 /* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
  * returns the cycle of the access. */
@@ -404,10 +416,15 @@ static inline bool is_code(const avr_board *b, uint32_t address) {
 
 /* avr_board.c */
 void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param);
-void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param);
 void on_bit_write(avr_board *b, uint16_t address, avr_io_write_bit_t write, void *param);
 /* A register of interrupt flags for `vectors`, bit 0 first: read, write 1 to clear, SBI clears one. */
 void add_flag_register(avr_board *b, uint16_t address, const uint8_t vectors[8]);
+
+/* avr_registers.c */
+void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param);
+void registers_init(avr_board *b); /* before all that claim registers */
+/* Keeps what the instruction at `address` does, and `why` that is not what it seems; all literals. Once for each. */
+void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why);
 
 /* avr_pins.c */
 void pins_init(avr_board *b);

@@ -11,6 +11,7 @@
 #include <stdio.h>
 
 #include "avr_instructions.h"
+#include "avr_opcodes.h"
 #include "avr_parts.h"
 #include "sim_core.h"
 
@@ -151,8 +152,9 @@ static bool enter_interrupt(avr_board *b) {
     uint8_t vector = (uint8_t)__builtin_ctz(pending);
     if (b->recorder) spans_accept(b, vector, avr->cycle + (b->sleeping ? WAKE_UP_CYCLES : 0));
     acknowledge(b, vector);
+    bool elsewhere = _avr_sp_get(avr) + 1u < b->lowest_stack;
     _avr_push_addr(avr, avr->pc);
-    check_stack(b, (uint32_t)avr->pc);
+    check_stack(b, (uint32_t)avr->pc, elsewhere);
     avr_sreg_set(avr, S_I, 0);
     avr->pc = (avr_flashaddr_t)vector * avr->vector_size;
   } else { /* one of simavr's own modules; they are less urgent than all of ours */
@@ -197,9 +199,12 @@ void crash_at(avr_board *b, uint32_t address, const char *format, ...) {
   b->crashed = true;
 }
 
-void check_stack(avr_board *b, uint32_t address) {
+void check_stack(avr_board *b, uint32_t address, bool set) {
   uint32_t pointer = _avr_sp_get(b->avr), lowest = b->lowest_stack;
-  if (pointer + 1u < lowest) {
+  if (set && pointer + 1u >= RAM_BEGIN && pointer + 1u < lowest) {
+    note(b, address, "has a stack among", "its variables", "legal, but what it overwrites there is not seen");
+    b->lowest_stack = RAM_BEGIN;
+  } else if (pointer + 1u < lowest) {
     crash_at(b, address, "the stack overflows: it reaches 0x%04X, variables end below 0x%04X", (unsigned)pointer + 1u,
              (unsigned)lowest);
   } else if (pointer >= BOARD_DATA_SIZE) {
@@ -212,16 +217,13 @@ static void check_jump(avr_board *b, uint32_t address) {
   uint32_t pc = (uint32_t)b->avr->pc;
   if (b->crashed || is_code(b, pc)) return;
   if (address >= b->code_end) address = b->code_end - 2u; /* it ran straight on, behind the last instruction */
-  if (pc == 0) {
-    crash_at(b, address, "the program jumps to its start without a reset");
+  if (pc == 0 && !is_return(b->avr->flash[address] | (unsigned)b->avr->flash[address + 1] << 8)) {
+    note(b, address, "jumps to", "its start", "legal, but no reset: registers keep their values (or is a pointer 0?)");
+  } else if (pc == 0) {
+    crash_at(b, address, "the program returns to its start without a reset");
   } else {
     crash_at(b, address, "the program goes to 0x%04X, but ends at 0x%04X", (unsigned)pc, (unsigned)b->code_end);
   }
-}
-
-void refuse(avr_board *b, const char *what) {
-  crash_at(b, (uint32_t)b->avr->pc, "the program uses %s, which is not built,", what);
-  stop_core(b);
 }
 
 static void on_bad_opcode(struct avr_irq_t *irq, uint32_t opcode, void *param) {
@@ -274,6 +276,7 @@ void restart(avr_board *b) {
   b->counters.resets++;
   b->crashed = false;
   b->sleeping = false;
+  b->lowest_stack = b->variables_end;
   if (b->recorder) spans_restart(b);
   b->raised = 0;
   b->enabled = 0;

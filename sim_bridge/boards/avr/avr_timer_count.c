@@ -1,7 +1,7 @@
 /* avr_timer_count.c: timer/counters 0, 1 and 2 in all their counting modes (15 to 18), computed, not stepped.
  *
- * A timer walks round a lap: 0 up to its top, in the phase-correct modes on down to 0 again. `position` is where it
- * was at cycle `known`; every later place follows from the prescaler. What can happen at the count that leaves a place
+ * A timer walks round a lap: 0 up to its top, in the phase-correct modes on down to 0 again. `count` and `falling` say
+ * where it was at cycle `known`; every later place follows from the prescaler. What can happen at the count that leaves a place
  * (compare match, overflow, end of the lap) is found by its distance; the timer is due only for what somebody waits for:
  * an enabled flag that is not yet set, or an output pin. Everything else is computed when a register is touched.
  *
@@ -28,57 +28,56 @@ static uint32_t top_of(const timer_state *t) {
   }
 }
 
-/* Places in the present lap. A timer that is beyond its top goes on to its maximum. */
-static uint32_t lap_of(const timer_state *t) {
+/* Counts of a lap from 0 on. */
+static uint32_t whole_lap(const timer_state *t) {
   uint32_t top = top_of(t);
   if (counts_down(t)) return top ? 2 * top : 1;
-  return t->position > top ? t->maximum + 1 : top + 1;
+  return top + 1;
 }
 
-uint32_t timer_count_of(const timer_state *t) {
-  uint32_t top = top_of(t);
-  return counts_down(t) && t->position > top ? 2 * top - t->position : t->position;
+/* Counts until it is at 0 again. A timer that has missed its top on the way up goes on to its maximum (16.9.3). */
+static uint32_t rest_of_lap(const timer_state *t) {
+  if (t->falling) return t->count;
+  return t->count > top_of(t) ? t->maximum + 1 - t->count : whole_lap(t) - t->count;
 }
 
 void timer_set_count(timer_state *t, uint32_t count) {
-  uint32_t top = top_of(t);
-  t->position = counts_down(t) && count > top ? top : count;
-  if (counts_down(t) && t->position >= lap_of(t)) t->position = 0; /* top 0: there is but one place */
-}
-
-/* Where a compare value is met: on the way up, and on the way down. */
-static uint32_t place_up(const timer_state *t, int channel) { return t->compare[channel]; }
-static uint32_t place_down(const timer_state *t, int channel) {
-  uint32_t top = top_of(t), compare = t->compare[channel];
-  return compare > 0 && compare < top ? 2 * top - compare : compare;
-}
-
-/* The place that is left when the buffered compare values come into force (table 15-8, 16-4). */
-static uint32_t place_of_update(const timer_state *t) {
-  if (t->mode == COUNT_PHASE_PWM && top_of(t) > 0) return top_of(t) - 1; /* TOP is reached */
-  return lap_of(t) - 1;
+  t->count = count;
+  if (count == 0 || !counts_down(t)) t->falling = false;
 }
 
 /* ---- distances ---- */
 
-/* Counts until `place` is left; 1: by the next. */
-static uint64_t distance(const timer_state *t, uint32_t place) {
-  uint32_t lap = lap_of(t);
-  if (place >= t->position && place < lap) return (uint64_t)place - t->position + 1;
-  uint32_t following = counts_down(t) ? lap : top_of(t) + 1;
-  if (place >= following) return NEVER;
-  return (uint64_t)lap - t->position + place + 1;
+/* The same place in the next lap. */
+static uint64_t next_lap_distance(const timer_state *t, uint32_t value, bool down) {
+  uint32_t top = top_of(t);
+  if (down ? value >= top : value > top) return NEVER;
+  return (uint64_t)rest_of_lap(t) + (down ? 2 * top - value : value) + 1;
+}
+
+/* Counts until `value` is left, on the way up or down; 1: by the next. 0 and the top are places of the way up. */
+static uint64_t distance(const timer_state *t, uint32_t value, bool down) {
+  uint32_t top = top_of(t);
+  if (down && t->falling && value <= t->count) return (uint64_t)t->count - value + 1;
+  if (down && !t->falling && t->count <= top && value < top) return (uint64_t)rest_of_lap(t) - value + 1;
+  bool ahead = !down && !t->falling && value >= t->count && (value <= top || t->count > top);
+  return ahead ? (uint64_t)value - t->count + 1 : next_lap_distance(t, value, down);
 }
 
 /* The same for a compare match, which a write to the count holds off once. */
-static uint64_t match_distance(const timer_state *t, uint32_t place) {
-  uint64_t d = distance(t, place);
-  if (d != 1 || !t->match_blocked) return d;
-  uint32_t following = counts_down(t) ? lap_of(t) : top_of(t) + 1;
-  return place < following ? lap_of(t) + d : NEVER;
+static uint64_t match_distance(const timer_state *t, uint32_t value, bool down) {
+  uint64_t d = distance(t, value, down);
+  return d == 1 && t->match_blocked ? next_lap_distance(t, value, down) : d;
 }
 
 static uint64_t nearer(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+/* Counts until the buffered compare values come into force (tables 15-8, 16-4): with the count that leaves TOP or BOTTOM
+ * in the phase-correct modes, that reaches BOTTOM in fast PWM (figures 15-11, 16-12). */
+static uint64_t update_distance(const timer_state *t) {
+  if (!counts_down(t)) return rest_of_lap(t);
+  return distance(t, t->mode == COUNT_PHASE_PWM ? top_of(t) : 0, false);
+}
 
 static bool buffer_is_waiting(const timer_state *t) {
   return t->compare[0] != t->compare_written[0] || t->compare[1] != t->compare_written[1];
@@ -91,16 +90,17 @@ static uint64_t distance_to_next(const timer_state *t, uint32_t wanted) {
   wanted &= ~t->owner->raised;
   for (int channel = 0; channel < 2; channel++) {
     if (t->action[channel] == ACTION_NONE && !(wanted & FLAG(t->vector_compare[channel]))) continue;
-    next = nearer(next, match_distance(t, place_up(t, channel)));
-    if (counts_down(t)) next = nearer(next, match_distance(t, place_down(t, channel)));
+    uint32_t value = t->compare[channel];
+    next = nearer(next, match_distance(t, value, false));
+    if (counts_down(t) && value > 0) next = nearer(next, match_distance(t, value, true));
   }
   bool pwm_output = t->mode == COUNT_FAST_PWM && (t->action[0] != ACTION_NONE || t->action[1] != ACTION_NONE);
-  if (pwm_output) next = nearer(next, distance(t, lap_of(t) - 1));
-  if (is_buffered(t) && buffer_is_waiting(t)) next = nearer(next, distance(t, place_of_update(t)));
+  if (pwm_output) next = nearer(next, rest_of_lap(t));
+  if (is_buffered(t) && buffer_is_waiting(t)) next = nearer(next, update_distance(t));
   if (wanted & FLAG(t->vector_overflow)) {
-    next = nearer(next, distance(t, is_buffered(t) ? lap_of(t) - 1 : t->maximum));
+    next = nearer(next, is_buffered(t) ? rest_of_lap(t) : distance(t, t->maximum, false));
   }
-  if (t->top_from == TOP_ICR && (wanted & FLAG(VECTOR_TIMER1_CAPT))) next = nearer(next, distance(t, top_of(t)));
+  if (t->top_from == TOP_ICR && (wanted & FLAG(VECTOR_TIMER1_CAPT))) next = nearer(next, distance(t, top_of(t), false));
   return next;
 }
 
@@ -133,6 +133,8 @@ bool timer_takes_over_pin(const timer_state *t, int channel) {
 }
 
 void timer_force_match(timer_state *t, int channel, uint64_t cycle) {
+  avr_board *b = t->owner;
+  if (is_buffered(t)) note(b, b->avr->pc, "forces", "a compare match", "it is dropped in PWM modes (15.9.2, 16.11.3)");
   if (is_buffered(t) || t->action[channel] == ACTION_NONE) return;
   set_output(t, channel, level_after_match(t, channel, false), cycle);
 }
@@ -140,50 +142,53 @@ void timer_force_match(timer_state *t, int channel, uint64_t cycle) {
 /* ---- counting ---- */
 
 static void update_compare(timer_state *t) {
-  uint32_t count = timer_count_of(t);
   t->compare[0] = t->compare_written[0];
   t->compare[1] = t->compare_written[1];
-  if (counts_down(t)) timer_set_count(t, count);
+}
+
+/* `counts` counts under the same top. Where it has changed since the slope began, the way down goes on from where that
+ * turned (16.9.4). */
+static void move(timer_state *t, uint64_t counts) {
+  if (counts == 0) return;
+  t->match_blocked = false;
+  uint32_t top = top_of(t), rest = rest_of_lap(t);
+  if (counts >= rest) {
+    timer_set_count(t, 0);
+    counts = (counts - rest) % whole_lap(t);
+  }
+  if (t->falling) {
+    t->count -= (uint32_t)counts;
+  } else if (counts_down(t) && t->count <= top && t->count + counts > top) {
+    t->falling = true;
+    t->count = 2 * top - t->count - (uint32_t)counts;
+  } else {
+    t->count += (uint32_t)counts;
+  }
 }
 
 /* One count, at `cycle`, with all that it causes. */
 static void count_once(timer_state *t, uint64_t cycle) {
   avr_board *b = t->owner;
-  uint32_t here = t->position, lap = lap_of(t), top = top_of(t);
-  bool wraps = here + 1 == lap;
+  bool wraps = rest_of_lap(t) == 1;
   uint8_t level[2] = {t->output_level[0], t->output_level[1]};
   for (int channel = 0; channel < 2; channel++) {
-    bool up = here == place_up(t, channel), down = counts_down(t) && here == place_down(t, channel);
-    if ((up || down) && !t->match_blocked) {
+    if (t->count == t->compare[channel] && !t->match_blocked) {
       raise_flag(b, t->vector_compare[channel]);
-      level[channel] = level_after_match(t, channel, down && !up);
+      level[channel] = level_after_match(t, channel, t->falling);
     }
     if (wraps && t->mode == COUNT_FAST_PWM && t->action[channel] >= ACTION_CLEAR) {
       level[channel] = t->action[channel] == ACTION_CLEAR;
     }
   }
-  t->match_blocked = false;
-  if (is_buffered(t) ? wraps : here == t->maximum) raise_flag(b, t->vector_overflow);
-  if (t->top_from == TOP_ICR && here == top) raise_flag(b, VECTOR_TIMER1_CAPT);
-  bool updates = is_buffered(t) && buffer_is_waiting(t) && here == place_of_update(t);
-  t->position = wraps ? 0 : here + 1;
-  if (updates) update_compare(t);
+  if (is_buffered(t) ? wraps : t->count == t->maximum) raise_flag(b, t->vector_overflow);
+  if (t->top_from == TOP_ICR && !t->falling && t->count == top_of(t)) raise_flag(b, VECTOR_TIMER1_CAPT);
+  bool updates = is_buffered(t) && buffer_is_waiting(t) && update_distance(t) == 1;
+  bool at_bottom = t->mode == COUNT_PHASE_FREQUENCY_PWM;
+  if (updates && at_bottom) update_compare(t);
+  move(t, 1);
+  if (updates && !at_bottom) update_compare(t);
   for (int channel = 0; channel < 2; channel++) {
     if (timer_takes_over_pin(t, channel)) set_output(t, channel, level[channel], cycle);
-  }
-}
-
-/* `counts` counts in which nothing happens that matters. */
-static void pass(timer_state *t, uint64_t counts) {
-  if (counts == 0) return;
-  t->match_blocked = false;
-  uint32_t lap = lap_of(t);
-  if (t->position + counts < lap) {
-    t->position += (uint32_t)counts;
-  } else {
-    counts -= lap - t->position;
-    t->position = 0;
-    t->position = (uint32_t)(counts % lap_of(t));
   }
 }
 
@@ -196,10 +201,10 @@ void timer_bring_up(timer_state *t, uint64_t cycle) {
     while (counts) {
       uint64_t next = distance_to_next(t, UINT32_MAX);
       if (next > counts) {
-        pass(t, counts);
+        move(t, counts);
         break;
       }
-      pass(t, next - 1);
+      move(t, next - 1);
       done += next;
       counts -= next;
       count_once(t, base + done * t->divider);
@@ -235,6 +240,6 @@ void timer_capture(avr_board *b, uint8_t level, uint64_t cycle) {
   bool rising = b->avr->data[t->address_control_a + CONTROL_B] & CAPTURE_ON_RISE;
   if (t->top_from == TOP_ICR || (level != 0) != rising) return;
   timer_bring_up(t, cycle);
-  t->capture = timer_count_of(t);
+  t->capture = t->count;
   raise_flag(b, VECTOR_TIMER1_CAPT);
 }

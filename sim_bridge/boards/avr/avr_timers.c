@@ -7,6 +7,7 @@
 #include "avr_timer_count.h"
 
 #define REG_ICR1L 0x86
+#define EXTERNAL_CLOCK 6 /* CSn2:0 from here on; of timers 0 and 1 */
 
 typedef struct {
   uint8_t mode, top_from;
@@ -106,23 +107,22 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
   uint8_t strobes = (which == CONTROL_C || (which == CONTROL_B && !is_wide(t))) ? value & 0xC0 : 0;
   avr->data[address] = (uint8_t)(value & ~strobes);
   uint8_t a = avr->data[t->address_control_a], b = avr->data[t->address_control_a + CONTROL_B];
-  uint32_t count = timer_count_of(t);
   const waveform *w = is_wide(t) ? &WIDE[(a & 3) | (b >> 1 & 0x0C)] : &NARROW[(a & 3) | (b >> 1 & 0x04)];
   t->mode = (count_mode)w->mode;
   t->top_from = (top_source)w->top_from;
   t->fixed_top = w->fixed_top;
   t->divider = t->dividers[b & 7];
+  if (which == CONTROL_B && t->number != 2 && (b & 7) >= EXTERNAL_CLOCK) {
+    note(t->owner, avr->pc, "writes to", t->number ? "TCCR1B" : "TCCR0B",
+         "external clocks are not built: it stands still");
+  }
   t->action[0] = a >> 6;
   t->action[1] = a >> 4 & 3;
   if (!is_buffered(t)) {
     t->compare[0] = t->compare_written[0];
     t->compare[1] = t->compare_written[1];
   }
-  if (counts_down(t)) {
-    timer_set_count(t, count);
-  } else {
-    t->position = count;
-  }
+  timer_set_count(t, t->count);
   take_over_pins(t, cycle);
   if (strobes & 0x80) timer_force_match(t, 0, cycle);
   if (strobes & 0x40) timer_force_match(t, 1, cycle);
@@ -134,9 +134,8 @@ static uint8_t read_count(avr_t *avr, avr_io_addr_t address, void *param) {
   (void)avr;
   (void)address;
   timer_bring_up(t, begin_access(t->owner));
-  uint32_t count = timer_count_of(t);
-  if (is_wide(t)) t->high_byte = (uint8_t)(count >> 8);
-  return (uint8_t)count;
+  if (is_wide(t)) t->high_byte = (uint8_t)(t->count >> 8);
+  return (uint8_t)t->count;
 }
 
 static uint8_t read_capture(avr_t *avr, avr_io_addr_t address, void *param) {
@@ -158,21 +157,25 @@ static uint8_t read_high_byte(avr_t *avr, avr_io_addr_t address, void *param) {
 
 static void write_high_byte(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
   timer_state *t = param;
-  (void)avr;
-  (void)address;
+  if (t->open_half == address - 1 && value != t->high_byte) {
+    note(t->owner, avr->pc, "writes", "a high byte behind its low one", "the register took the old one (16.3)");
+  }
+  t->open_half = address;
   t->high_byte = value;
 }
 
-static uint32_t whole(const timer_state *t, uint8_t low) {
-  return is_wide(t) ? (uint32_t)t->high_byte << 8 | low : low;
+/* What a write of a low byte writes. */
+static uint32_t whole(timer_state *t, avr_io_addr_t address, uint8_t low) {
+  if (!is_wide(t)) return low;
+  t->open_half = t->open_half & 1 ? 0 : address; /* high bytes have odd addresses */
+  return (uint32_t)t->high_byte << 8 | low;
 }
 
 static void write_count(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
   timer_state *t = param;
   (void)avr;
-  (void)address;
   begin_change(t);
-  timer_set_count(t, whole(t, value));
+  timer_set_count(t, whole(t, address, value));
   t->match_blocked = true;
   timer_plan(t);
 }
@@ -181,7 +184,7 @@ static void write_compare(avr_t *avr, avr_io_addr_t address, uint8_t value, void
   timer_state *t = param;
   begin_change(t);
   int channel = address == t->address_compare[1];
-  t->compare_written[channel] = whole(t, value);
+  t->compare_written[channel] = whole(t, address, value);
   avr->data[address] = value;
   if (is_wide(t)) avr->data[address + 1] = t->high_byte;
   if (!is_buffered(t)) t->compare[channel] = t->compare_written[channel];
@@ -191,13 +194,13 @@ static void write_compare(avr_t *avr, avr_io_addr_t address, uint8_t value, void
 /* ICR1 can be written only where it is the top. */
 static void write_capture(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
   timer_state *t = param;
-  (void)avr;
-  (void)address;
   begin_change(t);
-  if (t->top_from != TOP_ICR) return;
-  uint32_t count = timer_count_of(t);
-  t->capture = whole(t, value);
-  if (counts_down(t)) timer_set_count(t, count);
+  const uint32_t capture = whole(t, address, value);
+  if (t->top_from == TOP_ICR) {
+    t->capture = capture;
+  } else if (t->capture != capture) {
+    note(t->owner, avr->pc, "writes to", "ICR1", "it is dropped: the mode has not ICR1 as its top (16.6)");
+  }
   timer_plan(t);
 }
 

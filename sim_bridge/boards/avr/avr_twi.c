@@ -290,12 +290,14 @@ static void write_data(avr_t *avr, avr_io_addr_t address, uint8_t value, void *p
     t->control &= (uint8_t)~TWWC;
     t->data = value;
   } else {
+    if (value != t->data) note(b, b->avr->pc, "writes to", "TWDR", "it is dropped: TWINT is not set (22.9.4)");
     t->control |= TWWC;
   }
 }
 
 void twi_reset(avr_board *b) {
   b->twi = (twi_state){.data = 0xFF, .status = STATUS_NONE};
+  b->avr->data[REG_TWAR] = 0xFE;
   plan(b, TWI_IDLE, NEVER);
 }
 

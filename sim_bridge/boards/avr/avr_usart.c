@@ -282,7 +282,10 @@ static void write_data(avr_t *avr, avr_io_addr_t address, uint8_t value, void *p
   usart_state *u = &b->usart;
   (void)address;
   uint64_t cycle = begin_access(b) + 1;
-  if (!(avr->data[REG_UCSR0B] & TXEN) || u->holding) return;
+  if (!(avr->data[REG_UCSR0B] & TXEN) || u->holding) {
+    note(b, avr->pc, "writes to", "UDR0", "it is dropped: TXEN0 or UDRE0 is not set (20.11.1)");
+    return;
+  }
   if (u->sending) {
     u->holding = true;
     u->holding_byte = value;

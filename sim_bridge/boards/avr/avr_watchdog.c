@@ -97,6 +97,9 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
   }
   control |= value & WDE; /* can always be set */
   if (avr->data[REG_MCUSR] & WDRF) control |= WDE;
+  if (!(value & WDCE) && ((value ^ control) & (WDP3 | WDP_LOW | WDE))) {
+    note(b, avr->pc, "writes to", "WDTCSR", "it is dropped: WDRF is set, or WDCE was not just before (11.9.2)");
+  }
   control |= value & WDIE;
   avr->data[address] = control;
   if (!(old & (WDE | WDIE))) b->watchdog.since = cycle + 1;

@@ -1,0 +1,103 @@
+/* avr_registers.c: the one table of the ATmega328P's I/O registers (36), with what of each is not built, and the notes
+ * that the board keeps where a program asks for it.
+ *
+ * A write that changes a bit which is not built does nothing more than to change that bit; a register that the chip does
+ * not have keeps nothing. The first of them is noted, with its place and cycle. Only registers with such bits are looked
+ * at: the others take no longer.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include <string.h>
+
+#include "avr_parts.h"
+
+static const char SPI[] = "SPI is not built: no transfer ends, SPIF stays 0";
+static const char DIGITAL[] = "not built: digital inputs stay on";
+static const char SLAVE[] = "slave modes of the two-wire interface are not built: no address is answered";
+
+typedef struct {
+  uint8_t address;
+  uint8_t missing; /* bits that are not built */
+  bool answers;    /* what is read there would come from what is not built */
+  const char *name, *why;
+} chip_register;
+
+/* Those that are not built, or not whole. Any other register of the chip is one that a unit claims, or one of KEPT. */
+/* clang-format off */
+static const chip_register REGISTERS[] = {
+  {0x43, 0x80, false, "GTCCR", "TSM is not built: the prescalers run on"},
+  {0x4C, 0xFF, false, "SPCR", SPI}, {0x4D, 0xFF, true, "SPSR", SPI}, {0x4E, 0xFF, true, "SPDR", SPI},
+  {0x50, 0x7F, true, "ACSR", "the analog comparator is not built: it stays off"},
+  {0x53, 0x0E, false, "SMCR", "sleep modes other than idle are not built: it sleeps in idle mode"},
+  {0x55, 0x63, false, "MCUCR", "vectors in the boot section and BODS are not built"},
+  {0x61, 0x0F, false, "CLKPR", "the clock's prescaler is not built: the clock stays at 16 MHz"},
+  {0x64, 0xEF, false, "PRR", "power reduction is not built: all units run on"},
+  {0x66, 0xFF, false, "OSCCAL", "the internal oscillator is not built: the clock is the crystal's 16 MHz"},
+  {0x78, 0xFF, false, "ADCL", "it is read-only"}, {0x79, 0xFF, false, "ADCH", "it is read-only"},
+  {0x7B, 0x47, false, "ADCSRB", "triggers of the ADC other than free running are not built, nor is the comparator"},
+  {0x7E, 0x3F, false, "DIDR0", DIGITAL}, {0x7F, 0x03, false, "DIDR1", DIGITAL},
+  {0xB6, 0x60, false, "ASSR", "the asynchronous clock of timer 2 is not built: it runs on the system's"},
+  {REG_TWAR, 0xFF, false, "TWAR", SLAVE}, {0xBD, 0xFE, false, "TWAMR", SLAVE},
+  {0xC0, 0x01, false, "UCSR0A", "the multi-processor mode (MPCM0) is not built: every frame is received"},
+  {0xC1, 0x05, false, "UCSR0B", "the ninth bit of the USART is not built"},
+  {0xC2, 0xF0, false, "UCSR0C", "parity, synchronous and SPI mode of the USART are not built"},
+};
+/* clang-format on */
+
+/* GPIOR0 to 2, SPMCSR (simavr's), SPL, SPH, SREG, PCMSK0 and 1. */
+static const uint8_t KEPT[] = {0x3E, 0x4A, 0x4B, 0x57, 0x5D, 0x5E, 0x5F, 0x6B, 0x6C};
+
+void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why) {
+  board_notes *all = &b->notes;
+  for (size_t i = 0; i < all->count; i++) {
+    const board_note *n = &all->notes[i];
+    if (n->does == does && n->what == what && n->why == why) return;
+  }
+  if (all->count == BOARD_NOTES_MAXIMUM) return; /* more than there are different ones */
+  all->notes[all->count++] = (board_note){b->avr->cycle, address, does, what, why};
+}
+
+static void write_checked(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = avr->custom.data;
+  const chip_register *r = param;
+  const register_write *built = &b->built_write[address];
+  begin_access(b);
+  if ((value ^ avr->data[address]) & r->missing) note(b, avr->pc, "writes to", r->name, r->why);
+  if (built->write) {
+    built->write(avr, address, value, built->param);
+  } else {
+    avr->data[address] = value;
+  }
+}
+
+static uint8_t read_unbuilt(avr_t *avr, avr_io_addr_t address, void *param) {
+  const chip_register *r = param;
+  note(avr->custom.data, avr->pc, "reads", r->name, r->why);
+  return avr->data[address];
+}
+
+static void write_reserved(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  (void)address;
+  if (value) note(param, avr->pc, "writes to", "a reserved address", "the ATmega328P has no register there");
+}
+
+void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param) {
+  const uint16_t io = AVR_DATA_TO_IO(address);
+  if (b->avr->io[io].w.c == write_checked) {
+    b->built_write[address] = (register_write){write, param};
+  } else {
+    b->avr->io[io].w.c = write;
+    b->avr->io[io].w.param = param;
+  }
+}
+
+void registers_init(avr_board *b) {
+  for (uint16_t address = 0x20; address <= 0xFF; address++) {
+    if (!memchr(KEPT, address, sizeof KEPT)) on_write(b, address, write_reserved, b);
+  }
+  for (size_t i = 0; i < sizeof REGISTERS / sizeof *REGISTERS; i++) {
+    const chip_register *r = &REGISTERS[i];
+    on_write(b, r->address, write_checked, (void *)r);
+    if (r->answers) on_read(b, r->address, read_unbuilt, (void *)r);
+  }
+}
