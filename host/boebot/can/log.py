@@ -41,10 +41,6 @@ _TELEMETRY_BEGINS = LAYOUTS[messages.Telemetry.ID].identifiers[0]  # with `tick`
 _PARAMETER = {spec.id: name for name, spec in messages.PARAMETERS.items()}
 
 
-class GapError(CutError):
-    """Frames are missing in the middle of a log."""
-
-
 class Sent(NamedTuple):
     """A frame of a log."""
 
@@ -163,21 +159,19 @@ def is_log(path: Path) -> bool:
     return path.suffix[1:].lower() in KINDS and not path.is_dir()
 
 
-def read_log(
-    path: Path, robot: str | None = None, node: int | None = None, seed: int = 1, bus: str | None = None
-) -> RunResult:
+def read_log(path: Path, robot: str | None = None, node: str | None = None, seed: int = 1) -> RunResult:
     """The run in a log of CAN frames, as far as it shows there: the first session in which somebody drove the robot.
 
     Args:
         path: of the log.
         robot: its name or file; None: as the board's hello says.
-        node: the board's; None: the only one of the log.
+        node: the board's; in a log of several buses as in "can1:2", the bus as the log names it, in Vector's formats by
+            a number from 1 on. None: the only one of the log.
         seed: of the brain's chance, which no log shows.
-        bus: the board's, as the log names it, in Vector's formats by a number from 1 on; None: the only one of the log.
 
     Returns:
         The run. Of a log that breaks off it has ended there, with a `CutError` that says so; of one that lacks frames
-        before the last set-point it has ended at that gap, with a `GapError`.
+        before the last set-point it has ended at that gap, with a `CutError` that says what is lost.
 
     Raises:
         BoebotError: it cannot be read, has no hello of a board or no set-points, or several boards and no `node`.
@@ -192,7 +186,7 @@ def read_log(
             readers[board].take(sent)
     except CutError as error:
         cut = error
-    reader = _chosen(path, readers, bus, node)
+    reader = _chosen(path, readers, node)
     result = reader.result(path, _robot(path, reader, robot), seed)
     result.error = result.error or cut
     return result
@@ -232,29 +226,27 @@ def _sent(path: Path) -> Iterator[tuple[str, Sent]]:
         raise BoebotError(f"{path} is no log of CAN frames: {reason}") from None
 
 
-def _chosen(path: Path, readers: dict[tuple[str, int], _LogReader], bus: str | None, node: int | None) -> _LogReader:
-    """The reader of a board that was driven: of one bus and one node."""
-    heard = [board for board, reader in readers.items() if reader.hello is not None]
+def _chosen(path: Path, readers: dict[tuple[str, int], _LogReader], node: str | None) -> _LogReader:
+    """The reader of a board that was driven."""
+    heard = {board: reader for board, reader in readers.items() if reader.hello is not None}
     if not heard:
         raise BoebotError(f"{path} has no hello of a board; expected a log from before the run began")
-    wishes = [(1, node, "of node", "of several nodes", "--node"), (0, bus, "on bus", "on several buses", "--bus")]
-    for part, wanted, of, of_several, option in sorted(wishes, key=lambda wish: wish[1] is None):
-        known = sorted({board[part] for board in heard}, key=str)
-        names = " or ".join(map(str, known))
-        if wanted is not None and wanted not in known:
-            raise BoebotError(f"{path} has no hello of a board {of} {wanted}; expected {names}")
-        if wanted is None and len(known) > 1:
-            raise BoebotError(f"{path} has boards {of_several}; expected {option} {names}")
-        heard = [board for board in heard if wanted in (None, board[part])]
-    reader = readers[heard[0]]
+    is_one_bus = len({bus for bus, _ in heard}) == 1
+    boards = {str(number) if is_one_bus else f"{bus}:{number}": heard[bus, number] for bus, number in sorted(heard)}
+    if node is None and len(boards) > 1:
+        raise BoebotError(f"{path} has boards of several nodes; expected --node {' or '.join(boards)}")
+    node = next(iter(boards)) if node is None else node
+    if node not in boards:
+        raise BoebotError(f"{path} has no hello of a board of node {node}; expected {' or '.join(boards)}")
+    reader = boards[node]
     hello = reader.hello
     assert hello is not None
     if not mismatch.speaks_alike(hello):
         raise mismatch.refusal(hello, str(path), _no_description)
     if reader.is_shared:
-        raise BoebotError(f"{path} has two boards of node {heard[0][1]} on one bus; expected each to have another")
+        raise BoebotError(f"{path} has two boards of node {node} on one bus; expected each to have another")
     if not reader.commands:
-        raise BoebotError(f"{path} has no set-points for node {heard[0][1]}: nobody drove the robot")
+        raise BoebotError(f"{path} has no set-points for node {node}: nobody drove the robot")
     return reader
 
 
@@ -392,8 +384,8 @@ class _LogReader:
                 lacks = "set-points" if tick in times else f"the telemetry of tick {tick}, which a set-point answers"
                 if place == 0:
                     raise BoebotError(f"{path} begins with a gap: it lacks {lacks}")
-                behind = f"lacks {lacks}; {count - place} of {count} commands are behind it"
-                gap = GapError(f"{path} has a gap after tick {before} ({times[before]:.2f} s): it {behind}")
+                where = f"{path} has a gap after tick {before} ({times[before]:.2f} s)"
+                gap = CutError(f"{where}: it lacks {lacks}; {count - place} of {count} commands are behind it", [lacks])
                 count = place
                 break
         last = ticks[count - 1]
