@@ -119,7 +119,7 @@ class Brain:
         return f"<Brain: {made_of}{f'; by {variables}' if variables else ''}>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """To copy and pickle it: without the robot, so that the copy begins a run of its own."""
+        """To copy and pickle it: without the robot, so that the copy begins afresh."""
         return {**vars(self), "_robot": None}
 
     def _check(self) -> None:

@@ -199,7 +199,7 @@ run.__doc__ = _HELP
 
 
 def _assigned(texts: list[str], count: int) -> list[dict[str, Any]]:
-    """Of "NAME=VALUE" or "2:NAME=VALUE" for each of so many robots; a value is as in TOML, what is none there a text.
+    """Of "NAME=VALUE" or "2:NAME=VALUE" for each of `count` robots; a value is as in TOML, what is none there a text.
 
     Raises:
         BoebotError: one is no such thing, or comes twice.

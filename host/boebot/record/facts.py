@@ -9,6 +9,7 @@ import msgspec
 
 from boebot.arenas import Arena
 from boebot.boards import WatchdogReset
+from boebot.brain.composition import MadeOf
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
 from boebot.link.messages import Identity
@@ -66,7 +67,7 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     behaviors: list[str]
     variables: list[str]
     parameters: dict[str, Any]
-    made_of: dict[str, Any] | None
+    made_of: MadeOf | None
 
 
 _CHANGED = ("error", "interrupted", "identity", "layout", "processes", "behaviors", "variables")

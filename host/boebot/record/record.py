@@ -298,7 +298,7 @@ class Unrecorded(Record):
         self._steps += 1
 
     def count(self, stream: str) -> int:
-        """Of commands, how many there were; of other streams 0: nobody has counted."""
+        """Of commands, how many there were; of other streams 0: they are not counted."""
         return self._steps if stream == "command" else 0
 
     def append(self, stream: str, time_s: float, data: bytes) -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.boards import Truth, WatchdogReset
+from boebot.brain.composition import MadeOf
 from boebot.description.robots import RobotDescription
 from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
@@ -105,7 +106,7 @@ class RunResult(FormerNames):
     imperfections: Mapping[str, float] = field(default_factory=dict)
     brain_names: BrainNames | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    made_of: Mapping[str, Any] | None = None
+    made_of: MadeOf | None = None
     odometry_source: str | None = None
     long_steps: int = 0
     longest_step: float = 0.0

@@ -195,13 +195,13 @@ def _composed(result: RunResult) -> Brain:
     Raises:
         BoebotError: that does not say all of it.
     """
-    whole = dict(result.made_of or {"undescribed": ["it is no Brain of processes"]})
-    if odd := whole.pop("undescribed"):
+    made_of: dict[str, Any] = {"undescribed": ["it is no Brain of processes"], **(result.made_of or {})}
+    if odd := made_of.pop("undescribed"):
         raise BoebotError(
             f"brain {result.brain!r} came from no file, and its record does not hold all of it: {'; '.join(odd)}; "
             "expected a run of a bundled brain, of a file, or of a Brain of the kit's parts"
         )
-    return composed(whole, "the record")
+    return composed(made_of, "the record")
 
 
 def _arena(run: Recorded, folder: Path) -> str | Path | None:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 from boebot.arguments import duration
 from boebot.boards import BoardRequest, BoardSession, VehicleSession
+from boebot.brain.composition import MadeOf
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
 from boebot.link.transport import BusFigures
@@ -50,8 +51,8 @@ class Task:
     """of the brain's chance"""
     parameters: Mapping[str, Any] = field(default_factory=dict)
     """of the brain that were set for this run, by name"""
-    made_of: Mapping[str, Any] | None = None
-    """the brain, if it is one of processes (boebot.brain.composition.described)"""
+    made_of: MadeOf | None = None
+    """the brain, if it is one of processes"""
     unrealisable: str | None = None
     """why sensors, period and line do not go together in time, where the run was forced all the same"""
 
