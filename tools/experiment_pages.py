@@ -44,8 +44,7 @@ def page(experiment: Experiment, measured: Iterable[Measured]) -> str:
         f"*{plain(experiment.caption)}*",
         "| figure | measured | expected | unit | |\n|---|--:|---|---|---|\n" + "\n".join(map(_row, measured)),
     ]
-    if experiment.criterion:
-        parts.append(f"**Criterion.** {plain(experiment.criterion)}")
+    parts.append(f"**Criterion.** {plain(experiment.criterion)}")
     return "\n\n".join(parts) + "\n"
 
 

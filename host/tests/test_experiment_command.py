@@ -41,7 +41,9 @@ def outcome(value: float = 1.0, data: dict[str, list[object]] | None = None) -> 
     return Outcome([about("gain, in one", value, 1.0, 0.1, "m")], data or {"time_s": [0.0, 1.0]}, draw)
 
 
-def invented(name: str, value: float = 1.0, error: Exception | None = None, criterion: str = "") -> Experiment:
+def invented(
+    name: str, value: float = 1.0, error: Exception | None = None, criterion: str = "As the notes."
+) -> Experiment:
     def run(seed: int, progress: Progress) -> Outcome:
         progress(0.5)
         if error is not None:

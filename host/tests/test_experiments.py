@@ -5,15 +5,20 @@ Those that are slow are run by `make experiments`; of their pages only what need
 
 from __future__ import annotations
 
+import itertools
 import re
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from PIL import Image
 
 from boebot.description.robots import load_robot
-from boebot.experiments import Outcome, all_experiments
+from boebot.experiments import Outcome, all_experiments, patrol
+from boebot.navigation import RandomSearch
 from boebot.view.experiment_files import stem
 from tools import experiment_pages
 
@@ -40,13 +45,60 @@ def test_experiment_says_what_it_is(name: str) -> None:
     one = EXPERIMENTS[name]
     assert re.fullmatch(r"[\w.-]+", name) and stem(name) == name
     assert name.lower() not in {"list", "readme", "index"}
-    for text in (one.title, one.source, one.caption):
+    for text in (one.title, one.source, one.caption, one.criterion):
         assert text and text == text.strip() and "\n" not in text
-    assert one.caption.endswith(".") and not one.title.endswith(".")
+    assert one.caption.endswith(".") and one.criterion.endswith(".") and not one.title.endswith(".")
     assert one.section, "names no section of the notes"
     robot = re.split(r"[ ,(]", one.robot)[0]
     if robot != "none":
         load_robot(robot)
+
+
+def hides(upper: Line2D, lower: Line2D) -> bool:
+    """A line drawn over another, as wide and without gaps, where most of that one's points are its own, too."""
+    if lower.get_zorder() > upper.get_zorder():
+        upper, lower = lower, upper
+    points, own = (
+        set(zip(*(np.asarray(data, dtype=float).round(6).tolist() for data in line.get_data()), strict=True))
+        for line in (lower, upper)
+    )
+    is_solid = upper.get_linestyle() == "-" and upper.get_linewidth() >= lower.get_linewidth()
+    return is_solid and len(points) > 2 and len(points & own) > len(points) / 2
+
+
+@pytest.mark.parametrize(
+    ("name", "legend"),
+    {
+        "E22": {"left", "right"},
+        "E23": {"s_min = 0.06", "without s_min"},
+        "E46": {"as searched", "tightened"},
+        "E49": {"wedge", "0.05 m beside", "no hill", "one hill"},
+        "E52": {"scan", "1 % noise", "the robot's own laser", "share of noise"},
+        "E53": {"scan", "expected by the map where odometry believes to be"},
+        "E54": {"believed before", "accepted", "found", "truth", "before", "after"},
+        "isocline": {"animal 1", "animal 2", "animal 3", "animal 4"},
+    }.items(),
+)
+def test_no_line_of_a_picture_hides_another_and_its_legend_names_them(name: str, legend: set[str]) -> None:
+    figure = Figure(layout="constrained")
+    outcome(name).draw(figure)
+    for axes in figure.axes:
+        lines = [line for line in axes.get_lines() if line.get_linestyle() != "None"]
+        assert not any(hides(upper, lower) for lower, upper in itertools.combinations(lines, 2))
+    legends = [*figure.legends, *(shown for axes in figure.axes if (shown := axes.get_legend()) is not None)]
+    assert legend <= {text.get_text() for shown in legends for text in shown.get_texts()}
+
+
+def test_patrol_is_drawn_as_it_was_and_as_it_was_believed() -> None:
+    """Figs. 6.14 and 6.15: the true path in each, by odometry alone on the left, else by localization."""
+    run = patrol.patrolled(1, "roller", 12.0, patrol.EVERY, RandomSearch())
+    figure = Figure(layout="constrained")
+    patrol._draw(figure, [run])
+    for axes, columns in zip(figure.axes, ((0, 1), (3, 4), (3, 4)), strict=False):
+        true, believed = (line.get_xydata() for line in axes.get_lines() if not str(line.get_label()).startswith("_"))
+        assert np.array_equal(true, run.trial.path) and np.array_equal(believed, run.poses[:, columns])
+    apart = np.hypot(*(run.poses[:, :2] - run.poses[:, 3:5]).T)
+    assert apart.max() > 0.01, "they differ, once a scan has come"
 
 
 def test_names_differ_as_names_of_files() -> None:

@@ -39,7 +39,6 @@ def test_cheap_experiments_are_met(name: str) -> None:
 def test_experiments_say_what_they_run_on(name: str) -> None:
     one = EXPERIMENTS[name]
     assert one.robot and one.title and one.caption and one.source
-    assert bool(one.criterion) == ("shieldbot" in one.robot or name in ("E28", "predator-prey"))
 
 
 def test_without_fatigue_the_reflex_does_not_fade() -> None:

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -118,7 +118,8 @@ def test_numbers_are_read_as_by_cpp(tmp_path: Path) -> None:
         (SAID.replace("0.05", "2001-99-99"), "resolution is '2001-99-99'; expected a finite number"),
         (SAID + "#" + "x" * 3_000_000, "it has 3,000,0.. bytes; expected at most 10,000"),
         ("[" * 100_000, "is no map"),
-        ("{" * (LONGEST - 1), "is no map: it is nested too deeply"),
+        ("{" * (LONGEST - 1), "is no map: it has more than 100 brackets"),
+        ("- " * (LONGEST // 2), "is no map: it is nested too deeply"),
         ("a: &a [x,x]\n" + "".join(f"{b}: &{b} [*{a},*{a}]\n" for a, b in zip("abcdef", "bcdefg", strict=True))
          + SAID.replace("[0, 0, 0]", "*g"), "origin is"),
         (SAID.replace("m.pgm", "/dev/zero"), "image '/dev/zero' cannot be read: it is a pipe or a device"),
@@ -129,11 +130,11 @@ def test_numbers_are_read_as_by_cpp(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_wrong_file_is_one_sentence_at_once(said: str, sentence: str, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    started = time.monotonic()
+    started = time.process_time()
     with pytest.raises(BrainError, match=sentence) as caught:
         read(tmp_path, said)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 600
-    assert time.monotonic() - started < 1.0
+    assert time.process_time() - started < 1.0
 
 
 @pytest.mark.parametrize(
@@ -151,10 +152,10 @@ def test_wrong_file_is_one_sentence_at_once(said: str, sentence: str, tmp_path: 
     ids=["comment", "spaces", "brackets", "text cut", "huge", "large", "floats", "program"],
 )
 def test_picture_that_is_none_is_one_sentence_at_once(picture: bytes, tmp_path: Path) -> None:
-    started = time.monotonic()
+    started = time.process_time()
     with pytest.raises(BrainError, match=r"image 'm\.pgm' cannot be read") as caught:
         read(tmp_path, SAID, picture)
-    assert "\n" not in str(caught.value) and time.monotonic() - started < 1.0
+    assert "\n" not in str(caught.value) and time.process_time() - started < 1.0
 
 
 def test_pipe_and_folder_are_no_map(tmp_path: Path) -> None:
@@ -192,16 +193,15 @@ def mutated(draw: st.DrawFn) -> bytes:
     return bytes(data)
 
 
-@settings(deadline=1000)
 @given(st.one_of(LINES, LINES.map(FULL.__add__), LINES.map(lambda lines: lines + "\n" + FULL)), mutated())
 def test_any_file_is_a_map_or_one_sentence(tmp_path_factory: pytest.TempPathFactory, said: str, picture: bytes) -> None:
     folder = tmp_path_factory.getbasetemp()
-    sentence = ""
+    sentence, started = "", time.process_time()
     try:
         assert read(folder, said.encode(errors="replace").decode(), picture).values.size
     except BrainError as error:
         sentence = str(error)
-    assert "\n" not in sentence and len(sentence) < 2000
+    assert "\n" not in sentence and len(sentence) < 2000 and time.process_time() - started < 1.0
 
 
 # ---- maps that are made ----

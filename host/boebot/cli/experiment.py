@@ -156,6 +156,5 @@ def _print(experiments: Sequence[Experiment], verdicts: Sequence[Verdict]) -> No
                     *map(Text, (figure.name, figure.text, figure.expected, figure.unit)), Text(word, colours[word])
                 )
             console.print(rows)
-        if one.criterion:
-            console.print(Text(f"Criterion: {one.criterion}", style="dim"))
+        console.print(Text(f"Criterion: {one.criterion}", style="dim"))
         console.print()

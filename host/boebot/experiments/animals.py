@@ -172,7 +172,7 @@ def _draw(figure: Figure, lives: list[Life], single: Life) -> None:
     water = np.linspace(max(0.0, 1 - 1 / ratio), 1, 2)
     axes.plot(water, 1 - ratio * (1 - water), "--", color="black", label="motivational isocline")
     for number, one in enumerate(lives, 1):
-        axes.plot(*one.levels.T, color=f"C{number - 1}", label=f"animal {number}")
+        axes.plot(*one.levels.T, color=f"C{number - 1}", lw=5.5 - 1.2 * number, label=f"animal {number}")
         axes.plot(*one.levels[0], "o", color=f"C{number - 1}")
     axes.plot(*single.levels.T, color="red", linestyle="-.", label="only drinks")
     axes.plot(*single.levels[-1], "x", color="red")

@@ -197,10 +197,10 @@ def evolution(seed: int, progress: Progress) -> Outcome:
     def draw(figure: Figure) -> None:
         axes = figure.subplot_mosaic([["best", "u"], ["best", "energy"], ["best", "place"]], height_ratios=(2, 1, 1))
         for number in range(RESTARTS):
-            axes["best"].plot(evolved.best[:, number], label=f"restart {number + 1}")
-        axes["best"].axhline(50, linestyle="--", color="0.6")
+            axes["best"].plot(evolved.best[:, number], lw=4 - 1.4 * number, label=f"restart {number + 1}")
+        axes["best"].axhline(50, linestyle="--", color="black", lw=1, label="never charging")
         axes["best"].set(xlabel="generation", ylabel="performance of the best (s of patrol)", ylim=(0, 220))
-        axes["best"].legend(loc="lower right")
+        axes["best"].legend(loc="center right")
         _draw_life(axes["u"], axes["energy"], axes["place"], best)
 
     return Outcome(measured, data, draw)

@@ -119,8 +119,8 @@ class Experiment:
     """of its figure"""
     robot: str = "none"
     """the robot that it runs on, and its board where it has one, such as "shieldbot (native)"; or "none" """
-    criterion: str = ""
-    """where the expected values come from; "" where the notes or their restored figures say it"""
+    criterion: str
+    """where the expected values come from, in sentences"""
     slow: bool = False
     """takes more than some two seconds"""
     run: Run

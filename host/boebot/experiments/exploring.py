@@ -277,16 +277,16 @@ def _draw_exploration(axes: Axes, trial: Trial, explore: Explore) -> None:
     """The nodes, the legs along which they were placed, and the true path."""
     assert explore.graph is not None
     floor(axes, trial.plan)
-    axes.plot(*trial.path.T, color="#0072b2", lw=0.9, alpha=0.6, zorder=6)
+    axes.plot(*trial.path.T, color="#0072b2", lw=0.9, alpha=0.6, zorder=6, label="path")
     nodes = explore.graph.nodes
-    for leg in explore.graph.legs:
+    for index, leg in enumerate(explore.graph.legs):
         ends: Floats = np.array([nodes[number].place for number in leg])
-        axes.plot(*ends.T, color="#555555", lw=1.2, zorder=7)
+        axes.plot(*ends.T, color="#555555", lw=1.2, zorder=7, label="" if index else "leg")
     for status, colour in STATUS_COLOURS.items():
         places = [node.place for node in nodes if node.status == status]
         if places:
             axes.plot(*np.array(places).T, "o", ms=5, color=colour, label=status, zorder=8)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize=9, frameon=False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=4, fontsize=9, frameon=False)
 
 
 def _draw_shares(axes: Axes, runs: list[Exploration], colour: str, label: str) -> None:

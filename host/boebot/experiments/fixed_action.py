@@ -133,6 +133,7 @@ def compare(stays: Escape, gone: Escape, duration: float) -> list[Measured]:
     caption="Stimulus as a sensor sees it and motor signals asked for, with a stimulus that stays and with one that "
     "has gone before the pattern is through.",
     robot="arsim",
+    criterion="Commands are the same without the stimulus; the pattern lasts as long as its parts, ± 3 steps.",
 )
 def pattern(seed: int, progress: Progress) -> Outcome:
     at = (0.7854, 2.0, 0.5)

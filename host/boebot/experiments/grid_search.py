@@ -483,8 +483,9 @@ def tightening(seed: int, progress: Progress) -> Outcome:
         left, right = figure.subplots(1, 2)
         _draw_grid(left, plan, lattice, cells)
         _draw_grid(right, plan, lattice, None)
-        right.plot(*np.array(raw[0]).T, color="#8a93a6", lw=1.6)
-        right.plot(*np.array(tight[0]).T, "o-", color="#0072b2", lw=1.8, ms=4)
+        right.plot(*np.array(raw[0]).T, color="#8a93a6", lw=1.6, label="as searched")
+        right.plot(*np.array(tight[0]).T, "o-", color="#0072b2", lw=1.8, ms=4, label="tightened")
+        figure.legend(loc="outside lower center", ncols=3, fontsize=9)
 
     return Outcome(measured, data, draw)
 

@@ -116,6 +116,7 @@ def ant(compass: float, way: float) -> RobotDescription:
     source="section 4.4.4, Cataglyphis",
     caption="A random way of 200 m out, the way home by the home vector, and the search about the place where it ends.",
     robot="arsim (compass 0.05 rad, odometer 2 % of each step; and without noise)",
+    criterion="After 200 m the home vector is at most 0.4 m off in the mean, 0.05 m without noise; search: 0.1 m.",
     slow=True,
 )
 def cataglyphis(seed: int, progress: Progress) -> Outcome:

@@ -126,6 +126,7 @@ def judge_notes(trial: Straight) -> list[Measured]:
     caption="Robot and ghost on a metre straight ahead by an odometer that takes the left wheel for 2 % larger than it "
     "is.",
     robot="arsim",
+    criterion="More than 0.01 m off after a metre, and as the closed form has it. The brain has the estimate alone.",
 )
 def notes_ghost(seed: int, progress: Progress) -> Outcome:
     robot = varied("arsim", "arsim-1.02", odometer={"factor_left": FACTOR})

@@ -31,6 +31,7 @@ START = (0.8, 0.8, 0.0)  # m, m, rad
 SECONDS, SEEDS = 120.0, 12
 EVERY = 5.0  # s from scan to scan
 JUMP = 0.05  # m: from here on a correction is one that can be seen
+WINDOW = 0.4  # m to each side of the correction that is drawn enlarged
 
 
 @dataclass(kw_only=True)
@@ -79,6 +80,8 @@ class Errors:
 
     trial: Trial
     times: Floats
+    poses: Floats
+    """as `Watch` has them"""
     odometry: Floats
     localization: Floats
     jumps: Floats
@@ -107,18 +110,24 @@ def patrolled(
     return Errors(
         trial,
         times,
+        poses,
         np.hypot(poses[:, 0] - true.x, poses[:, 1] - true.y),
         np.hypot(poses[:, 3] - true.x, poses[:, 4] - true.y),
         np.array([steps[max(0, at - 1) : at + 2].max() for at in scanned if at < len(steps)]),
     )
 
 
+FIRST = (
+    "Above: true path of the first run (green) and the path that it believes to take (red), by odometry alone, with "
+    "localization, and enlarged about its largest correction. Below: how far from the truth it believes to be, "
+)
+
+
 @experiment(
     "E55",
     title="A patrol with localization and without",
     source="section 6.3, Figs. 6.14 and 6.15",
-    caption="Left: path of the first run. Right: how far from the truth it believes to be, by odometry alone and with "
-    "localization every five seconds; twelve runs, the first one dark.",
+    caption=FIRST + "by odometry alone and with localization every five seconds; twelve runs, the first one dark.",
     robot="roller",
     criterion="Medians of the greatest error of twelve runs: at least 0.5 m by odometry alone (0.73 m computed from "
     "its noise), at most 0.2 m with localization, whose corrections can be seen as jumps. In five seconds the heading "
@@ -150,8 +159,8 @@ AVR_SECONDS, AVR_SEEDS = 240.0, 5
     "E55-avr",
     title="A patrol of a Shield-Bot with a turret",
     source="section 6.3, Figs. 6.14 and 6.15",
-    caption="Left: path of the first run. Right: how far from the truth it believes to be, by its encoders alone and "
-    "with a sweep of the turret every ten seconds; five runs, the first one dark.",
+    caption=FIRST + "by its encoders alone and with a sweep of the turret every ten seconds; five runs, the first one "
+    "dark.",
     robot="shieldbot-turret (avr)",
     criterion="As the notes' figure shows it: the greatest error of a run with localization is less than half of that "
     "by odometry alone; medians.",
@@ -176,9 +185,19 @@ def patrol_avr(seed: int, progress: Progress) -> Outcome:
 
 
 def _draw(figure: Figure, runs: list[Errors]) -> None:
-    left, right = figure.subplots(1, 2, width_ratios=(1, 1.3))
-    floor(left, runs[0].trial.plan)
-    left.plot(*runs[0].trial.path.T, color="#0072b2", lw=1.2, zorder=6)
+    figure.set_figheight(6.4)
+    panels = figure.subplot_mosaic([["alone", "localized", "jump"], ["errors"] * 3], height_ratios=(1.1, 1))
+    poses, right = runs[0].poses, panels["errors"]
+    titles = {"alone": "odometry alone", "localized": "with localization", "jump": "its largest correction"}
+    for name, title in titles.items():
+        floor(axes := panels[name], runs[0].trial.plan)
+        believed = poses[:, :2] if name == "alone" else poses[:, 3:5]
+        axes.plot(*runs[0].trial.path.T, color="#009e73", lw=1.4, zorder=6, label="true path")
+        axes.plot(*believed.T, color="#d55e00", lw=0.9, zorder=7, label="path as believed")
+        axes.set_title(title, fontsize=10)
+    at = poses[np.hypot(*np.diff(poses[:, 3:5], axis=0).T).argmax(), 3:5]
+    axes.set(xlim=(at[0] - WINDOW, at[0] + WINDOW), ylim=(at[1] - WINDOW, at[1] + WINDOW))
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize=9)
     for number, run in reversed(list(enumerate(runs))):
         strength = 1.0 if number == 0 else 0.25
         for name, errors, colour in (

@@ -78,7 +78,8 @@ def gradient(seed: int, progress: Progress) -> Outcome:
         _draw_landscape(left, PotentialField.of([FIG_6_11_GOAL, FIG_6_11_HILL]), (-1, -1.5, 3, 1.5))
         right = figure.add_subplot(1, 2, 2)
         right.loglog(steps, differences, "o-", ms=4)
-        right.loglog(steps[6:], 5 * differences[-1] * (steps[6:] / steps[-1]) ** 2, "--", color="0.5", lw=1.0)
+        right.loglog(steps[6:], 5 * differences[-1] * (steps[6:] / steps[-1]) ** 2, "--", color="0.5", label="slope 2")
+        right.legend()
         right.set(xlabel="step of the differences (m)", ylabel="greatest difference (1/m)")
 
     return Outcome(measured, {"step_m": steps, "difference_per_m": differences}, draw)
@@ -202,11 +203,11 @@ def _draw_goal(axes: Axes, behavior: FollowField) -> None:
     axes.add_patch(Circle(place, behavior.arrival, facecolor="#f0e442", edgecolor="#39415a", lw=1.0, zorder=5))
 
 
-def _draw_way(axes: Axes, trial: Trial, number: int) -> None:
+def _draw_way(axes: Axes, trial: Trial, number: int, line: str = "-", width: float = 1.6) -> None:
     from boebot.view import style
     from boebot.view.robot_drawing import draw_robot
 
-    axes.plot(*trial.path.T, color=style.colour(number), lw=1.6, zorder=6)
+    axes.plot(*trial.path.T, line, color=style.colour(number), lw=width, zorder=6)
     draw_robot(axes, trial.result.robot, trial.start, style.colour(number))
 
 
@@ -331,7 +332,7 @@ AHEAD: list[Pose] = [(-1.0, 0.0, 0.0), (-1.0, 0.05, 0.0)]
     title="Locked in a wedge",
     source="section 6.2, Fig. 6.13",
     caption="Left: contours of the field of a goal at (2, 0) and of the three hills of a wedge, and paths from two "
-    "starts. Right: distance from the goal, also without the wedge, and with one of its hills only.",
+    "starts (line, dashes). Right: distance from the goal, also without the wedge, and with one of its hills only.",
     robot="roller, its odometer without noise",
     criterion="Where the slopes of goal and hills cancel on the axis, at x = 0.57 m, the field has a minimum of "
     "-0.553. Without hills, and with one of them, the robot arrives.",
@@ -361,16 +362,18 @@ def locked(seed: int, progress: Progress) -> Outcome:
     ]
 
     def draw(figure: Figure) -> None:
+        from boebot.view import style
+
         figure.set_figheight(3.5)
         left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
         _draw_field(left, field, held[0], -1.0, 0.0)
         _draw_goal(left, followers[0])
-        for number, trial in enumerate(held, 1):
-            _draw_way(left, trial, number)
-        styles = (("wedge", "C0", "-"), ("", "C1", "-"), ("no hill", "C2", "-"), ("one hill", "C6", "--"))
-        for trial, (label, colour, line) in zip(trials, styles, strict=True):
+        looks = (("wedge", "-", 3.0), ("0.05 m beside", "--", 1.4), ("no hill", "-", 8.0), ("one hill", "-", 5.0))
+        for number, (trial, (label, line, width)) in enumerate(zip(trials, looks, strict=True), 1):
+            if number <= len(held):
+                _draw_way(left, trial, number, line, width)
             away = np.hypot(*(trial.path - (BEHIND.x, BEHIND.y)).T)
-            right.plot(trial.time, away, line, color=colour, label=label)
+            right.plot(trial.time, away, line, color=style.colour(number), lw=width, label=label, zorder=9 - width)
         right.set(xlabel="time (s)", ylabel="distance from the goal (m)", ylim=(0, 3.2))
         right.legend(loc="upper right")
 

@@ -43,6 +43,7 @@ def judge_step(times: Floats, values: Floats) -> list[Measured]:
     title="A reflex warms up and tires",
     source="section 4.4.1, reflexes",
     caption="Intensity of a reflex under a stimulus that begins at 0 s and lasts; dashed: what is left in the end.",
+    criterion="By its equations: at most 0.73 ± 0.02, at 0.70 s ± 0.05 s; below 0.13 after 9 s, for it tends to 0.1.",
 )
 def step_response(seed: int, progress: Progress) -> Outcome:
     times, values = intensity_under_a_step(ReflexIntensity(), 15.0)
@@ -52,7 +53,7 @@ def step_response(seed: int, progress: Progress) -> Outcome:
         axes = figure.subplots()
         axes.plot([-1, 0, 0, 15], [0, 0, 1, 1], color="0.6", label="stimulus S")
         axes.plot(times, values, color="#0072b2", label="intensity ρ")
-        axes.axhline(0.1, linestyle="--", color="0.6", linewidth=0.8)
+        axes.axhline(0.1, linestyle="--", color="0.6", linewidth=0.8, label="left in the end")
         axes.set(xlabel="time (s)", ylabel="stimulus, intensity", xlim=(-1, 15), ylim=(0, 1.1))
         axes.legend(loc="center right", frameon=False)
 
@@ -141,6 +142,7 @@ def judge(one: Larva) -> list[Measured]:
     source="section 4.4.1, reflexes",
     caption="Place of a fly larva in a dead-end tunnel that is lit at its mouth, and the intensity with which it turns "
     "away from the light; dashed: the intensity below which forward motion wins.",
+    criterion="By its equations: at the end at 17.9 s ± 1 s, tired at 30.3 s ± 0.5 s, out at 50.6 s ± 2 s.",
 )
 def tunnel(seed: int, progress: Progress) -> Outcome:
     one = larva(ReflexIntensity(0.3, 15.0, 0.98))
@@ -152,7 +154,8 @@ def tunnel(seed: int, progress: Progress) -> Outcome:
         upper.set(ylabel="way from the mouth (cm)", ylim=(-1, 23))
         upper.legend(loc="upper right", fontsize=9, ncols=2)
         lower.plot(one.times, one.intensity, color="#d55e00")
-        lower.axhline(TIRED, linestyle="--", color="0.6")
+        lower.axhline(TIRED, linestyle="--", color="0.6", label="below this forward motion wins")
+        lower.legend(fontsize=9)
         lower.set(xlabel="time (s)", ylabel="intensity ρ", ylim=(0, 1.05))
 
     data = {"time_s": one.times, "place_m": one.place, "heading_rad": one.heading, "rho": one.intensity}

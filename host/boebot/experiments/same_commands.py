@@ -180,6 +180,9 @@ def _counts_apart(runs: list[RunResult]) -> int:
     return int(np.abs(counts[0][:, :ticks] - counts[1][:, :ticks]).max())
 
 
+FIRSTS = {"first telemetry": "0.5", "infrared or whiskers": "C2", "commands differ": "red"}
+
+
 def _draw(figure: Figure, drawn: list[tuple[str, list[RunResult], list[Difference | None]]]) -> None:
     grid = figure.subplots(len(drawn), 2, sharex="row", sharey=True)
     for row, (name, runs, differences) in zip(grid, drawn, strict=True):
@@ -188,12 +191,13 @@ def _draw(figure: Figure, drawn: list[tuple[str, list[RunResult], list[Differenc
                 times = [run.record.times[step[0]] for step in run.record.steps]
                 axes.step(times, [step[2 + side] for step in run.record.steps], style, where="post", label=run.board)
             axes.set(ylim=(-1.05, 1.05))
-            for difference, color in zip(differences, ("0.8", "C2", "red"), strict=True):
+            for difference, (label, color) in zip(differences, FIRSTS.items(), strict=True):
                 if difference is not None:
-                    axes.axvline(difference.tick * runs[0].tick, color=color, linestyle=":")
+                    axes.axvline(difference.tick * runs[0].tick, color=color, linestyle=":", label=label)
         row[0].set(ylabel=name)
     for axes, title in zip(grid[0], ("motor signal, left", "motor signal, right"), strict=True):
         axes.set_title(title, fontsize=9)
     for axes in grid[-1]:
         axes.set(xlabel="time (s)")
-    grid[0, 1].legend(loc="lower right", ncols=2, fontsize="x-small")
+    labelled = dict(zip(*reversed(grid[0, 0].get_legend_handles_labels()), strict=True))
+    figure.legend(labelled.values(), labelled, loc="outside lower center", ncols=5, fontsize="small")

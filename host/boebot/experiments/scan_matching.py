@@ -112,7 +112,8 @@ def at_the_true_pose(seed: int, progress: Progress) -> Outcome:
         _draw_pose(left, poses[0], "#0072b2")
         right.plot(range(1, POSES + 1), noisy, "o", ms=4, label="1 % noise")
         right.plot(range(1, OWN + 1), own, "s", mfc="none", ms=6, label="the robot's own laser")
-        right.axhline(NOISE, color="0.5", lw=1.0)
+        right.axhline(NOISE, color="0.5", lw=1.0, label="share of noise")
+        left.legend(loc="lower left", fontsize=9)
         right.set(xlabel="pose", ylabel="scan error ε", ylim=(0, 0.016))
         right.legend(loc="lower right")
 
@@ -176,6 +177,7 @@ def at_the_true_pose_by_turret(seed: int, progress: Progress) -> Outcome:
         _draw_scan(left, scans[0], poses[0], "#0072b2")
         _draw_pose(left, poses[0], "#0072b2")
         numbers = range(1, TURRET_POSES + 1)
+        left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), frameon=False, fontsize=9)
         right.plot(numbers, there, "o", ms=5, label="at the true pose")
         right.plot(numbers, beside, "s", mfc="none", ms=6, label="beside it")
         right.set(xlabel="pose", ylabel="scan error ε", ylim=(0, None))
@@ -184,7 +186,9 @@ def at_the_true_pose_by_turret(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, {"pose": range(1, TURRET_POSES + 1), "error": there, "error_beside": beside}, draw)
 
 
-def _draw_scan(axes: Axes, scan: Scan, at: Pose, colour: str, *, rays: bool = True, dotted: bool = False) -> None:
+def _draw_scan(
+    axes: Axes, scan: Scan, at: Pose, colour: str, *, rays: bool = True, dotted: bool = False, label: str = "scan"
+) -> None:
     """Its ends, and a few of its rays, as they lie when the range finder is there."""
     from matplotlib.collections import LineCollection
 
@@ -195,7 +199,7 @@ def _draw_scan(axes: Axes, scan: Scan, at: Pose, colour: str, *, rays: bool = Tr
         lines = [((x, y), (end_x, end_y)) for end_x, end_y in ends[::4].tolist()]
         dashes = (0, (1.5, 2)) if dotted else "solid"
         axes.add_collection(LineCollection(lines, colors=colour, linewidths=0.7, linestyles=[dashes], zorder=5))
-    axes.plot(*ends.T, ".", color=colour, ms=3, zorder=6)
+    axes.plot(*ends.T, ".", color=colour, ms=3, zorder=6, label=label)
 
 
 def _draw_pose(axes: Axes, pose: Pose, colour: str, length: float = 0.45) -> None:
@@ -251,9 +255,11 @@ def near_and_far(seed: int, progress: Progress) -> Outcome:
                     _draw_scan(axes, scans[0], here, "#0072b2", rays=not shown[1])
                     _draw_pose(axes, here, "#0072b2")
                 if shown[1]:
-                    _draw_scan(axes, expected, estimate, "#d55e00", rays=not shown[0], dotted=True)
+                    label = "expected by the map where odometry believes to be"
+                    _draw_scan(axes, expected, estimate, "#d55e00", rays=not shown[0], dotted=True, label=label)
                     _draw_pose(axes, estimate, "#d55e00")
                 axes.label_outer()
+        figure.legend(*panels[0, 2].get_legend_handles_labels(), loc="outside lower center", ncols=2, markerscale=3)
 
     x, y, heading = np.array(poses).T
     data = {"x_m": x, "y_m": y, "heading_rad": heading}
@@ -342,14 +348,8 @@ def found_by_chance(seed: int, progress: Progress) -> Outcome:
         left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1.1))
         for axes, one in zip((left, middle), searches, strict=False):
             _draw_search(axes, one)
-        right.plot(
-            [one.way[0] for one in searches],
-            [one.turn[0] for one in searches],
-            "x",
-            color="#d55e00",
-            ms=7,
-            label="before",
-        )
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)
+        right.plot(*before, "x", color="#d55e00", ms=7, label="before")
         right.plot(ways, turns, "o", ms=4, label="after")
         right.set(xlabel="error of the place (m)", ylabel="error of the heading (rad)", xscale="log", yscale="log")
         right.margins(0.12)
@@ -373,10 +373,10 @@ def _draw_search(axes: Axes, one: Search) -> None:
     x, y, heading = poses.T
     axes.plot(x, y, "-", color="#b8bfcd", lw=0.8)
     axes.quiver(x, y, np.cos(heading), np.sin(heading), angles="xy", color="#0072b2", width=0.006, scale=9, zorder=3)
-    axes.plot(x[1:-1], y[1:-1], "o", mfc="white", mec="#0072b2", ms=5, zorder=4)
-    axes.plot(x[0], y[0], "o", color="#d55e00", ms=8, zorder=5)
-    axes.plot(x[-1], y[-1], "s", mfc="none", mec="#0072b2", mew=1.6, ms=11, zorder=6)
-    axes.plot(*one.true[:2], "s", color="#009e73", ms=7, zorder=5)
+    axes.plot(x[1:-1], y[1:-1], "o", mfc="white", mec="#0072b2", ms=5, zorder=4, label="accepted")
+    axes.plot(x[0], y[0], "o", color="#d55e00", ms=8, zorder=5, label="believed before")
+    axes.plot(x[-1], y[-1], "s", mfc="none", mec="#0072b2", mew=1.6, ms=11, zorder=6, label="found")
+    axes.plot(*one.true[:2], "s", color="#009e73", ms=7, zorder=5, label="truth")
     axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
     axes.set_adjustable("datalim")
     axes.locator_params(nbins=5)

@@ -79,7 +79,8 @@ def timing_rule(seed: int, progress: Progress) -> Outcome:
 def _diagram(axes: Axes, verdict: Verdict) -> None:
     for place, event in enumerate(verdict.events):
         axes.barh(place, event.seconds * 1000, 0.7, left=event.begin * 1000, color=_COLOURS[event.kind])
-    axes.axvline(verdict.period_s * 1000, color="#2e3440")
+    axes.axvline(verdict.period_s * 1000, color="#2e3440", label="the step's time")
+    axes.legend(loc="upper right", fontsize=9)
     axes.set_yticks(range(len(verdict.events)), [event.name.replace("_", " ") for event in verdict.events])
     axes.invert_yaxis()
     axes.set_title("realisable" if verdict.is_realisable else "not realisable")

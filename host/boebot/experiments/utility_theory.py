@@ -324,8 +324,9 @@ def elicitation(seed: int, progress: Progress) -> Outcome:
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
-        axes.plot(grid, true)
-        axes.plot(amounts, utilities, "o-", linewidth=0.8)
+        axes.plot(grid, true, linewidth=3, label="true")
+        axes.plot(amounts, utilities, "o-", linewidth=0.8, label="as answered")
+        axes.legend()
         axes.set(xlabel="money x", ylabel="utility u(x)")
 
     return Outcome(measured, {"amount": amounts, "utility": utilities}, draw)

@@ -91,6 +91,7 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
     source="chapter 5, Fig. 5.1",
     caption="Path of a robot that follows the walls of a room of 3 m by 2 m, and its distance from them.",
     robot="arsim in the size of a Boe-Bot, IR ahead and at -60 degrees",
+    criterion="Once about the room at least in 80 s, at 0.25 m ± 0.05 m from the nearest wall, without a contact.",
 )
 def wall(seed: int, progress: Progress) -> Outcome:
     return outcome(lap(small_arsim(), None, seed, 0.25, progress), 0.20, 0.30)

@@ -24,13 +24,11 @@ from boebot.showing import Grid
 if TYPE_CHECKING:
     from boebot.navigation.line_map import Floats
 
-    Said = dict[str, str | list[str]]
-
 FREE, UNKNOWN, OCCUPIED = 0.0, math.nan, 1.0
 FREE_BELOW, OCCUPIED_ABOVE = 0.196, 0.65  # map_server's own thresholds
 PIXELS = {"free": 254, "unknown": 205, "occupied": 0}
 LARGEST = 50_000_000  # pixels
-LONGEST = 10_000  # bytes of a YAML file, and of a picture's header
+LONGEST, BRACKETS = 10_000, 100  # bytes of a YAML file and of a picture's header; brackets of a YAML file
 SWITCH = {text: index for index, two in enumerate(("0 false no off n", "1 true yes on y")) for text in two.split()}
 MODES = ("trinary", "scale", "raw")
 FORMATS = ("BMP", "GIF", "JPEG", "PNG", "PPM")
@@ -182,27 +180,30 @@ class OccupancyMap:
         return cls(np.where(opaque, values[sums], UNKNOWN)[::-1], cell, x, y)
 
 
-def _said(file: Path) -> Said:
+def _said(file: Path) -> dict[str, str | list[str]]:
     """What a YAML file says by key, in the texts that are there: '0', "0" and 0 are the same to map_server."""
     import yaml
 
     try:
-        root = yaml.compose(regular(file, LONGEST).read_text(encoding="utf-8"), yaml.SafeLoader)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        deep = "it is nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
-        what = getattr(error, "strerror", None) or deep
+        text = regular(file, LONGEST).read_text(encoding="utf-8")
+        if text.count("[") + text.count("{") > BRACKETS:  # the time that yaml takes grows with their square
+            raise ValueError(f"it has more than {BRACKETS} brackets")
+        root = yaml.compose(text, yaml.SafeLoader)
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        what = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        what = "it is nested too deeply" if isinstance(error, RecursionError) else what
         raise BrainError(f"{file} is no map: {what}; expected a YAML file of map_server") from None
     if not isinstance(root, yaml.MappingNode):
         raise BrainError(f"{file} is no map; expected keys image, resolution and origin")
 
-    def text(node: yaml.Node) -> str:
+    def plain(node: yaml.Node) -> str:
         return str(node.value) if isinstance(node, yaml.ScalarNode) else "..."
 
-    said: Said = {}
+    said: dict[str, str | list[str]] = {}
     for key, node in root.value:
-        if text(key) in said:
-            raise BrainError(f"{file}: {shown(text(key))} is given twice; expected each key once")
-        said[text(key)] = list(map(text, node.value)) if isinstance(node, yaml.SequenceNode) else text(node)
+        if plain(key) in said:
+            raise BrainError(f"{file}: {shown(plain(key))} is given twice; expected each key once")
+        said[plain(key)] = list(map(plain, node.value)) if isinstance(node, yaml.SequenceNode) else plain(node)
     return said
 
 
@@ -218,10 +219,8 @@ def _picture(file: Path, name: object, mode: object) -> tuple[Any, int, Any]:
         if len(head) == LONGEST and head[:1] == b"P" and len(re.sub(rb"#[^\r\n]*", b"", head).split(maxsplit=4)) < 4:
             raise ValueError(f"its header has more than {LONGEST:,} bytes")
         with Image.open(path, formats=FORMATS) as picture:
-            if picture.width * picture.height > LARGEST:
-                raise ValueError(f"it has more than {LARGEST:,} cells")
-            if picture.mode == "F":
-                raise ValueError("its pixels are floating-point numbers")
+            if picture.mode == "F" or picture.width * picture.height > LARGEST:
+                raise ValueError(f"expected at most {LARGEST:,} pixels, whole numbers")
             if picture.mode.startswith("I"):
                 return np.clip(np.asarray(picture).astype(int), 0, 65535), 65535, True
             has_alpha = picture.has_transparency_data

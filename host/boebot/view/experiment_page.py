@@ -87,8 +87,7 @@ def _section(experiment: Experiment, verdict: Verdict) -> str:
             f"<figcaption>{escape(experiment.caption)}</figcaption></figure>",
             _measured(verdict),
         ]
-    if experiment.criterion:
-        parts.append(f"<p><b>Criterion.</b> {escape(experiment.criterion)}</p>")
+    parts.append(f"<p><b>Criterion.</b> {escape(experiment.criterion)}</p>")
     links = " · ".join(f'<a href="{file}">{file.rpartition(".")[2].upper()}</a>' for file in verdict.files)
     parts.append(f"<p>{links}</p>" if links else "")
     return "\n".join(parts) + "\n</section>"
