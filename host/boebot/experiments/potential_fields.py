@@ -458,7 +458,7 @@ WITHIN = (
     source="section 6.2",
     caption=PAST,
     robot="roller, its odometer without noise",
-    criterion=WITHIN,
+    criterion=WITHIN.strip(),
 )
 def around(seed: int, progress: Progress) -> Outcome:
     return past_the_wedge(roller(), 25.0, seed, progress)

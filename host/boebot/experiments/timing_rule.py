@@ -44,7 +44,7 @@ def is_run(count: int) -> bool:
     source="section 3.2, Fig. 3.2",
     caption="All that one time step asks of the hardware, to scale, for two IR sensors and for four; the line is Δt.",
     robot="arsim",
-    criterion="the rule of section 3.2: the sum of all events that follow one another is less than Δt",
+    criterion="The rule of section 3.2: the sum of all events that follow one another is less than Δt.",
 )
 def timing_rule(seed: int, progress: Progress) -> Outcome:
     verdicts = {count: judge(robot_with(count), STEP_S, brain_s=BRAIN_S) for count in (2, 3, 4)}
