@@ -74,8 +74,11 @@ def test_served_board_answers_no_sooner_than_it_was_asked(native_pty: str) -> No
 )
 def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_path: Path) -> None:
     with served(board, *where) as (url, _):
-        done = boebot("run", "wander", "--on", url, "--seconds", "2", "--out", str(tmp_path), "--json")
+        done = boebot(
+            "run", "wander", "--on", url, "--seconds", "2", "--out", str(tmp_path), "--json", "--arena", "room"
+        )
         assert done.returncode == 0, done.stderr
+        assert "arena room changes nothing: the robot at" in done.stderr
         summary = json.loads(done.stdout)
         assert summary["lost_frames"] == 0 and summary["bad_frames"] == 0
         assert {"record.mcap", "run.png", "replay.html"} <= {path.name for path in tmp_path.iterdir()}

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from boebot.arenas import load_arena
 from boebot.arenas.floor_plan import floor_plan
 from boebot.boards import BoardRequest, Truth, TruthNow
+from boebot.errors import BoardError
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sim import Sim, SimRobot
@@ -17,7 +18,13 @@ Wait = Callable[[SimRobot, int, int], None]
 
 
 def new_sim(request: BoardRequest, step_s: float) -> Sim:
-    """The world that a request wants, without robots; `step_s`: its step, unless the request has one."""
+    """The world that a request wants, without robots; `step_s`: its step, unless the request has one.
+
+    Raises:
+        BoardError: the request has an option that there is not.
+    """
+    if unknown := request.options.keys() - {"world_step_s"}:
+        raise BoardError(f"there is no option {min(unknown)!r} of a simulated world; expected world_step_s")
     step_cycles = round(float(request.options.get("world_step_s", step_s)) * CLOCK_HZ)
     sim = Sim(
         load_arena(request.arena),

@@ -201,6 +201,12 @@ def test_a_switch_without_effect_is_told(tmp_path: Path) -> None:
     ]
 
 
+def test_a_grip_without_slip_is_told(tmp_path: Path) -> None:
+    file = own(tmp_path, "[body]\ntyre_grip = 0.1", "arsim")
+    result = boebot.run("wander", robot=file, seconds=0.1)
+    assert "body.tyre_grip of its file changes nothing: tyre_slip of robot 'mine' is 0" in result.notices
+
+
 FILES: list[tuple[str, str, str]] = [
     ("shieldbot", "[imperfections]\nservo_lag = 0.1", "mine.toml:4: imperfections.servo_lag: there is no imperfection"),
     ("shieldbot", "[imperfections]\n\nping_miss = 2", "mine.toml:5: imperfections.ping_miss is 2.0; expected a finite"),

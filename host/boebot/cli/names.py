@@ -36,7 +36,10 @@ def list_names(
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """List what is bundled, by the names that other commands and Python understand."""
+    """List what is bundled, by the names that other commands and Python understand.
+
+    Imperfections are set by --imperfection and in robots' files; switches take them away, by --without.
+    """
     if what is not None and what not in KINDS:
         raise typer.BadParameter(
             f"there is no list of {what!r}; expected {', '.join(KINDS)}{did_you_mean(what, KINDS)}"

@@ -158,6 +158,8 @@ def idle(name: str, robot: RobotDescription, *, noise: bool = True) -> str:
 def notices(robot: RobotDescription, without: Sequence[str]) -> list[str]:
     """A sentence for each of a robot's own magnitudes, and of what is switched off, that changes nothing of it."""
     asked = {f"imperfections.{name} of its file": [name] for name in robot.imperfections}
+    if robot.body.tyre_grip is not None:
+        asked["body.tyre_grip of its file"] = ["tyre_grip"]
     asked |= {f"without {name}": list(switched_off([name])) for name in without}
     found = [(what, [idle(name, robot) for name in names]) for what, names in asked.items()]
     return [f"{what} changes nothing: {faults[0]}" for what, faults in found if all(faults)]

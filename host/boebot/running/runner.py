@@ -290,8 +290,11 @@ def result_of(driver: Driver, task: Task, times: StepTimes, error: BaseException
     result.notices += [*task.brain.notices, *driver.robot.showing.notices]
     result.longest_step, result.long_steps = times.longest, times.long
     result.unrealisable = task.unrealisable
+    request = task.request
     if not is_live(task.on):
-        result.notices += notices(task.request.robot, task.request.without)
+        result.notices += notices(request.robot, request.without)
+    elif request.arena is not None:
+        result.notices.append(f"arena {request.arena} changes nothing: the robot at {task.on} is where it stands")
     if task.unrealisable is not None:
         result.notices.append(f"forced: {task.unrealisable}")
     return result
