@@ -60,7 +60,7 @@ def notes(board: BoardAccess) -> list[str]:
 
 def stored(*writes: tuple[str, int]) -> list[str]:
     """What is noted of a program that writes those values to those registers."""
-    return notes(written([(registers()[name], value) for name, value in writes]))
+    return notes(written([(registers()[name], value) for name, value in writes], reads=False))
 
 
 def test_a_started_spi_transfer_is_told_and_where_it_is_waited_for() -> None:
@@ -84,25 +84,29 @@ def test_a_started_spi_transfer_is_told_and_where_it_is_waited_for() -> None:
     assert len(machine.board.notes(since=2)) == 1
 
 
-STS, LDI_R24, FILL = 0x9380, 0xE080, 800
+LDS_R25, STS_R24, LDI_R24, ROOM = 0x9190, 0x9380, 0xE080, 1000
 
 
 @cache
 def frame() -> tuple[bytes, bytes]:
     """An image, what stands before room for a program and what behind it."""
-    filled = b"\x5a" * FILL
-    before, _, behind = assemble(f"main:\n .fill {FILL}, 1, 0x5A\n1: rjmp 1b").partition(filled)
+    filled = b"\x5a" * ROOM
+    before, _, behind = assemble(f"main:\n .fill {ROOM}, 1, 0x5A\n1: rjmp 1b").partition(filled)
     return before, behind
 
 
-def written(writes: list[tuple[int, int]]) -> BoardAccess:
-    """A board that has run a program which stores those values at those addresses, in that order."""
-    code = [word for to, value in writes for word in (LDI_R24 | (value & 0xF0) << 4 | value & 0xF, STS, to)]
+def written(writes: list[tuple[int, int]], *, reads: bool = True) -> BoardAccess:
+    """A board that has run a program which stores those values at those addresses, in that order, and reads what is
+    there then, if not told otherwise."""
+    code: list[int] = []
+    for to, value in writes:
+        code += (LDI_R24 | (value & 0xF0) << 4 | value & 0xF, STS_R24, to)
+        code += (LDS_R25, to) if reads else ()
     program = b"".join(word.to_bytes(2, "little") for word in code)
-    assert len(program) <= FILL
+    assert len(program) <= ROOM
     before, behind = frame()
-    board = AvrBoard(before + program.ljust(FILL, b"\0") + behind, Path("program.elf")).access()
-    board.run(4 * FILL)
+    board = AvrBoard(before + program.ljust(ROOM, b"\0") + behind, Path("program.elf")).access()
+    board.run(4 * ROOM)
     return board
 
 
@@ -124,11 +128,22 @@ def test_any_writes_tell_what_is_not_built_and_nothing_else(writes: list[tuple[i
     assert [told for told in notes(written(writes)) if told in names_told] == expected
 
 
+@given(st.lists(st.tuples(st.integers(0x20, 0xFF), st.integers(0, 255)), max_size=100))
+def test_any_writes_at_all_end_in_a_run_or_a_fault(writes: list[tuple[int, int]]) -> None:
+    """Also to the stack pointer, SREG and the watchdog: soft resets, resets, stacks anywhere."""
+    try:
+        written(writes)
+    except BoardError as error:
+        assert re.match(r"The board stopped: the (program|stack)", str(error))  # noqa: PT017
+
+
 def test_each_register_that_is_not_built_is_told_at_its_place() -> None:
     writes = [(registers()[name], bits ^ AFTER_RESET.get(name, 0)) for name, bits in NOT_BUILT.items()]
-    board = written([*writes, (0xFF, 1)])
-    assert notes(board) == [*(f"writes to {name}" for name in NOT_BUILT), "writes to a reserved address"]
-    assert set(gaps(address for _, address, _, _ in board.notes())) == {6}  # ldi, sts
+    told = written([*writes, (0xFF, 1)]).notes()
+    assert [does for _, _, does, _ in told if "reads" in does] == ["reads SPSR", "reads SPDR", "reads ACSR"]
+    told = [row for row in told if "writes" in row[2]]
+    assert [row[2] for row in told] == [*(f"writes to {name}" for name in NOT_BUILT), "writes to a reserved address"]
+    assert set(gaps(address for _, address, _, _ in told)) == {10}  # LDI, STS, LDS
 
 
 def test_what_a_program_of_the_kits_kind_writes_is_not_told() -> None:
