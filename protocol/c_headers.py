@@ -11,38 +11,30 @@ DIRECTIONS = ("to_board", "to_host")
 
 def values_header(spec: schema.Schema) -> str:
     """firmware/src/generated/values.h"""
-    lines = [
-        "/* values.h: the flags and values that messages speak of, from protocol/messages.toml.",
-        f" * {schema.MADE_NOTE} */",
-        "#ifndef GENERATED_VALUES_H",
-        "#define GENERATED_VALUES_H",
-    ]
+    lines: list[str] = []
     for name, flags in spec.flags.items():
         lines += ["", f"/* {flags.doc} */"]
         lines += [
-            f"#define {name.upper()}_{bit.upper()} (1{'u' if i < 16 else 'ul'} << {i})"
-            + c_comment(flags.docs.get(bit, ""))
+            f"#define {name.upper()}_{bit.upper()} 0x{1 << i:X}u" + c_comment(flags.docs.get(bit, ""))
             for i, bit in enumerate(flags.bits)
         ]
     for name, enum in spec.enum.items():
         lines += ["", f"/* {enum.doc} */", "enum {"]
-        names = enum.values if name == "task" else [value.upper() for value in enum.values]  # TASK_name, for tasks.def
+        upper = str if name == "task" else str.upper  # TASK_session, as in tasks.def
         lines += [
-            f"  {name.upper()}_{own} = {i}," + c_comment(enum.docs.get(value, ""))
-            for i, (own, value) in enumerate(zip(names, enum.values, strict=True))
+            f"  {name.upper()}_{upper(value)} = {i}," + c_comment(enum.docs.get(value, ""))
+            for i, value in enumerate(enum.values)
         ]
         lines += [f"  {name.upper()}_COUNT"]
         lines += ["};"]
-    return "\n".join([*lines, "", "#endif", ""])
+    return schema.c_header(
+        "values.h", "the flags and values that messages speak of, from protocol/messages.toml.", lines
+    )
 
 
 def messages_header(spec: schema.Schema) -> str:
     """firmware/src/generated/messages.h"""
     lines = [
-        "/* messages.h: the layout of every message of the protocol, from protocol/messages.toml.",
-        f" * {schema.MADE_NOTE} */",
-        "#ifndef GENERATED_MESSAGES_H",
-        "#define GENERATED_MESSAGES_H",
         "",
         "#include <stdbool.h>",
         "#include <stdint.h>",
@@ -101,19 +93,14 @@ def messages_header(spec: schema.Schema) -> str:
         f"  X(0x{m.id:02X}, {m.length}, 0x{spec.message_hash(m):08X}ul)"
         for m in sorted(spec.message, key=lambda m: m.id)
     ]
-    lines += [*continued("#define MESSAGE_LIST(X)", rows), "", "#endif", ""]
-    return "\n".join(lines)
+    lines += continued("#define MESSAGE_LIST(X)", rows)
+    doc = "the layout of every message of the protocol, from protocol/messages.toml."
+    return schema.c_header("messages.h", doc, lines)
 
 
 def parameters_header(spec: schema.Schema) -> str:
     """firmware/src/generated/parameters.h"""
-    lines = [
-        "/* parameters.h: the run-time parameters, from protocol/messages.toml.",
-        f" * {schema.MADE_NOTE} */",
-        "#ifndef GENERATED_PARAMETERS_H",
-        "#define GENERATED_PARAMETERS_H",
-        "",
-    ]
+    lines = [""]
     for p in spec.parameter:
         unit = schema.unit_per_count(p.scale, p.unit)
         lines.append(f"#define PARAMETER_{p.name.upper()} {p.id}u /* {unit}: {p.doc} */")
@@ -128,8 +115,14 @@ def parameters_header(spec: schema.Schema) -> str:
     for p in spec.parameter:
         default = str(p.default) if not p.default_from and p.default is not None else f"DEFAULT_{p.name.upper()}"
         rows.append(f"  X({p.name.upper()}, {p.type}, {p.min}, {p.max}, {default})")
-    lines += [*continued("#define PARAMETER_LIST(X)", rows), "", "#endif", ""]
-    return "\n".join(lines)
+    lines += continued("#define PARAMETER_LIST(X)", rows)
+    devices = [f"  X({name.upper()}, {first})" for name, first in spec.devices_parameters.items()]
+    lines += [
+        "",
+        "/* X(NAME, first bit) for each that holds 16 of the DEVICES_... bits, and all of these in one number. */",
+    ]
+    lines += [*continued("#define DEVICES_LIST(X)", devices), f"typedef uint{16 * len(devices)}_t device_set;"]
+    return schema.c_header("parameters.h", "the run-time parameters, from protocol/messages.toml.", lines)
 
 
 CRC21_POLYNOMIAL = 0x1DBF6F
@@ -144,10 +137,6 @@ def crc21_header() -> str:
             register = register << 1 ^ (CRC21_POLYNOMIAL << 3 | 1 << 24 if register & 0x800000 else 0)
         entries.append(register)
     lines = [
-        "/* crc21_table.h: the remainder of each byte in CRC-21, in the top 21 of 24 bits.",
-        f" * {schema.MADE_NOTE} */",
-        "#ifndef GENERATED_CRC21_TABLE_H",
-        "#define GENERATED_CRC21_TABLE_H",
         "",
         "#include <stdint.h>",
         "",
@@ -163,7 +152,8 @@ def crc21_header() -> str:
         for row in range(0, 256, 16):
             lines.append("  " + " ".join(f"0x{entry >> shift & 0xFF:02X}," for entry in entries[row : row + 16]))
         lines += ["};"]
-    return "\n".join([*lines, "", "#endif", ""])
+    doc = "the remainder of each byte in CRC-21, in the top 21 of 24 bits."
+    return schema.c_header("crc21_table.h", doc, lines)
 
 
 def c_comment(text: str) -> str:

@@ -9,16 +9,9 @@ import schema
 def can_module(spec: schema.Schema) -> str:
     """host/boebot/can/layout.py"""
     names = ("ROUND", "SESSION", "SEQUENCE", "TIME_TO_LIVE", "PART")
+    doc = "Which bytes of a message stand in which CAN frame, from protocol/messages.toml by protocol/can_layout.py."
     lines = [
-        '"""Which bytes of a message stand in which CAN frame, from protocol/messages.toml by protocol/can_layout.py.',
-        "",
-        schema.MADE_NOTE,
-        '"""',
-        "",
-        "# fmt: off",
-        "# ruff: noqa: E501",
-        "",
-        "from __future__ import annotations",
+        *schema.python_head(doc),
         "",
         "from typing import NamedTuple",
         "",

@@ -8,12 +8,6 @@ from __future__ import annotations
 
 import schema
 
-HEAD = """/* devices.h: the devices of this image, from protocol/messages.toml and the pin map.
- * {note} */
-#ifndef GENERATED_DEVICES_H
-#define GENERATED_DEVICES_H
-"""
-
 
 def devices_header(spec: schema.Schema) -> str:
     """The header's text."""
@@ -21,8 +15,7 @@ def devices_header(spec: schema.Schema) -> str:
     spoken = [message for message in spec.message if message.devices]
     others = [message for message in spoken if message.name != "telemetry"]
     names = sorted({name for message in spoken for name in message.devices} | set(bits))
-    lines = [HEAD.format(note=schema.MADE_NOTE)]
-    lines += [f'#include "{name}.h"' for name in names]
+    lines = ["", *(f'#include "{name}.h"' for name in names)]
     lines += [
         '#include "clock.h"',
         '#include "generated/messages.h"',
@@ -59,7 +52,8 @@ def devices_header(spec: schema.Schema) -> str:
     lines += ["", "/* and sends it, if one of its devices has something to say. */"]
     lines += ["static inline bool device_message_send(uint8_t number) {"]
     lines += _switch(others, lambda m: [f"return send_{m.name}();"], "return false;")
-    return "\n".join([*lines, "", "#endif", ""])
+    doc = "the devices of this image, from protocol/messages.toml and the pin map."
+    return schema.c_header("devices.h", doc, lines)
 
 
 def _built(message: schema.Message, bits: list[str]) -> str:

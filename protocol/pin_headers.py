@@ -31,12 +31,7 @@ def pins_file(robot: robot_files.Robot) -> str:
 
 def pins_header(spec: schema.Schema, robot: robot_files.Robot) -> str:
     """firmware/src/generated/pins_<map>.h"""
-    guard = f"GENERATED_PINS_{robot.pin_map.upper().replace('-', '_')}_H"
     lines = [
-        f"/* {pins_file(robot)}: pin map and defaults of the {robot.table['title']}, from protocol/robots.",
-        f" * {schema.MADE_NOTE} */",
-        f"#ifndef {guard}",
-        f"#define {guard}",
         "",
         f'#define ROBOT_NAME "{robot.table["name"]}"',
         f'#define PIN_MAP_NAME "{robot.pin_map}"',
@@ -61,8 +56,8 @@ def pins_header(spec: schema.Schema, robot: robot_files.Robot) -> str:
     for p in spec.parameter:
         if p.default_from:
             lines.append(f"#define DEFAULT_{p.name.upper()} {default_counts(p, robot)}")
-    lines += ["", "#endif", ""]
-    return "\n".join(lines)
+    doc = f"pin map and defaults of the {robot.table['title']}, from protocol/robots."
+    return schema.c_header(pins_file(robot), doc, lines)
 
 
 def devices_default(spec: schema.Schema, robot: robot_files.Robot) -> int:

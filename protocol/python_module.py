@@ -7,16 +7,9 @@ import schema
 
 def python_module(spec: schema.Schema) -> str:
     """host/boebot/link/messages.py"""
+    doc = "Every message of the protocol, from protocol/messages.toml: wire integers in, wire integers out."
     lines = [
-        '"""Every message of the protocol, from protocol/messages.toml: wire integers in, wire integers out.',
-        "",
-        schema.MADE_NOTE,
-        '"""',
-        "",
-        "# fmt: off",
-        "# ruff: noqa: E501",
-        "",
-        "from __future__ import annotations",
+        *schema.python_head(doc),
         "",
         "import struct",
         "from enum import IntEnum, IntFlag",

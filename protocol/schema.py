@@ -33,11 +33,7 @@ NOT_ON_THE_WIRE = (
 )
 MINORS = 16
 PARAMETER_TYPES = ("u16", "i16")  # what the board keeps of each
-DEVICES = {
-    "devices": 0,
-    "more_devices": 16,
-}  # parameters that hold 16 of the devices flags each, and the first of these
-PADDING = "so that this message is not as long as one of the handshake"
+DEVICES = {"devices": 0, "more_devices": 16}  # parameters of 16 devices flags each, and the first of these
 
 # wire type -> (size in bytes, C type, struct letter, least, greatest)
 INTEGERS: dict[str, tuple[int, str, str, int, int]] = {
@@ -51,6 +47,28 @@ INTEGERS: dict[str, tuple[int, str, str, int, int]] = {
 
 
 MADE_NOTE = "Made by protocol/generate.py; do not edit."
+
+
+def c_header(name: str, doc: str, lines: list[str]) -> str:
+    """The text of firmware/src/generated/<name>."""
+    guard = "GENERATED_" + re.sub(r"\W", "_", name).upper()
+    head = [f"/* {name}: {doc}", f" * {MADE_NOTE} */", f"#ifndef {guard}", f"#define {guard}"]
+    return "\n".join([*head, *lines, "", "#endif", ""])
+
+
+def python_head(doc: str) -> list[str]:
+    """The first lines of a Python module."""
+    return [
+        f'"""{doc}',
+        "",
+        MADE_NOTE,
+        '"""',
+        "",
+        "# fmt: off",
+        "# ruff: noqa: E501",
+        "",
+        "from __future__ import annotations",
+    ]
 
 
 def number(value: float) -> str:
@@ -369,7 +387,7 @@ def _pad(schema: Schema) -> None:
             taken.add((message.direction, message.length))
         elif (message.direction, message.length) in taken:
             end = len(message.fields) - (2 if message.delivery == "set_point" else 0)
-            message.fields.insert(end, Field("padding", "u8", max=0, doc=PADDING))
+            message.fields.insert(end, Field("padding", "u8", max=0, doc="for no message of the handshake is as long"))
 
 
 def _with_tasks(schema: Schema) -> Schema:

@@ -54,10 +54,6 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
 def vectors_header(rows: list[dict[str, object]]) -> str:
     """firmware/src/generated/vectors.h"""
     lines = [
-        "/* vectors.h: the golden frames of protocol/vectors/frames.json for the C tests.",
-        f" * {schema.MADE_NOTE} */",
-        "#ifndef GENERATED_VECTORS_H",
-        "#define GENERATED_VECTORS_H",
         "",
         "#include <stdint.h>",
         "",
@@ -76,5 +72,5 @@ def vectors_header(rows: list[dict[str, object]]) -> str:
         head = f"{row['id']}, {row['sequence']}, {row['seed']}"
         lines.append(f'    {{"{row["message"]}", {head}, "{row["payload"]}",')
         lines.append(f'     "{row["frame"]}"}},')
-    lines += ["};", "", "#endif", ""]
-    return "\n".join(lines)
+    doc = "the golden frames of protocol/vectors/frames.json for the C tests."
+    return schema.c_header("vectors.h", doc, [*lines, "};"])

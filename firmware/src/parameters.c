@@ -37,7 +37,10 @@ HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
                  "type of " #name);
 PARAMETER_LIST(WITHIN)
 #undef WITHIN
-_Static_assert((DEFAULT_DEVICES & ~DEVICES_BUILT) == 0, "the robot switches on a device without pins");
+#define HAS_PINS(name, first) \
+  _Static_assert((DEFAULT_##name & ~(DEVICES_BUILT >> (first))) == 0, "the robot switches on a device without pins");
+DEVICES_LIST(HAS_PINS)
+#undef HAS_PINS
 
 static uint16_t values[PARAMETER_COUNT];
 static bool has_host_come; /* since the start */
@@ -66,12 +69,10 @@ static bool is_allowed(uint8_t parameter, uint16_t kept, parameter_range range) 
     return false;
   }
   switch (parameter) {
-    case PARAMETER_DEVICES: /* only those that the pin map has can be switched on */
-      return (kept & (uint16_t)~DEVICES_BUILT) == 0;
-#ifdef PARAMETER_MORE_DEVICES
-    case PARAMETER_MORE_DEVICES:
-      return (kept & (uint16_t) ~(DEVICES_BUILT >> 16)) == 0;
-#endif
+#define ARE_BUILT(name, first) \
+  case PARAMETER_##name:       \
+    return (kept & (uint16_t) ~(DEVICES_BUILT >> (first))) == 0;
+    DEVICES_LIST(ARE_BUILT) /* only devices that the pin map has can be switched on */
     case PARAMETER_BAUD_RATE:
       return is_baud_rate(kept);
     default:
@@ -107,13 +108,9 @@ uint8_t parameters_set(uint8_t parameter, int32_t value) {
   return ANSWER_STATUS_OK;
 }
 
-device_set parameters_devices(void) {
-#ifdef PARAMETER_MORE_DEVICES
-  return (device_set)values[PARAMETER_MORE_DEVICES] << 16 | values[PARAMETER_DEVICES];
-#else
-  return values[PARAMETER_DEVICES];
-#endif
-}
+#define SHIFTED(name, first) | (device_set)((device_set)values[PARAMETER_##name] << (first))
+device_set parameters_devices(void) { return 0 DEVICES_LIST(SHIFTED); }
+#undef SHIFTED
 
 bool parameters_device_on(device_set device) { return (parameters_devices() & device) != 0; }
 

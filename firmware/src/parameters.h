@@ -29,14 +29,7 @@ int32_t parameters_get(uint8_t parameter);
 /* Returns an ANSWER_STATUS_...; the value changes only on ANSWER_STATUS_OK. */
 uint8_t parameters_set(uint8_t parameter, int32_t value);
 
-/* DEVICES_... bits: one parameter has 16 of them, and where there are more, a second one has the others. */
-#ifdef PARAMETER_MORE_DEVICES
-typedef uint32_t device_set;
-#else
-typedef uint16_t device_set;
-#endif
-
-/* The devices that are switched on, and whether one is. */
+/* The devices (DEVICES_... bits) that are switched on, and whether one is. */
 device_set parameters_devices(void);
 bool parameters_device_on(device_set device);
 

@@ -287,6 +287,8 @@ class _Explorer:
         flow = draft.flows[address]
         try:
             targets = targets_of(self.image.code, self._way_to(draft, address))
+            if wild := [target for target in targets if not self._is_code(target)]:
+                raise NotProvenError(f"one way leads out of the code, to 0x{wild[0]:04X}")
         except NotProvenError as error:
             self._leads_anywhere(draft, flow, str(error))
             return
@@ -297,16 +299,12 @@ class _Explorer:
         if flow.instruction.mnemonic == "ijmp":
             known = self._jump(draft, flow.instruction, sorted(targets))
         draft.flows[address] = known
-        try:
-            self._leave(draft, known)
-        except AnalysisError as error:
-            self._give_up(draft, address, error)
+        self._leave(draft, known)
 
     def _give_up(self, draft: _Draft, address: int, why: AnalysisError) -> None:
         """Ends a function in front of an instruction that is refused, and notes it."""
         self.unproven.setdefault(draft.entry, str(why))
         draft.flows[address] = _Flow(_refused(address), [])
-        draft.computed.pop(address, None)
         self._returns(draft.entry)
 
     def _leads_anywhere(self, draft: _Draft, flow: _Flow, why: str) -> None:
