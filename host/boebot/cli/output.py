@@ -197,18 +197,21 @@ def share_bars(names: Sequence[str]) -> Iterator[Callable[[Mapping[str, float]],
 
 @contextlib.contextmanager
 def step_watch(progress: Progress) -> Iterator[Progress]:
-    """Gives a function to call in place of `progress`; says so once if it is not called again for 5 s."""
-    called_at = math.inf  # the run has not begun
+    """Gives a function to call in place of `progress`; says so once if it is not called again for 5 s,
+    counted in looks: a computer that slept is not a brain that does not end its step."""
+    waited_s = -math.inf  # since the last call; the run has not begun
     ended = threading.Event()
 
     def report(passed: float) -> None:
-        nonlocal called_at
-        called_at = time.monotonic()
+        nonlocal waited_s
+        waited_s = 0.0
         progress(passed)
 
     def watch() -> None:
+        nonlocal waited_s
         while not ended.wait(0.1):
-            if time.monotonic() - called_at > STEP_S:
+            waited_s += 0.1
+            if waited_s > STEP_S:
                 sentence = f"the brain has been in its step for {STEP_S:g} s; Ctrl-C ends it"
                 say(sentence)
                 return
