@@ -195,7 +195,8 @@ def _composed(result: RunResult) -> Brain:
     Raises:
         BoebotError: that does not say all of it.
     """
-    made_of: dict[str, Any] = {"undescribed": ["it is no Brain of processes"], **(result.made_of or {})}
+    none: dict[str, Any] = {"undescribed": ["it is no Brain of processes"]}
+    made_of = none | cast(dict[str, Any], result.made_of or {})
     if odd := made_of.pop("undescribed"):
         raise BoebotError(
             f"brain {result.brain!r} came from no file, and its record does not hold all of it: {'; '.join(odd)}; "
