@@ -97,9 +97,9 @@ pictures:
 	@mkdir -p build/pictures
 	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures/demo
 	@cp build/pictures/demo/run.png docs/images/demo.png
-	@sed -n '/^# first.py/,/^```$$/{/^```$$/!p}' README.md >build/pictures/first.py
-	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot run first.py --seconds 120 --out first
-	@cp build/pictures/first/run.png docs/images/first.png
+	@sed -n '/^# echoes.py/,/^```$$/{/^```$$/!p}' README.md >build/pictures/echoes.py
+	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot run echoes.py --seconds 120 --out echoes
+	@cp build/pictures/echoes/run.png docs/images/echoes.png
 	@$(VENV)/bin/boebot run explore --robot roller --arena office --seconds 1000 --out build/pictures/explored
 	@cp build/pictures/explored/run.png docs/images/explored.png
 	@$(PYTHON_VENV) -m boebot.arenas.reference --pictures

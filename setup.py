@@ -192,6 +192,7 @@ setup(
     ],
     package_data={
         "": ["py.typed", "*.pyi", "*.html", "*.css", "*.js"],
+        "boebot": ["slips.toml"],
         "boebot.brains": ["*.toml"],
         "boebot.imperfections": ["*.toml"],
         "boebot.arenas.bundled": ["*.toml", "*.json"],

@@ -95,7 +95,7 @@ def test_make_target_exists(page: Path, target: str) -> None:
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE), f"{page.name}: make {target}"
 
 
-@pytest.mark.parametrize("name", ["demo", "first"])
+@pytest.mark.parametrize("name", ["demo", "echoes"])
 def test_picture_is_of_this_kit(name: str, workspace: Path, tmp_path: Path) -> None:
     """A picture of the README says what the same run gives now; `make pictures` renews it."""
     recipe = next(

@@ -27,8 +27,11 @@ What to call for what:
 Units are SI: m, s, rad, V; motor signals go from -1 (full backward) to 1 (full forward).
 """
 
+import atexit
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from boebot import slips
 
 if TYPE_CHECKING:
     from boebot import boards
@@ -75,6 +78,9 @@ _HOMES = {
     "run": "running.runner",
     "run_together": "running.together",
 }
+
+
+atexit.register(slips.say_unrun)
 
 
 def __getattr__(name: str) -> Any:

@@ -73,11 +73,11 @@ def test_name_that_is_no_utf_8_is_escaped_and_the_run_is_repeated_by_it(tmp_path
     assert (done.returncode, done.stderr) == (0, "") and r"a\xff on shieldbot" in done.stdout
     assert_whole(tmp_path / "out", 4)
     (tmp_path / brain).unlink()  # its source is in the record
-    done = copied_process.command(["run", "--again", "out"], tmp_path)
+    done = copied_process.command(["run", "--again", "out", "--trust"], tmp_path)
     assert (done.returncode, done.stdout) == (0, "bit-equal to out: 4 steps\n")
 
 
-FORKS = """import multiprocessing, os, time
+FORKS = """import multiprocessing, os, signal
 os.fork()
 def step(robot):
     if robot.time == 0:
@@ -86,8 +86,8 @@ def step(robot):
             1 / 0
         if os.fork() == 0:
             os.fork()
-            time.sleep(60)
-        multiprocessing.get_context("fork").Process(target=time.sleep, args=(60,)).start()
+            signal.pause()
+        multiprocessing.get_context("fork").Process(target=signal.pause).start()
 """
 FORKS_BETWEEN_WAITS = """import os
 def main(robot):

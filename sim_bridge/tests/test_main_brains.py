@@ -137,8 +137,11 @@ def test_waits() -> None:
     [
         ("robot.drive(1.5, 0)", "mine.py, line 4: drive(1.5, 0): motor signals go from -1 to 1"),
         ("1 / 0", "mine.py, line 4: ZeroDivisionError: division by zero"),
-        ("while True: pass", "mine.py, line 4: a step of the brain has not ended after 0.3 s; expected it to return"),
-        ("time.sleep(1e6)", "mine.py, line 4: a step of the brain has not ended after 0.3 s"),
+        (
+            "while True: pass",
+            "mine.py, line 4: main has come to no wait for 0.3 s; expected robot.wait(...) in each of its loops",
+        ),
+        ("time.sleep(1e6)", "mine.py, line 4: main has come to no wait for 0.3 s"),
         (
             "robot.wait_until(robot.whisker_left.pressed)",
             "mine.py, line 4: wait_until(False) expects a function, as in",

@@ -18,7 +18,7 @@ from functools import partial
 from types import FrameType, TracebackType
 from typing import ClassVar
 
-from boebot import arguments
+from boebot import arguments, slips
 from boebot.brain.pausable_thread import PausableThread
 from boebot.cognition import Odometry
 from boebot.cognition.odometry import LAG_S, wrapped
@@ -29,6 +29,7 @@ END_S = 0.5  # that a main which is ended has to clear up
 _ON_TIME = 1e-9  # s; times are sums of ticks
 _SPEED = 0.5  # of `forward`, as share of the wheels' greatest speed
 _TURNING = 0.35  # of `turn`
+_NEAR_RAD = 0.005  # to a multiple of π/12: an angle of a few degrees may be meant in radians
 _SLOWEST = 0.1  # of both near their end
 _SMOOTHING = 0.4  # of the speed, from step to step: an encoder has few edges
 _SLOWING_S = 0.5  # the way that is left, divided by this, is the speed
@@ -43,7 +44,7 @@ class MainRobot(Robot):
     A wait ends at a step of the brain, PERIOD seconds apart; sensors show what they said at that step.
     """
 
-    __slots__ = ("_moved", "_odometry", "_pause")
+    __slots__ = ("_moved", "_odometry", "_pause", "notes")
 
     def __init__(self, robot: Robot, pause: Callable[[], object]) -> None:
         """`robot`: what the brain steps with; `pause`: returns at the next step."""
@@ -52,6 +53,8 @@ class MainRobot(Robot):
         self._pause = pause
         self._odometry = Odometry()
         self._moved = False
+        self.notes: dict[str, str] = {}
+        """What a user should know of the run, by the signs in slips.toml."""
 
     # ---- waits -------------------------------------------------------------------------------------------------------
 
@@ -82,10 +85,7 @@ class MainRobot(Robot):
             BrainError: the condition is no function, or the time-out no time.
         """
         if not callable(condition):
-            raise BrainError(
-                f"wait_until({arguments.shown(condition)}) expects a function, as in "
-                "wait_until(lambda: robot.whisker_left.pressed)"
-            )
+            raise BrainError(slips.of_sign("condition", condition=arguments.shown(condition)))
         limit = math.inf if timeout is None else _seconds("wait_until: timeout", timeout)
         until = self.time + limit - _ON_TIME
         while not condition():
@@ -136,6 +136,8 @@ class MainRobot(Robot):
             BrainError: it is no angle.
         """
         angle = math.radians(arguments.number("turn: degrees", degrees, BrainError))
+        if _NEAR_RAD < abs(degrees) < 7.0 and abs(math.remainder(degrees, math.pi / 12)) < _NEAR_RAD:
+            self.notes["radians"] = slips.of_sign("radians", angle=degrees, degrees=math.degrees(degrees))
         sign, radius = math.copysign(1.0, angle), self.dimensions.track_width / 2
         turned, last = 0.0, self._odometry.heading
 
@@ -157,7 +159,8 @@ class MainRobot(Robot):
         its signal.
         """
         self._moved = True
-        by_time = self._odometry.source == "commands"
+        if by_time := self._odometry.source == "commands":
+            self.notes["commands"] = slips.of_sign("commands", robot=self.name)
         top = min(self.dimensions.speed, self.speed_limit)
         fastest, slowest = (top, top) if by_time else (share * top, _SLOWEST * top)
         given_up = self.time + _PATIENCE_S + _PATIENCE * way / fastest
@@ -198,11 +201,15 @@ class MainRobot(Robot):
 
 
 class MainBrain:
-    """What steps a `main`. Each run, with a robot not seen before, begins it anew."""
+    """What steps a `main`. Each run, with a robot not seen before, begins it anew.
+
+    Attributes:
+        function: the `main`.
+    """
 
     def __init__(self, main: Callable[[MainRobot], object]) -> None:
         """`main`: of one argument."""
-        self._main = main
+        self.function = main
         self._of: Robot | None = None  # whose run it is
         self._robot: MainRobot | None = None
         self._thread: PausableThread | None = None
@@ -213,7 +220,7 @@ class MainBrain:
         Raises:
             BaseException: what `main` raises, or what is raised here while it runs: it is ended then.
         """
-        if robot is not self._of:
+        if is_first := robot is not self._of:
             self._begin(robot)
         assert self._thread is not None and self._robot is not None
         if self._thread.is_done:
@@ -231,6 +238,8 @@ class MainBrain:
             if self._thread.error is not None:
                 raise self._thread.error
             self._robot.stop()
+            if is_first:
+                self._robot.notes["no time"] = slips.of_sign("no time")
         self._robot.give(robot)
 
     def _begin(self, robot: Robot) -> None:
@@ -239,7 +248,7 @@ class MainBrain:
         mine = MainRobot(robot, lambda: thread.pause())
         mine.take(robot)
         mine.begin()
-        thread = PausableThread(partial(self._main, mine), "main of a brain")
+        thread = PausableThread(partial(self.function, mine), "main of a brain")
         self._robot, self._thread = mine, thread
         weakref.finalize(self, thread.end, 0.0).atexit = False  # where nothing else ends it
 
@@ -262,12 +271,7 @@ class MainBrain:
     @property
     def notices(self) -> Sequence[str]:
         """What a user should know of the run, in sentences."""
-        if self._robot is None or self.odometry_source != "commands":
-            return []
-        return [
-            f"robot {self._robot.name!r} has neither wheel encoders nor an odometer: forward and turn went by time, "
-            "as far as it should come by its commands"
-        ]
+        return [] if self._robot is None else list(self._robot.notes.values())
 
 
 def _trace(frame: FrameType | None) -> TracebackType | None:

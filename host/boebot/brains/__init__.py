@@ -31,7 +31,7 @@ from sysconfig import get_path
 from types import ModuleType
 from typing import Any
 
-from boebot import arguments
+from boebot import arguments, slips
 from boebot.brain import Brain, Process, StateVariable, composition
 from boebot.brain.main_brain import MainBrain
 from boebot.brain.pausable_thread import leave_copy
@@ -169,7 +169,8 @@ def explain(error: BaseException, path: Path | None) -> str:
     what = _first_line(error)
     if not isinstance(error, SyntaxError | BrainError):
         what = type(error).__name__ + (f": {what}" if what else "")
-    return locate(error, path, what)
+    slip = slips.of_error(error, _first_line(error))
+    return locate(error, path, what.partition("; its devices")[0] + slip if slip else what)
 
 
 def locate(error: BaseException, path: Path | None, sentence: str) -> str:
@@ -260,10 +261,7 @@ def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
         raise BrainError(f"{where}: main takes no robot; expected def main(robot)")
     other = next((key for key, value in vars(module).items() if isinstance(value, Brain)), None)
     hint = f"; it has a Brain called {other}, expected the name brain" if other else ""
-    raise BrainError(
-        f"{where} has neither a function step(robot) nor main(robot) nor a class Brain with step(self, robot) nor a "
-        f"brain = Brain([...]){hint}"
-    )
+    raise BrainError(f"{where} {slips.of_sign('no step')}{hint}")
 
 
 def _made(module: ModuleType, where: str, path: Path | None) -> LoadedBrain | None:
@@ -310,15 +308,13 @@ def _check_function(function: Callable[..., object], where: str, name: str) -> N
     only makes a coroutine or a generator."""
     whole = (function, getattr(function, "__call__", function))  # noqa: B004
     if any(inspect.iscoroutinefunction(part) for part in whole):
-        raise BrainError(f"{where}: {name} is an async function; expected a plain one, def {name}(robot)")
+        raise BrainError(f"{where}: {slips.of_sign('async', name=name)}")
     if any(inspect.isgeneratorfunction(part) or inspect.isasyncgenfunction(part) for part in whole):
-        raise BrainError(f"{where}: {name} contains yield; expected a function that returns, def {name}(robot)")
+        raise BrainError(f"{where}: {slips.of_sign('yield', name=name)}")
     try:
         inspect.signature(function).bind("the robot")
     except TypeError as error:
-        raise BrainError(
-            f"{where}: {name} cannot be called with the robot alone ({error}); expected {name}(robot)"
-        ) from None
+        raise BrainError(f"{where}: {slips.of_sign('no robot', name=name, why=error)}") from None
     except ValueError:  # a function in C that does not say its arguments
         pass
 

@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot import slips
 from boebot.devices.latest import Latest
 from boebot.devices.wiring import BREADBOARD, Wire
 from boebot.link.messages import DevicesTelemetry
@@ -163,6 +164,11 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     """Field of the reading, unit and digits of its column in run.csv."""
     SHOWN: ClassVar[tuple[str, str, float, int] | None] = None
     """What pages show of it as a number: name of the column, unit, factor, digits."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if cls.READING is not None:
+            slips.has_no_truth(cls.READING)
 
     def fault(self) -> tuple[str, str] | None:
         """A key that does not fit the others, and the rest of the sentence about it; None: all fit."""

@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from boebot import slips
 from boebot.boards import BoardSession, VehicleSession, is_live, open_board, open_vehicle
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
@@ -288,6 +289,9 @@ def result_of(driver: Driver, task: Task, times: StepTimes, error: BaseException
     know of the brain."""
     result = driver.result(error, elapsed_s)
     result.notices += [*task.brain.notices, *driver.robot.showing.notices]
+    main = task.brain.main
+    if times.long and slips.sleeps(task.brain.step if main is None else main.function):
+        result.notices.append(slips.of_sign("sleep"))
     result.longest_step, result.long_steps = times.longest, times.long
     result.unrealisable = task.unrealisable
     request = task.request

@@ -24,7 +24,7 @@ from numbers import Real
 from types import FrameType, TracebackType
 from typing import Any, NamedTuple
 
-from boebot import brains
+from boebot import brains, slips
 from boebot.brain.pausable_thread import leave_copy, throw
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
@@ -86,13 +86,14 @@ def step_once(robot: Robot, brain: LoadedBrain, watch: StepWatch, times: StepTim
     except KeyboardInterrupt:
         raise
     except _OverdueError as error:
-        raise BrainError(brains.locate(error, brain.path, watch.sentence)) from None
+        sentence = watch.sentence if brain.main is None else slips.of_sign("no wait", seconds=watch.limit.seconds)
+        raise BrainError(brains.locate(error, brain.path, sentence)) from None
     except BaseException as error:  # also what asyncio, test tools or the brain itself derive from it
         raise BrainError(brains.explain(error, brain.path)) from error
     finally:
         times.add(wall.perf_counter() - begun, robot.period)
     if answer is not None and _is_pair(answer):
-        raise BrainError(f"{_where(brain)}: step returned {answer!r}; motors are driven by robot.drive(left, right)")
+        raise BrainError(f"{_where(brain)}: {slips.of_sign('pair', answer=repr(answer))}")
     command = robot.command
     if not _is_possible(command, robot.speed_limit):
         raise BrainError(

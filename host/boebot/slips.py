@@ -1,0 +1,64 @@
+"""Beginners' slips, of which Python says nothing, or nothing clear: slips.toml lists what shows each, and what is said
+of it."""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+
+@cache
+def _table() -> list[dict[str, str]]:
+    slips: list[dict[str, str]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["slip"]
+    return slips
+
+
+def of_sign(sign: str, **values: object) -> str:
+    """The sentence of what the kit has noticed itself."""
+    return next(slip["sentence"] for slip in _table() if slip.get("sign") == sign).format(**values)
+
+
+def of_error(error: BaseException, text: str) -> str:
+    """What is said after an error's text; "": nothing."""
+    kinds = {kind.__name__ for kind in type(error).__mro__}
+    for slip in _table():
+        if slip.get("error") in kinds and (found := re.search(slip["text"], text)):
+            return "; " + found.expand(slip["sentence"])
+    return ""
+
+
+def has_no_truth(reading: type) -> None:
+    """Readings of that class are neither true nor a number: as tuples they would be true, and equal to none."""
+
+    def refuse(self: Any) -> bool:
+        values = ", ".join(f".{name}" for name in self._fields if name not in ("age", "valid"))
+        raise TypeError(of_sign("truth", reading=type(self).__name__, values=values))
+
+    def guarded(compare: Callable[[Any, object], bool]) -> Callable[[Any, object], bool]:
+        return lambda self, other: refuse(self) if isinstance(other, int | float) else compare(self, other)
+
+    for name, method in (("__bool__", refuse), ("__eq__", guarded(tuple.__eq__)), ("__ne__", guarded(tuple.__ne__))):
+        setattr(reading, name, method)
+
+
+def sleeps(function: object) -> bool:
+    """That function, or one that it names, calls something named sleep."""
+    named = getattr(getattr(function, "__code__", None), "co_names", ())
+    helpers = [getattr(function, "__globals__", {}).get(name) for name in named]
+    return any("sleep" in getattr(getattr(one, "__code__", None), "co_names", ()) for one in (function, *helpers))
+
+
+def say_unrun() -> None:
+    """Says so at the end of a script that defines a brain and runs no robot."""
+    main, script = vars(sys.modules["__main__"]), Path(*sys.argv[:1])
+    if main.get("__spec__") or hasattr(sys, "ps1") or hasattr(sys, "last_type") or "boebot.boards" in sys.modules:
+        return  # it is no script, somebody types there, it has failed, or it runs robots
+    for name in ("step", "main"):
+        code = getattr(main.get(name), "__code__", None)
+        if code and code.co_varnames[: code.co_argcount] == ("robot",) and Path(code.co_filename).name == script.name:
+            print(f"boebot: {of_sign('unrun', file=script, name=f'{name}(robot)')}", file=sys.stderr)
