@@ -90,6 +90,7 @@ FUZZ_SECONDS ?= 60
 fuzz:
 	@$(SIDE_BY_SIDE) ready-test
 	@$(PYTHON_VENV) -m tools.fuzz --seconds $(FUZZ_SECONDS)
+	@$(PYTHON_VENV) host/fuzz/damaged_records.py
 	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis -o faulthandler_timeout=1800
 
 pictures:
