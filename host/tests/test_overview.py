@@ -12,8 +12,9 @@ import pytest
 
 import boebot
 from boebot.record import windows
+from boebot.record.overview import _Walk
 from boebot.record.result import RunResult
-from boebot.record.series import touch_indices, truth_at
+from boebot.record.series import Pose, touch_indices, truth_at
 from boebot.view import tables
 
 RUNS = ("shieldbot-basic", "shieldbot", "shieldbot-charging", "arsim")
@@ -97,3 +98,11 @@ def test_few_ticks_stand_for_many(robot: str, monkeypatch: pytest.MonkeyPatch) -
     for mine, theirs in zip(thin.readouts(), every.readouts(), strict=True):
         assert np.array_equal(mine.values, theirs.values[kept], equal_nan=True), mine.device
         assert np.allclose(mine.ages, theirs.ages[kept], equal_nan=True, atol=1e-9), mine.device
+
+
+def test_long_time_between_two_ticks_takes_no_memory() -> None:
+    """As a record claims it that no run has left; a place for each 0.1 s would be 72 TB."""
+    walk = _Walk(0.1)
+    time, x = np.array([0.0, 0.1, 0.2, 1e12]), np.array([0.0, 1.0, 2.0, 5.0])
+    walk.add(time, Pose(x, np.zeros(4), np.zeros(4)), is_last=True)
+    assert walk.length == 5.0

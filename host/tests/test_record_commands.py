@@ -13,6 +13,7 @@ from PIL import Image
 
 import boebot as library
 from boebot import resources
+from boebot.record.blocks import Block, Group
 from boebot.record.reading import attachments_of, read_run
 from boebot.record.record_file import RecordReader, RecordWriter
 from boebot.record.result import RunResult
@@ -391,8 +392,10 @@ def test_nothing_is_not_the_same_as_nothing(
         assert (code, out) == (2, "") and "there is nothing to compare" in err
 
 
-def strangers(many: Path, to: Path, name: str, asked: dict[str, object], source: bytes = b"") -> Path:
-    """A record with a brain's file of that name, whose request is changed."""
+def strangers(
+    many: Path, to: Path, name: str, asked: dict[str, object], source: bytes = b"", rows: Group | None = None
+) -> Path:
+    """A record with a brain's file of that name, whose request is changed. `rows`: in place of those of its groups."""
     attached = attachments_of(many)
     begin = json.loads(attached["begin.json"])
     begin["request"] |= asked
@@ -403,7 +406,7 @@ def strangers(many: Path, to: Path, name: str, asked: dict[str, object], source:
         writer.attach(f"brain/{name}", source)
         writer.attach("begin.json", json.dumps(begin).encode())
         for kept in RecordReader(old, "it").groups():
-            writer.write(kept.group, kept.end_s)
+            writer.write({**kept.group, **(rows or {})}, kept.end_s)
         writer.attach("end.json", attached["end.json"])
         writer.finish()
     return to
@@ -449,3 +452,14 @@ def test_link_in_the_folder_of_a_stranger_is_not_followed(
         (run / name).symlink_to(mine)
     assert boebot(capsys, "report", str(run), "--mend")[0] == 0
     assert mine.read_text() == "mine" and not (run / "summary.json").is_symlink()
+
+
+@pytest.mark.parametrize("data", [b"\x09" + bytes(16), b"short"])
+def test_rows_that_no_run_writes_are_one_sentence(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path, data: bytes
+) -> None:
+    """Though their checksums are right: a command of kind 9, and one without signals."""
+    run = strangers(many, tmp_path / "run", "x.py", {}, rows={"command": Block.of([(0.0, data)])})
+    for asked in (("report", str(run)), ("replay", str(run), "--brain", "wander"), ("plot", str(run), "tick")):
+        code, out, err = boebot(capsys, *asked)
+        assert (code, out) == (2, "") and "the record makes no sense (" in err and len(err.splitlines()) == 1

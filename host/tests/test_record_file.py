@@ -17,10 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from boebot.record.blocks import Block, Group, packed, schema, unpacked
+from boebot.record.blocks import Block, Group, Kept, packed, schema, unpacked
 from boebot.record.keepers import InMemory, Shared, Temporary
 from boebot.record.record import Record
-from boebot.record.record_file import Kept, RecordError, RecordReader, RecordWriter
+from boebot.record.record_file import RecordError, RecordReader, RecordWriter
 
 ROWS = st.lists(st.tuples(st.floats(allow_nan=False), st.binary(max_size=40)), min_size=1, max_size=40)
 

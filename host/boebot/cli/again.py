@@ -10,7 +10,7 @@ from pathlib import Path
 
 import typer
 
-from boebot.cli import output, streams
+from boebot.cli import ending, output, streams
 from boebot.errors import BoebotError
 from boebot.record.reading import CutError
 from boebot.running.again import Repetition, again, recorded
@@ -18,6 +18,7 @@ from boebot.running.again import Repetition, again, recorded
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
 
 
+@ending.of_sensible_rows()
 def run_again(folder: Path, as_json: bool, trust: bool) -> None:
     """Repeats the run, prints what came of it, and ends the command with its exit code. `trust`: without asking."""
     try:

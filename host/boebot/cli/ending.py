@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -12,10 +13,22 @@ from boebot.cli import output
 from boebot.cli.run_table import Detail, print_run
 from boebot.errors import BoebotError, InterruptedRunError
 from boebot.record.reading import CutError
+from boebot.record.record_file import NoRecordError
 from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RECORD
 from boebot.running import interrupts
 from boebot.view import IncompleteError
+
+
+@contextlib.contextmanager
+def of_sensible_rows() -> Iterator[None]:
+    """A record whose checksums are right can still be none that a run has written, and whatever reads it may meet what
+    cannot be: that is one sentence."""
+    try:
+        yield
+    except (ValueError, LookupError, TypeError, ArithmeticError, struct.error, MemoryError) as error:
+        what = f"{type(error).__name__}: {error}"
+        raise NoRecordError(f"the record makes no sense ({what}); expected one that a run has written") from error
 
 
 @contextlib.contextmanager

@@ -11,6 +11,7 @@ from boebot.cli import ending, options, output
 from boebot.record.reading import read_run, robots_of
 
 
+@ending.of_sensible_rows()
 def plot(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run, with its record.mcap.")],
     columns: Annotated[

@@ -25,6 +25,7 @@ EXIT_DIFFERS, EXIT_USAGE = 1, 2
 _TICK = reader(Telemetry, "tick")
 
 
+@ending.of_sensible_rows()
 def replay(
     run: Annotated[
         Path, typer.Argument(metavar="DIR|LOG", help="Folder of a run, or a log of CAN frames (.blf, .asc, .log).")

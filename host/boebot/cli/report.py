@@ -18,6 +18,7 @@ from boebot.record.run_folder import RECORD, RunFolder
 from boebot.view import IncompleteError
 
 
+@ending.of_sensible_rows()
 def report(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run, with its record.mcap.")],
     csv: Annotated[

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,16 @@ class Block:
 
 Group = Mapping[str, Block]
 """What came in one stretch of a run, at most a second of the wall clock: a block of each stream that had rows."""
+
+
+class Kept(NamedTuple):
+    """A group as a record has it: its number from 0, and the times of the run (s) that it lies between."""
+
+    number: int
+    begin_s: float
+    end_s: float
+    group: Group
+
 
 Rows = Mapping[str, Sequence[Row] | Block]
 """The same, as it comes."""

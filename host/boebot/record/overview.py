@@ -108,11 +108,12 @@ class _Walk:
         at = np.arange(len(time))
         if self._apart_s:
             self._begun_s = float(time[0]) if self._begun_s is None else self._begun_s
-            most = math.ceil((float(time[-1]) - self._begun_s) / self._apart_s + 1)
-            wanted = self._begun_s + np.arange(self._places, most) * self._apart_s
-            wanted = wanted[wanted <= time[-1]]
-            self._places += len(wanted)
-            at = np.searchsorted(time, wanted)
+            near = np.floor((time - self._begun_s) / self._apart_s)
+            numbers = np.unique((near - 1, near, near + 1))  # no more, however long the time between two ticks
+            wanted = self._begun_s + numbers * self._apart_s
+            is_new = (numbers >= self._places) & (wanted <= time[-1])
+            self._places = np.max(numbers[is_new], initial=self._places - 1) + 1
+            at = np.searchsorted(time, wanted[is_new])
             at = np.append(at, len(time) - 1) if is_last else at
         when = np.append(self._time, time[at])
         x, y = np.append(self._x, pose.x[at]), np.append(self._y, pose.y[at])

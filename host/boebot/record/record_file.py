@@ -25,14 +25,14 @@ import threading
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import partial
 from typing import IO, Any, NamedTuple, cast
 
 from boebot.errors import BoebotError
-from boebot.record.blocks import SCHEMA, Group, Rows, group_of, packed, schema, unpacked
+from boebot.record.blocks import SCHEMA, Kept, Rows, group_of, packed, schema
 
 LARGEST_CHUNK = 1 << 28  # B, that is read; a second of a run has a hundredth of it
-PIECE = 1 << 16  # B, that are read or unpacked at a time
+PIECE = 1 << 16  # B, that are read at a time
 TRIES, SPARE = 8, 1 << 26  # times its size, and B more, that a file is looked at for what is sound
 TEXT = "text/plain"
 LONGEST_NAME = 200  # B, of an attachment that is named
@@ -197,15 +197,6 @@ class Damage(NamedTuple):
         return f"bytes {self.begin:,} to {self.end:,}: {what}"
 
 
-class Kept(NamedTuple):
-    """A group as a record has it: its number from 0, and the times of the run (s) that it lies between."""
-
-    number: int
-    begin_s: float
-    end_s: float
-    group: Group
-
-
 @dataclass
 class Found:
     """What one pass over a record has found so far.
@@ -330,12 +321,12 @@ class RecordReader:
         sound."""
         kind, length = _HEAD.unpack(self._at(begin, _HEAD.size).ljust(_HEAD.size, b"\0"))
         end = begin + _HEAD.size + length
-        if end > limit or length > 2 * LARGEST_CHUNK or kind not in _KINDS:
+        if end > limit or length > 2 * LARGEST_CHUNK or kind not in (_CHUNK, _ATTACHMENT):
             return min(end, limit), None
-        try:
-            return end, _KINDS[kind](self._at(begin + _HEAD.size, length))
-        except _damages():
-            return end, None
+        from boebot.record import checked  # here, as MCAP's library takes a while: no other command should wait for it
+
+        body = self._at(begin + _HEAD.size, length)
+        return end, checked.group(body, LARGEST_CHUNK) if kind == _CHUNK else checked.attachment(body)
 
     def _damage(self, begin: int, end: int, after_s: float, before_s: float) -> Damage:
         """What begins there, as far as its bytes can be believed."""
@@ -356,61 +347,7 @@ _LIKELY = re.compile(rb"\x06(?=.{36}\x04\0\0\0zstd)|\x09(?=.{8}\0{16})", re.DOTA
 _LIKELY_SIZE = 44
 
 
-def _group(body: bytes) -> Kept:
-    """The group of a chunk. Raises one of `_damages`."""
-    from mcap.data_stream import ReadDataStream
-    from mcap.records import Chunk, Message
-    from mcap.stream_reader import breakup_chunk
-
-    stream = ReadDataStream(io.BytesIO(body))
-    chunk = Chunk.read(stream)
-    data = _decompressed(chunk)
-    is_whole = (stream.count, len(data), chunk.compression) == (len(body), chunk.uncompressed_size, "zstd")
-    if not is_whole or zlib.crc32(data) != chunk.uncompressed_crc:
-        raise ValueError("wrong CRC")
-    chunk.compression, chunk.data = "", data
-    messages = [record for record in breakup_chunk(chunk) if isinstance(record, Message)]
-    ((number, begin_ns, end_ns),) = {(one.sequence, one.publish_time, one.log_time) for one in messages}
-    return Kept(number, begin_ns / 1e9, end_ns / 1e9, dict(unpacked(one.data) for one in messages))
-
-
-def _attachment(body: bytes) -> dict[str, bytes]:
-    """An attachment by its name. Raises one of `_damages`."""
-    from mcap.data_stream import ReadDataStream
-    from mcap.records import Attachment
-
-    stream = ReadDataStream(io.BytesIO(body))
-    attachment = Attachment.read(stream)
-    if stream.count != len(body) or zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
-        raise ValueError("wrong CRC")
-    return {attachment.name: attachment.data}
-
-
-_KINDS: dict[int, Callable[[bytes], Kept | dict[str, bytes]]] = {_CHUNK: _group, _ATTACHMENT: _attachment}
-
-
-def _decompressed(chunk: Any) -> bytes:
-    """The bytes of a chunk. Only what there really is takes memory, whatever size it claims."""
-    from zstandard import ZstdDecompressor
-
-    data = bytearray()
-    with ZstdDecompressor().stream_reader(chunk.data) as stream:
-        while part := stream.read(PIECE):
-            data += part
-            if len(data) > LARGEST_CHUNK:
-                raise ValueError(f"a chunk of more than {LARGEST_CHUNK:,} B")
-    return bytes(data)
-
-
 def in_words(damages: Sequence[str]) -> str:
     """The first of them by themselves."""
     more = len(damages) - NAMED
     return "; ".join(damages[:NAMED]) + (f"; and {more} more places" if more > 0 else "")
-
-
-@cache
-def _damages() -> tuple[type[Exception], ...]:
-    from mcap.exceptions import McapError
-    from zstandard import ZstdError
-
-    return (McapError, ZstdError, struct.error, ValueError, KeyError, IndexError, OverflowError, EOFError)
