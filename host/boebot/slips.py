@@ -56,8 +56,9 @@ def sleeps(function: object) -> bool:
 def say_unrun() -> None:
     """Says so at the end of a script that defines a brain and runs no robot."""
     main, script = vars(sys.modules["__main__"]), Path(*sys.argv[:1])
-    if main.get("__spec__") or hasattr(sys, "ps1") or hasattr(sys, "last_type") or "boebot.boards" in sys.modules:
-        return  # it is no script, somebody types there, it has failed, or it runs robots
+    is_script = (main.get("__name__"), main.get("__spec__")) == ("__main__", None)
+    if not is_script or hasattr(sys, "ps1") or hasattr(sys, "last_type") or "boebot.boards" in sys.modules:
+        return  # somebody types there, it has failed, or it runs robots
     for name in ("step", "main"):
         code = getattr(main.get(name), "__code__", None)
         if code and code.co_varnames[: code.co_argcount] == ("robot",) and Path(code.co_filename).name == script.name:

@@ -65,7 +65,7 @@ def kept(*, for_the_answer: bool = False) -> Iterator[None]:
     """
     depth, rights = sys.getrecursionlimit(), os.umask(0)
     os.umask(rights)
-    streams, folder = {"stdout": sys.stdout, "stderr": sys.stderr}, os.open(".", os.O_RDONLY)
+    streams, folder = {"stdout": sys.stdout, "stderr": sys.stderr}, os.open(".", getattr(os, "O_PATH", os.O_RDONLY))
     own = [os.dup(number) for number in range(_STDERR + 1)]
     if for_the_answer:
         sys.stdout = sys.stderr

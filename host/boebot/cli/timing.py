@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import completion, options, output, quantity, timing_board
+from boebot.cli import completion, options, output, quantity, streams, timing_board
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -234,6 +234,7 @@ def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
         return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
 
 
+@streams.kept()
 def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, seed: int) -> tuple[float, float | None]:
     """What a step of the brain takes at most (s; 0: not known), as given or as measured, and the brain's own period."""
     if brain is None:
@@ -242,13 +243,13 @@ def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, see
     from boebot.running.runner import execute
     from boebot.running.tasks import Request
 
-    own_period = load_brain(brain).period
+    loaded = load_brain(brain)
     if step_s is not None:
-        return step_s, own_period
-    result = execute(Request.single(brain, robot=robot, seconds=5.0, seed=seed, force_timing=True))
+        return step_s, loaded.period
+    result = execute(Request.single(loaded, robot=robot, seconds=5.0, seed=seed, force_timing=True))
     if result.error is not None:
         raise result.error
-    return result.longest_step, own_period
+    return result.longest_step, loaded.period
 
 
 def _board_times(report: Report) -> Any:
