@@ -165,7 +165,7 @@ def test_a_fault_ends_the_run_with_its_source_line(
     assert "Traceback" not in error
 
 
-def test_a_null_pointer_that_is_called_is_told_with_its_source_line(
+def test_a_null_pointer_that_is_called_is_noted_with_its_source_line(
     tmp_path: Path, command: Callable[..., tuple[object, str]], variants: Variants
 ) -> None:
     """The program begins anew, as on the robot; the run says where that came from, and so does its record."""

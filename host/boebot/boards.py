@@ -151,7 +151,7 @@ class BoardSession(Protocol):
 
     def notes(self) -> Sequence[str]:
         """Sentences on what the board's program asked for that the board does not do as the chip would, or the chip
-        not as it seems, each with its place, once; empty where nobody sees into the board."""
+        not as it seems, each with its place, once; empty of a board that cannot be seen into."""
 
     def close(self) -> None:
         """Closes the board."""

@@ -160,7 +160,7 @@ class BoardMemory(ABC):
 
     def notes(self, since: int = 0) -> list[tuple[int, int, str, str]]:
         """Cycle, address (bytes), what the program did there and why that is not what it seems (board.h): each once,
-        oldest first, without the first `since`; empty where nobody sees into the board."""
+        oldest first, without the first `since`; empty of a board that cannot be seen into."""
         log, text = self._memory_lib.board_notes_of(self._board), self._memory_ffi.string
         if log == self._memory_ffi.NULL:
             return []

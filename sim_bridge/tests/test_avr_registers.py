@@ -63,7 +63,7 @@ def stored(*writes: tuple[str, int]) -> list[str]:
     return notes(written([(registers()[name], value) for name, value in writes], reads=False))
 
 
-def test_a_started_spi_transfer_is_told_and_where_it_is_waited_for() -> None:
+def test_a_started_spi_transfer_is_noted_and_where_it_is_waited_for() -> None:
     source = """
       main:
         ldi r24, 0x50         ; SPE, MSTR
@@ -137,7 +137,7 @@ def test_any_writes_at_all_end_in_a_run_or_a_fault(writes: list[tuple[int, int]]
         assert re.match(r"The board stopped: the (program|stack)", str(error))  # noqa: PT017
 
 
-def test_each_register_that_is_not_built_is_told_at_its_place() -> None:
+def test_each_register_that_is_not_built_is_noted_at_its_place() -> None:
     writes = [(registers()[name], bits ^ AFTER_RESET.get(name, 0)) for name, bits in NOT_BUILT.items()]
     told = written([*writes, (0xFF, 1)]).notes()
     assert [does for _, _, does, _ in told if "reads" in does] == ["reads SPSR", "reads SPDR", "reads ACSR"]
@@ -180,7 +180,7 @@ DROPPED = {
 
 
 @pytest.mark.parametrize("what", DROPPED)
-def test_what_the_chip_drops_is_told(what: str) -> None:
+def test_what_the_chip_drops_is_noted(what: str) -> None:
     writes, told = DROPPED[what]
     assert stored(*writes) == told
 

@@ -148,7 +148,7 @@ def test_what_cannot_be_served_is_told() -> None:
         serve("toaster", request(), tcp=0, announce=print, visit=print, running=lambda: False)
 
 
-def test_what_the_board_notes_is_told_while_it_is_served(tmp_path: Path) -> None:
+def test_what_the_board_notes_is_heard_while_it_is_served(tmp_path: Path) -> None:
     image = tmp_path / "program.elf"
     image.write_bytes(assemble("main: ldi r24, 0x51\n out SPCR, r24\n1: rjmp 1b"))
     visits: list[Visit] = []
