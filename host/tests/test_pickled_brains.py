@@ -39,13 +39,13 @@ def test_an_unpickled_brain_commands_the_same(name: str) -> None:
     brain = load_brain(name).brain
     assert brain is not None
     fresh = pickle.dumps(brain)
-    runs = [boebot.run(brain, robot, arena=arena, seconds=4)]
+    runs = [boebot.run(brain, robot, arena=arena, seconds=2)]
     for data in (fresh, pickle.dumps(brain)):
         copy = pickle.loads(data)
-        runs.append(boebot.run(copy, robot, arena=arena, seconds=4))
+        runs.append(boebot.run(copy, robot, arena=arena, seconds=2))
         assert copy.processes[0] is not brain.processes[0]
     first, *others = (run.record.steps for run in runs)
-    assert len(first) == 80 and others == [first, first]
+    assert len(first) == 40 and others == [first, first]
 
 
 def test_another_process_reads_a_brain_whose_classes_are_in_a_bundled_file() -> None:
