@@ -15,6 +15,7 @@ import boebot
 from boebot import Member
 from boebot.boards import BoardRequest, open_board
 from boebot.cli.options import magnitudes
+from boebot.cli.run_table import Detail, print_run
 from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.devices.accelerometer import Accelerometer
 from boebot.devices.light import Phototransistor
@@ -88,10 +89,13 @@ def test_the_record_has_what_was_asked(tmp_path: Path) -> None:
     assert repetition.is_equal and repetition.steps == result.steps
 
 
-def test_one_robot_of_several() -> None:
+def test_one_robot_of_several(capsys: pytest.CaptureFixture[str]) -> None:
     members = [Member(pose=(0, y, 0), imperfections=given) for y, given in ((0, EXAMPLE), (2, None))]
-    one, other = boebot.run_together(members, arena="empty", seconds=0.5).robots
+    result = boebot.run_together(members, arena="empty", seconds=0.5)
+    one, other = result.robots
     assert (one.imperfections, other.imperfections) == (EXAMPLE, {})
+    print_run(result, Detail.FEW)
+    assert " ".join(capsys.readouterr().out.split()).count(", with servo_lag_s 0.2, tyre_grip 0.3") == 1
 
 
 class Asked(Draw):

@@ -83,19 +83,23 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
     """Name and words of each."""
     table = result.table()
     where = f" in {table['arena']}" if table["arena"] else ""
-    changed = f", without {table['without']}" if table["without"] else ""
-    changed += f", with {table['imperfections']}" if table["imperfections"] else ""
     faster = f", {result.real_time_factor:.3g} times real time" if result.real_time_factor else ""
     way = result.way_in_words()
     if (error_m := result.odometry_error) is not None:
         way.append(f"odometry off by {error_m:.2f} m at the end")
     return [
-        ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{changed}"),
+        ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{_changed(table)}"),
         ("time", f"{result.run_time:g} s{faster}"),
         ("way", ", ".join(way)),
         ("brain", _brain(result, table)),
         ("ended", table["ended"] + _touched(result)),
     ]
+
+
+def _changed(table: dict[str, Any]) -> str:
+    """What the simulated robot was without, and what it had in other magnitudes than usual, in words."""
+    parts = {"without": table["without"], "with": table["imperfections"]}
+    return "".join(f", {word} {names}" for word, names in parts.items() if names)
 
 
 def _touched(result: RunResult) -> str:
@@ -126,4 +130,4 @@ def _row(number: int, robot: RunResult) -> tuple[str, ...]:
     ended = (brief(robot.error) or ["complete"])[0]
     values = (table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches"))
     cells = ("-" if value is None else figures.text(value) for value in values)
-    return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}"
+    return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}{_changed(table)}"
