@@ -17,6 +17,11 @@ def shown(value: Any) -> str:
     return " ".join(reprlib.repr(value).split())
 
 
+def plain(value: Any) -> Any:
+    """Numpy's arrays and numbers as Python's; anything else as a text, which no number is."""
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else shown(value)
+
+
 def number(
     what: str, value: Any, error: type[BoebotError], *, least: float = -math.inf, most: float = math.inf
 ) -> float:

@@ -14,6 +14,7 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -225,6 +226,19 @@ def test_map_with_numbers_of_numpy_is_saved(tmp_path: Path) -> None:
 def test_map_that_is_none(values: np.ndarray, cell: float, sentence: str) -> None:
     with pytest.raises(BrainError, match=sentence):
         OccupancyMap(values, cell)
+
+
+def test_lattice_of_what_is_no_length_is_one_sentence_and_of_a_giant_is_forbidden() -> None:
+    drawn = OccupancyMap(np.array([[0.0, 1.0, 0.0]]), 0.05)
+    lengths: list[tuple[Any, float, str]] = [(math.nan, 0.0, "radius"), (0.1, -1.0, "margin"), ("a", 0.0, "radius")]
+    for radius, margin, name in lengths:
+        for made in (lambda *of: Lattice.of(WALL, *of), drawn.lattice):
+            with pytest.raises(BrainError, match=f"a lattice: {name} is .*; expected a finite number of at least 0"):
+                made(radius, margin)
+    with pytest.raises(BrainError, match="cells of 'a' m; expected a length above 0"):
+        Lattice.of(WALL, 0.1, 0.0, "a")  # type: ignore[arg-type]
+    assert not drawn.lattice(1e9).free.any()
+    assert np.asarray(Lattice(np.array([[1, 0]])).grid().values).tolist() == [[False, True]], "numbers are truths"
 
 
 # ---- steps of a lattice, by shapely ----

@@ -516,3 +516,23 @@ def test_overruns_are_counted_over_their_roll_over_and_over_resets(session: InPr
 def test_realtime_run_takes_its_time(session: InProcess) -> None:
     result = boebot.run(straight, seconds=0.4, realtime=True)
     assert 0.35 < result.wall_time < 0.8
+
+
+def test_numbers_of_numpy_are_recorded_as_python_s(tmp_path: Path) -> None:
+    """The same run, and files that say the same."""
+    pose = (0.5, 0.25, 0.0)
+    plain = boebot.run(straight, robot="arsim", seconds=1, seed=3, period=0.05, pose=pose, out=tmp_path / "plain")
+    numbers = boebot.run(
+        straight,
+        robot="arsim",
+        seconds=np.float32(1),  # type: ignore[arg-type]
+        seed=np.uint8(3),  # type: ignore[arg-type]
+        period=np.float64(0.05),
+        pose=tuple(np.array(pose)),
+        out=tmp_path / "numpy",
+    )
+    assert numbers.hash == plain.hash
+    first, second = (
+        msgspec.json.decode((tmp_path / name / "summary.json").read_bytes()) for name in ("plain", "numpy")
+    )
+    assert first["seed"] == second["seed"] == 3 and first["steps"] == second["steps"] == 20

@@ -246,14 +246,9 @@ def load_arena(arena: str | Path | None) -> Arena:
 def _table_of(description: Any) -> dict[str, Any]:
     """A description made in Python as a file would say it."""
     try:
-        return cast("dict[str, Any]", msgspec.to_builtins(description, enc_hook=_plain))
+        return cast("dict[str, Any]", msgspec.to_builtins(description, enc_hook=arguments.plain))
     except RecursionError:
         raise ArenaError("arena: the description holds itself; expected an ArenaDescription") from None
-
-
-def _plain(value: Any) -> Any:
-    """Numpy's arrays and numbers as Python's; anything else as a text, which no number is."""
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else arguments.shown(value)
 
 
 def _position(x: float, y: float) -> tuple[float, ...]:

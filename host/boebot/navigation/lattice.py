@@ -11,11 +11,13 @@ import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.arguments import number
 from boebot.errors import BrainError
 from boebot.navigation.frames import Point
 from boebot.showing import Grid
@@ -47,6 +49,10 @@ class Lattice:
     y: float = 0.0
     diagonal: bool = True
 
+    def __post_init__(self) -> None:
+        """Truths, also of what is given as numbers."""
+        object.__setattr__(self, "free", np.asarray(self.free, dtype=np.bool_))
+
     @classmethod
     def of(
         cls, plan: LineMap, radius: float, margin: float = 0.05, cell: float = 0.1, *, diagonal: bool = True
@@ -59,8 +65,7 @@ class Lattice:
         Raises:
             BrainError: cell, radius or margin is no length, or the map has too many cells of it.
         """
-        if not (0 <= radius < math.inf and 0 <= margin < math.inf):
-            raise BrainError(f"a lattice for a radius of {radius!r} m and a margin of {margin!r} m; expected lengths")
+        radius, margin = lengths(radius, margin)
         shape, centres = cells_of(plan, cell)
         # No place of a step is farther from a centre than half of a cell's diagonal. By Pythagoras the step keeps the
         # radius where both of its ends keep this; and then no line is in a free cell at all.
@@ -138,6 +143,14 @@ class Lattice:
         return self.cell * math.hypot(cell[0] - other[0], cell[1] - other[1])
 
 
+def lengths(radius: float, margin: float) -> tuple[float, float]:
+    """Both, as numbers (m). Raises BrainError: one is no length."""
+    return (
+        number("a lattice: radius", radius, BrainError, least=0.0),
+        number("a lattice: margin", margin, BrainError, least=0.0),
+    )
+
+
 def cells_of(plan: LineMap, cell: float) -> tuple[tuple[int, int], Floats]:
     """How many rows and columns of cells of that side (m) a map has, one of each at least, and their centres (m), row
     by row, shape (cells, 2).
@@ -145,7 +158,7 @@ def cells_of(plan: LineMap, cell: float) -> tuple[tuple[int, int], Floats]:
     Raises:
         BrainError: it is no length, or there are too many.
     """
-    if not 0 < cell < math.inf:
+    if not isinstance(cell, Real) or not 0 < cell < math.inf:
         raise BrainError(f"cells of {cell!r} m; expected a length above 0")
     low, high = plan.bounds
     columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in (high - low).tolist())

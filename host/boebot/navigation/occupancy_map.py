@@ -17,7 +17,7 @@ import numpy as np
 from boebot.arguments import number, shown
 from boebot.errors import BrainError
 from boebot.files import regular
-from boebot.navigation.lattice import Lattice, cells_of
+from boebot.navigation.lattice import Lattice, cells_of, lengths
 from boebot.navigation.line_map import LineMap
 from boebot.showing import Grid
 
@@ -83,15 +83,14 @@ class OccupancyMap:
         Raises:
             BrainError: radius or margin is no length.
         """
-        if not (0 <= radius < math.inf and 0 <= margin < math.inf):
-            raise BrainError(f"a lattice for a radius of {radius!r} m and a margin of {margin!r} m; expected lengths")
+        radius, margin = lengths(radius, margin)
         blocked = ~(self.values < FREE_BELOW)
         # To the nearest point of a blocked cell. Halfway along a diagonal step that point may be nearer than from both
         # ends, by Pythagoras up to this; within sqrt(2) cells it is not, as no diagonal cuts a corner.
         least = radius + margin
         if radius > self.cell * math.sqrt(2.0):
             least = max(least, math.hypot(radius, self.cell * math.sqrt(0.5)))
-        reach = math.ceil(least / self.cell + 0.5)
+        reach = min(math.ceil(least / self.cell + 0.5), max(blocked.shape))
         padded = np.pad(blocked, reach)
         near = blocked.copy()
         rows, columns = blocked.shape

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from boebot.arguments import plain
 from boebot.errors import BoebotError, as_utf8
 from boebot.record.keepers import Keeper, OnDisk, Shared, Temporary
 from boebot.record.record import Record, Unrecorded
@@ -97,4 +98,4 @@ def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None
     }
     if requested is not None:
         said["request"] = requested
-    return json.dumps(msgspec.to_builtins(said), indent=1).encode()
+    return json.dumps(msgspec.to_builtins(said, enc_hook=plain), indent=1).encode()

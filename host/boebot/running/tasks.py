@@ -211,7 +211,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
     board = BoardRequest(
         robot=description,
         arena=None if request.arena is None else str(request.arena),
-        seed=request.seed,
+        seed=int(request.seed),
         realtime=request.realtime,
         saveable=False,
         record=request.record,
@@ -229,7 +229,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         step_timeout_s=request.step_timeout,
         parameters={name: now[name] for name in given},
         made_of=made_of,
-        brain_seed=request.seed + number - 1 if member.seed is None else member.seed,
+        brain_seed=int(request.seed) + number - 1 if member.seed is None else int(member.seed),
         unrealisable=None if verdict.is_realisable else verdict.sentence,
     )
 
@@ -246,7 +246,7 @@ def prepare(
     expect("period", period, "seconds or None", Real, type(None))
     description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
     loaded = brains.load_brain(brain)
-    period_s = period if period is not None else loaded.period or DEFAULT_PERIOD
+    period_s = float(period if period is not None else loaded.period or DEFAULT_PERIOD)
     if description.has_board:
         check_time_to_live(period_s)
     missing = Equipment(description, tick_s=1.0).missing(loaded.needs)
