@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import random
+import socket
 import subprocess
 import sys
 import time
@@ -214,6 +215,14 @@ def test_name_that_leads_to_no_bus_is_one_sentence(name: str, sentence: str) -> 
     with pytest.raises(BoardError) as told:
         open_can(f"can:{name}")
     assert str(told.value).startswith(sentence) and "\n" not in str(told.value)
+
+
+def test_port_that_does_not_greet_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("boebot.can.bus.TIMEOUT_S", 0.1)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        name = f"socketcand:can0?host=127.0.0.1&port={silent.getsockname()[1]}"
+        with pytest.raises(BoardError, match="cannot be joined: no answer within"):
+            PythonCanBus(BusName.parse(name))
 
 
 def test_settings_of_a_bus_reach_its_interface() -> None:

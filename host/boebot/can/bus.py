@@ -232,13 +232,14 @@ def _take_leave(connection: socket.socket) -> None:
 
 
 def _check_listener(name: BusName, settings: dict[str, Any]) -> None:
-    """python-can would ask for ten seconds where nobody listens."""
+    """python-can would ask for ten seconds where nobody listens, and for ever where nobody answers."""
     port = settings.get("port")
     if not isinstance(port, int):
         raise BoardError(f"{name.text!r} names no port; expected socketcand:CHANNEL?host=HOST&port=PORT")
     host = str(settings["host"])
     try:
-        socket.create_connection((host, port), TIMEOUT_S).close()
+        with socket.create_connection((host, port), TIMEOUT_S) as connection:
+            connection.recv(_READ_BYTES)  # the greeting
     except (OSError, OverflowError) as error:
         why = why_not(error, host) if isinstance(error, OSError) else "there is no such port"
         raise BoardError(f"the CAN bus {name.text} cannot be joined: {why}") from None
