@@ -117,7 +117,7 @@ def draw_runs(figure: Figure, runs: Sequence[Straight]) -> None:
             )
         series = one.result.series
         for side, signal, look, width in zip(("left", "right"), series.signals, ("C0-", "C1--"), (2, 1), strict=True):
-            lower.plot(one.time, signal, look, lw=width, alpha=0.7, label="" if number else side)
+            lower.plot(one.time, signal, look, lw=width, label="" if number else side)
     upper.set(ylabel="distance (m)", ylim=(0, 1.08))
     lower.set(xlabel="time (s)", ylabel="motor signal")
     upper.legend(fontsize="small", loc="lower right")
