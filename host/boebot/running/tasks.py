@@ -32,7 +32,7 @@ class _NamesFiles:
     def __post_init__(self) -> None:
         for name in vars(self).keys() & {"arena", "brain", "robot"}:
             value = getattr(self, name)
-            is_name = not isinstance(value, str | Path) or not Path(value).suffix
+            is_name = not isinstance(value, str | Path) or Path(value).suffix not in (brains.PYTHON, brains.TOML)
             if not is_name and os.path.isfile(value):  # noqa: PTH113 (no error where it is too long)
                 object.__setattr__(self, name, Path(value).absolute())
 
