@@ -55,11 +55,13 @@ def test_experiment_says_what_it_is(name: str) -> None:
 
 
 def hides(upper: Line2D, lower: Line2D) -> bool:
-    """A line drawn over another, as wide and without gaps, where most of that one's points are its own, too."""
+    """A line drawn over another, as wide and without gaps, where it takes most of that one's dots."""
     if lower.get_zorder() > upper.get_zorder():
         upper, lower = lower, upper
+    assert upper.axes is not None
+    to_pixels = upper.axes.transData.transform
     points, own = (
-        set(zip(*(np.asarray(data, dtype=float).round(6).tolist() for data in line.get_data()), strict=True))
+        {tuple(pixel) for pixel in to_pixels(np.column_stack(line.get_data())).round().tolist()}
         for line in (lower, upper)
     )
     is_solid = upper.get_linestyle() == "-" and upper.get_linewidth() >= lower.get_linewidth()
