@@ -190,15 +190,14 @@ def test_others_with_our_identifiers_stop_the_motors(frame: CanFrame, sentence: 
 def test_host_that_another_program_sends_beside_stops_the_motors_and_ends_its_run() -> None:
     """With the host's own session and tick, so that the board obeys."""
     with bridged() as board, joined(board) as somebody:
-        sent = []
+        sent: list[can.Message] = []
 
         def beside(robot: Robot) -> None:
             robot.drive(0.5, 0.5)
             while not sent and robot.time > 0.2 and (message := somebody.recv(0.0)) is not None:
                 if message.arbitration_id == 0x120:
-                    message.data = (
-                        bytes([0x78, 0xEC, 0x78, 0xEC]) + message.data[4:7] + bytes([message.data[7] + 1 & 0xFF])
-                    )
+                    message.data[:4] = bytes.fromhex("78EC78EC")  # -0.5, twice
+                    message.data[7] = (message.data[7] + 1) & 0xFF  # the next set-point
                     somebody.send(message)
                     sent.append(message)
 
