@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from avr_timing.closed_pipe import exit_as
 from tools import imports
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -143,4 +144,4 @@ def rows(page: Path) -> dict[str, tuple[str, str]]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    exit_as(main)

@@ -11,12 +11,12 @@ import argparse
 import os
 import select
 import subprocess
-import sys
 import tempfile
 import time
 import zlib
 from pathlib import Path
 
+from avr_timing.closed_pipe import exit_as
 from boebot.link import frame, messages
 from hil_tests.calibration.avr8js import FOLDER, find_tool
 from tools.avr_program import IMAGES, ROOT
@@ -108,4 +108,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    exit_as(main)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from rich.progress import track
 
+from avr_timing.closed_pipe import exit_as
 from boebot import resources
 from boebot.description.robots import load_robot
 from boebot.running.tasks import DEFAULT_PERIOD
@@ -270,4 +271,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    exit_as(main)

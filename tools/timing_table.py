@@ -9,6 +9,7 @@ import argparse
 import re
 from pathlib import Path
 
+from avr_timing.closed_pipe import exit_as
 from boebot.timing.table import InterruptRow, SensorRow, Table, TaskRow
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -121,4 +122,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    exit_as(main)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 from avr_timing.bounds.stack import Stack
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.bounds.worst_path import worst_path
+from avr_timing.closed_pipe import exit_as
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.graph import program_of
 from avr_timing.image.elf import Image, read_image
@@ -19,7 +19,7 @@ from avr_timing.program import Program
 
 def main(arguments: list[str] | None = None) -> int:
     """Prints a row for each function. Exit code: 0; 1 where a function that is named has no bound, or any could not be
-    followed, or where the output is not read to its end; 2 where the image is refused, or the path of a function."""
+    followed; 2 where the image is refused, or the path of a function."""
     parser = argparse.ArgumentParser("python -m avr_timing", description="Worst case of functions of an AVR image.")
     parser.add_argument("image", type=Path, help="ELF file for the ATmega328P, with symbols")
     parser.add_argument("function", nargs="*", help="names; else all functions of the image")
@@ -32,13 +32,9 @@ def main(arguments: list[str] | None = None) -> int:
         program = program_of(image)
         entries = {name: program.entry(name) for name in given.function}
         judged = _show_paths(program, entries) if given.path else _show_bounds(image, program, entries)
-        sys.stdout.flush()
     except AnalysisError as error:
         print(error, file=sys.stderr)
         return 2
-    except BrokenPipeError:  # as behind `| head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
     return 0 if judged else 1
 
 
@@ -80,4 +76,4 @@ def _show_paths(program: Program, asked: dict[str, int]) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    exit_as(main)

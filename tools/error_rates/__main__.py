@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
+from avr_timing.closed_pipe import exit_as
 from tools.error_rates import library, wrong_bits
 from tools.error_rates.image import Image
 from tools.error_rates.statistics import LOST_ALLOWED, LOST_ALLOWED_CUT, RATE_ALLOWED, trials_needed
@@ -154,4 +154,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    exit_as(main)
