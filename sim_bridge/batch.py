@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from types import TracebackType
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,6 @@ from boebot import arguments
 from boebot.arenas import Arena
 from boebot.brains import LoadedBrain
 from boebot.errors import BrainError, RobotError
-from boebot.former_names import FormerNames
 from boebot.running import interrupts
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicle import VehicleModel
@@ -39,14 +38,12 @@ PORTION_SHORT_S: Final = 0.02  # such portions are doubled ...
 PORTION_LONG_S: Final = 0.1  # ... and such halved
 
 
-class Batch(FormerNames):
+class Batch:
     """N worlds of one model. With several threads, `close` it or use it by `with`; what was read stays.
 
     Attributes:
         readings: shape (N, M), a view that changes with each step; `model.names` says which column is what.
     """
-
-    FORMER: ClassVar = {"poses": "true_poses"}
 
     def __init__(
         self,

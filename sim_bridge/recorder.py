@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan, plan_of_poses, poses_of
 from boebot.errors import RobotError
-from boebot.former_names import refusal
 from boebot.record.record import Record
 from sim_bridge.vehicle import Vehicle
 
@@ -21,11 +20,6 @@ TRUTH = {
     "true_distance": "m", "true_contact": "",
 }  # fmt: skip
 """Columns of what only a simulator knows, and their units."""
-
-FORMER = {
-    "x": "true_x", "y": "true_y", "heading": "true_heading", "speed": "true_speed", "turn_rate": "true_turn_rate",
-    "distance": "true_distance", "touching": "true_contact",
-}  # fmt: skip
 
 
 class Recorder:
@@ -67,7 +61,7 @@ class Recorder:
             KeyError: there is no such column.
         """
         if name not in self.names:
-            raise KeyError(refusal(name, FORMER) or f"no column {name!r}; expected {', '.join(self.names)}")
+            raise KeyError(f"no column {name!r}; expected {', '.join(self.names)}")
         return self.table[:, self.names.index(name)]
 
     @property

@@ -9,7 +9,7 @@ import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from boebot.arguments import point, shown, whole
 from boebot.boards import TruthNow
 from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
-from boebot.former_names import FormerNames
 from boebot.record.blocks import Block, Group, group_of
 from sim_bridge import saved
 from sim_bridge._core import ffi, lib
@@ -505,10 +504,8 @@ class _Patience:
             print(f"restoring: {passed:.0f} of {self._seconds:.0f} s", file=sys.stderr, flush=True)
 
 
-class SimRobot(FormerNames):
+class SimRobot:
     """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
-
-    FORMER: ClassVar = {"contacts": "true_contacts"}
 
     def __init__(self, sim: Sim, number: int) -> None:
         self.sim, self.number = sim, number

@@ -9,12 +9,11 @@ rad, SI units; motor signals in [-1, 1], left and right.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
-from boebot.former_names import FormerNames
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicles import worlds
 from sim_bridge.vehicles.model import VehicleModel as VehicleModel
@@ -37,15 +36,13 @@ SPEED_MAXIMUM: Final = 99.9  # m/s, at the start
 TURN_RATE_MAXIMUM: Final = 999.9  # rad/s
 
 
-class Vehicle(FormerNames):
+class Vehicle:
     """One vehicle in one world. Its readings are there from the start; `step` takes motor signals to the next ones.
 
     Attributes:
         readings: all readings, a view that changes with each step; `model.names` says where what is.
         true_pose: where it truly is; not for brains.
     """
-
-    FORMER: ClassVar = {"pose": "true_pose"}
 
     def __init__(
         self,

@@ -85,9 +85,3 @@ def test_of_an_unrecorded_run_each_figure_is_right_or_none(robot: str) -> None:
         value = getattr(unrecorded, name)
         if isinstance(value, int | float) and name not in ("is_recorded", "has_truth", "real_time_factor"):
             assert value == getattr(recorded, name), (name, kind)
-
-
-def test_a_former_figure_names_where_it_is_now() -> None:
-    run = boebot.run("wander", seconds=0.1)
-    with pytest.raises(KeyError, match=r"'long_steps' was renamed; expected long_steps of wall_clock\(\)"):
-        run.table()["long_steps"]

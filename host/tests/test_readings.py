@@ -64,18 +64,6 @@ def test_any_declared_name_is_read(tmp_path: Path) -> None:
     assert not hasattr(robot, "sonar_ahead")
 
 
-@pytest.mark.parametrize(("old", "new"), [("left_ir", "infrared_left"), ("analog_ir", "analog_infrared")])
-def test_old_names_are_refused_with_the_new_one(tmp_path: Path, old: str, new: str) -> None:
-    robot = robot_reading(0, 0, 0, 0, 0, 0)
-    with pytest.raises(BrainError, match=f"no attribute '{old}'; it is called '{new}' now"):
-        getattr(robot, old)
-    with pytest.raises(BrainError, match=f"a brain cannot need '{old}'; it is called '{new}' now"):
-        robot.observation.equipment.missing([old])
-    text = f"[device.{old}]\ntype = 'touch_whisker'\nroot_m = [0.1, 0]\ntip_m = [0.2, 0]"
-    with pytest.raises(RobotError, match=rf"variant\.toml:2: device\.{old}: a device cannot have this name; .*'{new}'"):
-        load_robot(variant(tmp_path, text))
-
-
 @pytest.mark.parametrize("name", ["drive", "time", "front-left", "_seed"])
 def test_names_that_a_brain_could_not_read_are_refused(tmp_path: Path, name: str) -> None:
     text = f"[device.{name}]\ntype = 'touch_whisker'\nroot_m = [0.1, 0]\ntip_m = [0.2, 0]"

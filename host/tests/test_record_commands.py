@@ -58,7 +58,6 @@ def test_columns_are_drawn(
     [
         ("true_x_mm", "the run has no column 'true_x_mm'; expected one of time_s, tick"),
         ("true_x_mm", "did you mean 'true_x_m'?"),
-        ("contact", "'contact' was renamed; expected true_contact"),
         ("command", "column 'command' has words, not numbers"),
     ],
 )

@@ -85,21 +85,6 @@ def test_odometry_lies_in_the_arena_from_the_true_start(result: RunResult) -> No
     )
 
 
-@pytest.mark.parametrize(
-    ("former", "now"),
-    [("distance", "true_distance, .*or odometry_distance"), ("contacts", "true_contacts, .*or whisker")],
-)
-def test_former_names_are_refused_with_the_new_ones(result: RunResult, former: str, now: str) -> None:
-    with pytest.raises(AttributeError, match=f"^'{former}' was renamed; expected {now}"):
-        getattr(result, former)
-    with pytest.raises(KeyError, match="'period_ms' was renamed; expected period_s"):
-        result.table()["period_ms"]
-    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
-        result.nothing  # type: ignore[attr-defined]  # noqa: B018
-    with pytest.raises(KeyError, match=r"^'nothing'$"):
-        result.table()["nothing"]
-
-
 def test_csv_has_a_row_for_each_tick(result: RunResult, folder: Path) -> None:
     with (folder / "run.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

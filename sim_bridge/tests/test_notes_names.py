@@ -14,12 +14,9 @@ from shapely.geometry import LineString, Point
 
 from boebot.arenas import load_arena
 from boebot.arenas.rays import bearing_interval, ray_segment
-from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, RobotError
-from sim_bridge.batch import Batch
 from sim_bridge.motor import DCMotor
 from sim_bridge.recorder import Recorder
-from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, arsim
 from sim_bridge.view import View
@@ -136,22 +133,6 @@ def test_recorder_keeps_a_row_a_step(tmp_path: Path) -> None:
     assert back["infrared_left"] == pytest.approx(log["infrared_left"], rel=1e-8) and len(back) == 60
     with pytest.raises(KeyError, match="no column 'nothing'; expected time, true_x"):
         log["nothing"]
-
-
-def test_former_names_of_the_truth_are_refused_with_the_new_ones() -> None:
-    vehicle = Vehicle(arsim(), load_arena("arsim"))
-    batch = Batch(arsim(), load_arena("arsim"), [(0.0, 0.0, 0.0)], [1])
-    robot = Sim(load_arena("arsim")).add(None, load_robot("arsim"))
-    for owner, former, now in (
-        (vehicle, "pose", "true_pose"),
-        (batch, "poses", "true_poses"),
-        (robot, "contacts", "true_contacts"),
-    ):
-        with pytest.raises(AttributeError, match=f"^'{former}' was renamed; expected {now}$"):
-            getattr(owner, former)
-        assert hasattr(owner, now)
-    with pytest.raises(KeyError, match="'x' was renamed; expected true_x"):
-        Recorder(vehicle)["x"]
 
 
 @pytest.mark.unsanitized

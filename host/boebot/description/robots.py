@@ -20,7 +20,6 @@ from boebot.description.outlines import Point, polygon_fault, way_out
 from boebot.devices.battery import Energy
 from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_number
 from boebot.devices.encoder import WheelEncoder
-from boebot.devices.equipment import RENAMED
 from boebot.devices.motor import Motor
 from boebot.errors import RobotError, did_you_mean
 from boebot.imperfections import imperfections, unknown
@@ -227,8 +226,8 @@ def _check_devices(robot: RobotDescription, table: dict[str, Any], file: str) ->
     """Refuses keys that do not fit each other, and names that a brain could not write."""
     for name, device in robot.device.items():
         at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
-        if not name.isidentifier() or name in RENAMED or hasattr(Robot, name):
-            expected = f"{RENAMED[name]!r}" if name in RENAMED else "a name that robot.NAME can have in a brain"
+        if not name.isidentifier() or hasattr(Robot, name):
+            expected = "a name that robot.NAME can have in a brain"
             raise RobotError(f"{at}: a device cannot have this name; expected {expected}")
         if device.on and (fault := device.fault()):
             key = f"device.{name}.{fault[0]}"

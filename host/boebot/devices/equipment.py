@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from boebot.devices.device import Place, Reader, kinds
 from boebot.devices.latest import MESSAGE_TICKS
@@ -13,24 +13,6 @@ from boebot.errors import BrainError, did_you_mean
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
-
-RENAMED: Final = {
-    "left_whisker": "whisker_left",
-    "right_whisker": "whisker_right",
-    "left_ir": "infrared_left",
-    "right_ir": "infrared_right",
-    "left_encoder": "encoder_left",
-    "right_encoder": "encoder_right",
-    "left_servo": "servo_left",
-    "right_servo": "servo_right",
-    "left_light": "light_left",
-    "right_light": "light_right",
-    "left_zone": "infrared_left.zone",
-    "right_zone": "infrared_right.zone",
-    "analog_ir": "analog_infrared",
-    "zones": "infrared",
-}
-"""What a device was called before -> what it is called."""
 
 
 class NoDeviceError(BrainError, AttributeError):
@@ -93,8 +75,8 @@ class Equipment:
                 continue
             if need not in groups() and need not in usual_names():
                 known = list(dict.fromkeys((*groups(), *usual_names(), *self.readers)))
-                hint = _hint(need, f"expected one of {', '.join(known)}{did_you_mean(need, known)}")
-                raise BrainError(f"a brain cannot need {need!r}; {hint}")
+                expected = f"expected one of {', '.join(known)}{did_you_mean(need, known)}"
+                raise BrainError(f"a brain cannot need {need!r}; {expected}")
             lacking += [name for name in groups().get(need, (need,)) if name not in self.readers]
         return lacking
 
@@ -103,12 +85,8 @@ class Equipment:
         if name in usual_names():
             return NoDeviceError(f"robot {self.robot_name!r} has no {name}")
         there = [other for other in known if other[0] != "_"]
-        hint = _hint(name, f"its devices are {', '.join(self.readers) or 'none'}{did_you_mean(name, there)}")
+        hint = f"its devices are {', '.join(self.readers) or 'none'}{did_you_mean(name, there)}"
         return NoDeviceError(f"robot {self.robot_name!r} has no attribute {name!r}; {hint}")
-
-
-def _hint(name: str, otherwise: str) -> str:
-    return f"it is called {RENAMED[name]!r} now" if name in RENAMED else otherwise
 
 
 def places(

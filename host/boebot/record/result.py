@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
@@ -19,7 +19,6 @@ from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
 from boebot.errors import brief
-from boebot.former_names import CONTACTS, DISTANCE, Figures, FormerNames
 from boebot.link.fields import text
 from boebot.link.messages import DevicesTelemetry, Identity
 from boebot.record import figures
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True, repr=False)
-class RunResult(FormerNames):
+class RunResult:
     """What came of a run. Lengths in metres, times in seconds.
 
     Attributes:
@@ -73,8 +72,6 @@ class RunResult(FormerNames):
         made_of: of a brain of processes: classes and parameters of its processes, their utilities, and state variables,
             as the run began (docs/reference/run-files.md).
     """
-
-    FORMER: ClassVar = {"distance": DISTANCE, "contacts": CONTACTS}
 
     brain: str
     robot: RobotDescription
@@ -331,66 +328,62 @@ class RunResult(FormerNames):
         once it had said something; None without such a device."""
         return self.overview.slow_reading_age
 
-    def table(self) -> Figures:
+    def table(self) -> dict[str, Any]:
         """The run's figures by name: numbers and texts, units in the names; None: not known, or nothing that this robot
         has. Runs that are equal have equal ones: what depends on this computer's speed is in `wall_clock`."""
         on_board = self.layout is None
         slow_age, identity, brain = self.slow_reading_age, self.identity, self.overview.brain
         unknown = dict.fromkeys(() if self.brain_names is None else self.brain_names.behaviors)
         shares: Mapping[str, float | None] = unknown if brain is None else brain.shares(self.run_time)
-        return Figures(
-            {
-                "brain": self.brain,
-                "robot": self.robot.name,
-                "board": self.board,
-                "arena": self.plan.name if self.has_truth else self.arena,
-                "seed": self.seed,
-                "without": ", ".join(self.without) or None,
-                "imperfections": ", ".join(f"{name} {size:.10g}" for name, size in self.imperfections.items()) or None,
-                "run_time_s": round(self.run_time, 3),
-                "true_distance_m": _rounded(self.true_distance, 3),
-                "odometry_distance_m": _rounded(self.odometry_distance, 3),
-                "true_contacts": self.true_contacts,
-                "whisker_touches": self.whisker_touches,
-                "odometry_source": self.odometry_source,
-                "odometry_error_m": _rounded(self.odometry_error, 3),
-                "period_s": round(self.period, 6),
-                "steps": self.steps,
-                "late_steps": self.late_steps,
-                "unrealisable": self.unrealisable,
-                "behavior_switches": None if brain is None else brain.behavior_switches,
-                **{f"{name}_share": _rounded(share, 4) for name, share in shares.items()},
-                "ticks": self.ticks,
-                "slow_readings": None if slow_age is None else self.record.count(DevicesTelemetry.NAME),
-                "slow_reading_age_s": _rounded(slow_age, 6),
-                "lost_frames": self.lost_frames if on_board else None,
-                "bad_frames": self.bad_frames if on_board else None,
-                "overruns": self.overruns if on_board else None,
-                "dead_man_stops": self.dead_man_stops if on_board else None,
-                "fallback_takeovers": self.fallback_takeovers if on_board else None,
-                "resets": self.resets if on_board else None,
-                "sessions_lost": self.sessions_lost if on_board else None,
-                "touched": self.touched,
-                "hung_at": hangs.places(self.watchdog_resets),
-                "firmware": None if identity is None else text(identity.firmware_version),
-                "compiler": None if identity is None else text(identity.compiler),
-                "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
-                "hash": self.hash,
-                "ended": "complete" if self.error is None else why(self.error),
-            }
-        )
+        return {
+            "brain": self.brain,
+            "robot": self.robot.name,
+            "board": self.board,
+            "arena": self.plan.name if self.has_truth else self.arena,
+            "seed": self.seed,
+            "without": ", ".join(self.without) or None,
+            "imperfections": ", ".join(f"{name} {size:.10g}" for name, size in self.imperfections.items()) or None,
+            "run_time_s": round(self.run_time, 3),
+            "true_distance_m": _rounded(self.true_distance, 3),
+            "odometry_distance_m": _rounded(self.odometry_distance, 3),
+            "true_contacts": self.true_contacts,
+            "whisker_touches": self.whisker_touches,
+            "odometry_source": self.odometry_source,
+            "odometry_error_m": _rounded(self.odometry_error, 3),
+            "period_s": round(self.period, 6),
+            "steps": self.steps,
+            "late_steps": self.late_steps,
+            "unrealisable": self.unrealisable,
+            "behavior_switches": None if brain is None else brain.behavior_switches,
+            **{f"{name}_share": _rounded(share, 4) for name, share in shares.items()},
+            "ticks": self.ticks,
+            "slow_readings": None if slow_age is None else self.record.count(DevicesTelemetry.NAME),
+            "slow_reading_age_s": _rounded(slow_age, 6),
+            "lost_frames": self.lost_frames if on_board else None,
+            "bad_frames": self.bad_frames if on_board else None,
+            "overruns": self.overruns if on_board else None,
+            "dead_man_stops": self.dead_man_stops if on_board else None,
+            "fallback_takeovers": self.fallback_takeovers if on_board else None,
+            "resets": self.resets if on_board else None,
+            "sessions_lost": self.sessions_lost if on_board else None,
+            "touched": self.touched,
+            "hung_at": hangs.places(self.watchdog_resets),
+            "firmware": None if identity is None else text(identity.firmware_version),
+            "compiler": None if identity is None else text(identity.compiler),
+            "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
+            "hash": self.hash,
+            "ended": "complete" if self.error is None else why(self.error),
+        }
 
-    def wall_clock(self) -> Figures:
+    def wall_clock(self) -> dict[str, Any]:
         """Figures by the wall clock of the computer, in which runs that are equal differ; None: not known."""
         is_known = self.wall_time > 0
-        return Figures(
-            {
-                "wall_time_s": round(self.wall_time, 3) if is_known else None,
-                "real_time_factor": _rounded(self.real_time_factor, 2),
-                "long_steps": self.long_steps if is_known else None,
-                "longest_step_s": round(self.longest_step, 6) if is_known else None,
-            }
-        )
+        return {
+            "wall_time_s": round(self.wall_time, 3) if is_known else None,
+            "real_time_factor": _rounded(self.real_time_factor, 2),
+            "long_steps": self.long_steps if is_known else None,
+            "longest_step_s": round(self.longest_step, 6) if is_known else None,
+        }
 
     @property
     def touched(self) -> int:

@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from boebot.errors import BoebotError, brief, did_you_mean, printable
-from boebot.former_names import FIGURES, refusal
 from boebot.view import figure_file, style, tables
 
 if TYPE_CHECKING:
@@ -65,8 +64,7 @@ def _numbers(columns: dict[str, list[str]], name: str) -> Floats:
     """The cells of a column; an empty one is not a number."""
     if name not in columns:
         raise BoebotError(
-            refusal(name, FIGURES)
-            or f"the run has no column {name!r}; expected one of {', '.join(columns)}{did_you_mean(name, columns)}"
+            f"the run has no column {name!r}; expected one of {', '.join(columns)}{did_you_mean(name, columns)}"
         )
     try:
         return np.array([float(cell) if cell else math.nan for cell in columns[name]])
