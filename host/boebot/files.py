@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import stat
 from pathlib import Path
 
 
-def regular(path: Path, most: int = 100_000_000) -> Path:
+def regular(path: Path, most: float = math.inf) -> Path:
     """The path, of a plain file of up to `most` bytes.
 
     Raises:
@@ -14,9 +15,9 @@ def regular(path: Path, most: int = 100_000_000) -> Path:
     """
     found = path.stat()
     if stat.S_ISDIR(found.st_mode):
-        raise IsADirectoryError(0, "it is a folder; expected a file")
+        raise IsADirectoryError(0, "it is a folder, no file")
     if not stat.S_ISREG(found.st_mode):
-        raise OSError(0, "it is a pipe or a device; expected a file")
+        raise OSError(0, "it is a pipe or a device, no file")
     if found.st_size > most:
         raise OSError(0, f"it has {found.st_size:,} bytes; expected at most {most:,}")
     return path

@@ -25,9 +25,11 @@ from PIL import Image
 
 from avr_timing.errors import AnalysisError
 from avr_timing.image.elf import read_image
+from boebot.can.log import read_log
 from boebot.errors import BoebotError, BrainError
 from boebot.navigation import Lattice, LineMap, OccupancyMap, search
 from boebot.navigation.occupancy_map import LONGEST
+from boebot.record.reading import read_run
 from boebot.timing.table import read_table
 from sim_bridge.boards import avr
 from sim_bridge.reading_table import ReadingTable
@@ -161,19 +163,21 @@ def test_picture_that_is_none_is_one_sentence_at_once(picture: bytes, tmp_path: 
 
 def test_pipe_and_folder_are_no_map(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "m.yaml")
-    with pytest.raises(BrainError, match="it is a pipe or a device; expected a file"):
+    with pytest.raises(BrainError, match="it is a pipe or a device, no file"):
         OccupancyMap.load(tmp_path / "m.yaml")
-    with pytest.raises(BrainError, match="it is a folder; expected a file"):
+    with pytest.raises(BrainError, match="it is a folder, no file"):
         OccupancyMap.load(tmp_path)
 
 
 @pytest.mark.parametrize(
-    "read", [ReadingTable.load, avr.create, read_table, read_image], ids=lambda one: one.__qualname__
+    "read",
+    [ReadingTable.load, avr.create, read_table, read_image, read_run, read_log],
+    ids=lambda one: one.__qualname__,
 )
 def test_no_other_reader_waits_for_a_pipe(read: Callable[[Path], object], tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", Path("/dev/zero")):
-        with pytest.raises((BoebotError, AnalysisError), match="it is a pipe or a device; expected a file"):
+        with pytest.raises((BoebotError, AnalysisError), match="it is a pipe or a device, no file"):
             read(path)
 
 

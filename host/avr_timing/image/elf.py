@@ -69,7 +69,7 @@ def read_image(path: Path) -> Image:
     """Reads an ELF file. Raises AnalysisError when it is not a linked program for the ATmega328P, or is damaged."""
     try:
         if path.is_fifo() or path.is_char_device():  # they have no end
-            raise OSError(0, "it is a pipe or a device; expected a file")
+            raise OSError(0, "it is a pipe or a device, no file")
         data = path.read_bytes()
     except OSError as error:
         raise AnalysisError(f"{path} cannot be read: {error.strerror or error}") from error

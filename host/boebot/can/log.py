@@ -23,6 +23,7 @@ from boebot.can.translator import BoardEnd, HostEnd
 from boebot.description.board_parameters import adapted, parameters_of
 from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import BoebotError
+from boebot.files import regular
 from boebot.link import messages, mismatch
 from boebot.link.fields import text
 from boebot.record.reading import CutError
@@ -209,7 +210,7 @@ def _sent(path: Path) -> Iterator[tuple[str, Sent]]:
     numbered = path.suffix.lower() != ".log"  # from 1 on; python-can counts from 0
     count = 0
     try:
-        with can.LogReader(str(path)) as log:
+        with can.LogReader(str(regular(path))) as log:
             for message in log:
                 count += 1
                 if not (message.is_error_frame or message.is_extended_id or message.is_remote_frame or message.is_fd):

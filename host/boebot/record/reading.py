@@ -12,6 +12,7 @@ import msgspec
 
 from boebot.arenas import Arena, ArenaDescription
 from boebot.errors import ArenaError
+from boebot.files import regular
 from boebot.record.facts import result_of
 from boebot.record.keepers import Finished, Keeper, Shared
 from boebot.record.record import Record
@@ -92,7 +93,7 @@ def _opened(path: str | Path) -> tuple[Path, RecordReader]:
     """A record, read once."""
     file = Path(path) / RECORD if Path(path).is_dir() else Path(path)
     try:
-        return file, RecordReader(file.open("rb"), str(file)).read()
+        return file, RecordReader(regular(file).open("rb"), str(file)).read()
     except OSError as error:
         what = "there is no record of a run" if error.errno == errno.ENOENT else error.strerror or error
         raise NoRecordError(f"{file}: {what}; expected the folder of a run, or its {RECORD}") from None
