@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 from boebot.boards import BoardRequest, BoardSession, Visit
 from boebot.errors import BoardError
@@ -120,7 +119,7 @@ def serve(
     if kind not in openers:
         raise BoardError(f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(openers)}")
     with contextlib.ExitStack() as stack:
-        session = openers[kind](replace(request, saveable=False))
+        session = openers[kind](request)
         stack.callback(session.close)
         port: Port = PtyPort(session.transport.baud) if tcp is None else TcpPort(tcp)
         stack.callback(port.close)

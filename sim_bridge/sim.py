@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import struct
-import sys
-import time
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +20,6 @@ from boebot.boards import TruthNow
 from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.record.blocks import Block, Group, group_of
-from sim_bridge import saved
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
@@ -35,9 +32,6 @@ from sim_bridge.vehicles.model_file import vehicle_model
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
 RECORD_CYCLES = 160_000  # 10 ms
-REPLAY_CYCLES = CLOCK_HZ // 4  # of a saved simulation, between two looks at the clock
-PATIENCE_S = 2.0  # that replaying takes without a word
-REPORT_S = 0.1  # between two words of progress
 CYCLES_MAXIMUM = 2**62  # 9,000 years
 NUMBER_MAXIMUM = 2**30 - 1
 STEP_MINIMUM = 160  # cycles of a world step: 10 us
@@ -56,7 +50,6 @@ PORTION_CYCLES = CLOCK_HZ  # of a long run, between two chances for Ctrl-C
 
 Floats = NDArray[np.float64]
 Pose = tuple[float, float, float]
-Progress = Callable[[float], None]
 
 
 def checked_pose(what: str, pose: object) -> Pose:
@@ -75,7 +68,6 @@ class Member:
     board: EmulatedBoard | None
     description: robots.RobotDescription
     """with the imperfections that it was added with"""
-    pose: Pose
     model: VehicleModel | None
     """of a robot without a board"""
 
@@ -132,7 +124,6 @@ class Sim:
         if handle == ffi.NULL:
             raise MemoryError("simulation")
         self._count, self._time = ffi.new("size_t *"), ffi.new("double *")
-        self.drained_s: dict[int, float] = {}  # of each robot: up to when its truth was drained
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
         _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
@@ -150,7 +141,7 @@ class Sim:
         return self._handle
 
     def __copy__(self) -> Sim:
-        raise BoardError("a simulation cannot be copied; expected save() and restore()")
+        raise BoardError("a simulation cannot be copied; expected a new one, built alike")
 
     def __deepcopy__(self, memo: object) -> Sim:
         return self.__copy__()
@@ -219,14 +210,10 @@ class Sim:
         status = lib.sim_add_robot(self.handle, number, board.address, body, *pose)
         self._check_place(status, pose)
         done(status, f"the {board.description}")
-        self.members[number] = Member(board, description, pose, None)
-        self._take(board)
-        join(self.handle, number, description, draw)
-
-    def _take(self, board: EmulatedBoard) -> None:
-        """From now on this simulation runs it."""
+        self.members[number] = Member(board, description, None)
         me = weakref.ref(self)
         board.is_in_use = lambda: (sim := me()) is not None and sim._handle is not None
+        join(self.handle, number, description, draw)
 
     def _add_vehicle(self, number: int, description: robots.RobotDescription, pose: Pose) -> None:
         model = vehicle_model(description, dt=self._step_cycles / CLOCK_HZ, noise=self.noise)
@@ -234,7 +221,7 @@ class Sim:
         self._check_place(status, pose)
         done(status, f"robot {description.name!r}")
         model.in_use = True
-        self.members[number] = Member(None, description, pose, model)
+        self.members[number] = Member(None, description, model)
 
     def _check_place(self, status: int, pose: Pose) -> None:
         if status == lib.SIM_NOT_FREE:
@@ -367,118 +354,6 @@ class Sim:
         """Of the whole state of all bodies, by robot number: equal for runs that are equal bit for bit."""
         return int(lib.sim_hash(self.handle))
 
-    # ---- save and restore --------------------------------------------------------------------------------------------
-
-    def save(self) -> bytes:
-        """The state of world and boards, to be gone on from by `restore`; what the host's end knows is not in it.
-
-        Raises:
-            SavedStateError: a board has crashed, or runs no firmware.
-        """
-        for number, member in self.members.items():
-            if member.board is not None and not member.board.can_repeat:
-                raise saved.SavedStateError(
-                    f"robot {number} cannot be saved: its {member.board.description} runs a script"
-                )
-        count = ffi.new("size_t *")
-        inputs = lib.sim_inputs(self.handle, count)
-        if inputs == ffi.NULL:
-            raise saved.SavedStateError(
-                "this simulation cannot be saved: a board has crashed, its inputs are not kept, or memory ran out"
-            )
-        return saved.encode(self._heading(), ffi.buffer(inputs, count[0])[:])
-
-    def keep_no_inputs(self) -> None:
-        """What robots are sent is not kept any more, so that a run of days takes no more memory; `save` then raises."""
-        lib.sim_keep_no_inputs(self.handle)
-
-    def restore(self, state: bytes, progress: Progress | None = None) -> None:
-        """Goes to a saved state, and on from there as the simulation went on that was saved, bit for bit.
-
-        This one has the same arena, seeds and robots with the same firmware; it may have run, and may stand before or
-        behind that state. All is replayed from the start, at the speed of the boards. Whoever holds a `SimRobot` or
-        `BoardPins` may keep it.
-
-        Args:
-            progress: called with the seconds that have been replayed, about ten times a second. None: where it takes
-                over two seconds, a line on standard error.
-
-        Raises:
-            SavedStateError: the bytes are damaged, of another simulation, or lead to another state; then nothing has
-                changed here.
-            BoardError: the firmware has changed on disk.
-        """
-        heading, inputs = saved.decode(state, saved.Simulation)
-        saved.check_alike(heading, self._heading())
-        fresh = Sim(self.arena, seed=self.seed, noise=self.noise, record=self._record, step_cycles=self._step_cycles)
-        try:
-            for number, member in self.members.items():
-                board = None if member.board is None else member.board.again()
-                try:
-                    fresh.add(board, member.description, pose=member.pose, number=number)
-                except Exception:
-                    if board is not None:
-                        board.close()
-                    raise
-            fresh._replay(heading, inputs, progress or _Patience(heading.cycle / CLOCK_HZ).report)
-        except BaseException:
-            fresh.close()
-            raise
-        for number in self.members:
-            lib.sim_listen(fresh.handle, number, lib.sim_listens(self.handle, number))
-        self.close()
-        self._handle, self.members, self._outlines = fresh._handle, fresh.members, fresh._outlines
-        for member in self.members.values():
-            if member.board is not None:
-                self._take(member.board)
-
-    def _heading(self) -> saved.Simulation:
-        return saved.Simulation(
-            format=saved.FORMAT,
-            cycle=self.cycle,
-            state=f"{lib.sim_state_hash(self.handle):016x}",
-            seed=self.seed,
-            noise=self.noise,
-            record=self._record,
-            step_cycles=self._step_cycles,
-            arena=self.arena.name,
-            arena_fingerprint=self.arena.fingerprint,
-            robots=[
-                saved.SavedRobot(
-                    number=number,
-                    name=member.description.name,
-                    built=saved.fingerprint_of(member.description, member.pose),
-                    firmware="" if member.board is None else member.board.firmware,
-                    waiting=lib.sim_waiting(self.handle, number),
-                )
-                for number, member in sorted(self.members.items())
-            ],
-        )
-
-    def _replay(self, heading: saved.Simulation, inputs: bytes, progress: Progress) -> None:
-        """From the start to where `heading` says."""
-        at = ffi.new("size_t *")
-        shown = time.monotonic()
-        while at[0] < len(inputs) or self.cycle < heading.cycle:
-            is_last = self.cycle == heading.cycle
-            until = min(self.cycle + REPLAY_CYCLES, heading.cycle)
-            status = lib.sim_replay(self.handle, inputs, len(inputs), at, until)
-            if status < 0 or (is_last and at[0] < len(inputs)):
-                raise saved.SavedStateError(
-                    "the saved simulation has an input that does not fit; expected what save() gave"
-                )
-            self.check(status)
-            if time.monotonic() - shown > REPORT_S:
-                shown = time.monotonic()
-                progress(self.cycle / CLOCK_HZ)
-        for robot in heading.robots:
-            lib.sim_forget_received(self.handle, robot.number, robot.waiting)
-        if self._heading() != heading:
-            raise saved.SavedStateError(
-                f"replaying came to another state at {self.cycle / CLOCK_HZ:.3f} s: another version of the simulator "
-                "saved it"
-            )
-
     def close(self) -> None:
         """Frees the simulation, then the boards. May be called twice."""
         handle, self._handle = self._handle, None
@@ -488,20 +363,6 @@ class Sim:
         for member in self.members.values():
             if member.board is not None:
                 member.board.close()
-
-
-class _Patience:
-    """Says on standard error how far a replay has come, once it takes its time."""
-
-    def __init__(self, seconds: float) -> None:
-        self._seconds = seconds
-        self._next = time.monotonic() + PATIENCE_S
-
-    def report(self, passed: float) -> None:
-        """So many seconds have been replayed."""
-        if time.monotonic() >= self._next:
-            self._next = time.monotonic() + PATIENCE_S
-            print(f"restoring: {passed:.0f} of {self._seconds:.0f} s", file=sys.stderr, flush=True)
 
 
 class SimRobot:
@@ -515,7 +376,7 @@ class SimRobot:
 
     @property
     def board(self) -> EmulatedBoard:
-        """Its board; another one after `Sim.restore`.
+        """Its board.
 
         Raises:
             BoardError: it has none.
@@ -707,13 +568,11 @@ class SimRobot:
         if not self.sim.is_recorded:
             return {}
         time, *columns = (self.truth_to_now() if to_now else self.truth()).values()
-        new = time > self.sim.drained_s.get(self.number, -1.0)  # a restored simulation has old rows again
         lib.sim_forget(self._handle, self.number)
-        if not new.any():
+        if not len(time):
             return {}
-        self.sim.drained_s[self.number] = float(time[-1])
-        data = np.column_stack(columns)[new]
-        return {"truth": Block(time[new], data.tobytes(), np.array([8 * len(columns)], dtype=np.uint32))}
+        data = np.column_stack(columns)
+        return {"truth": Block(time, data.tobytes(), np.array([8 * len(columns)], dtype=np.uint32))}
 
     def turret_angle(self, pin: int) -> float:
         """Of the turret on that pin, rad, counter-clockwise from straight ahead."""

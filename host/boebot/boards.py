@@ -51,7 +51,6 @@ class BoardRequest:
     image: str | None = None  # firmware to load in place of the bundled one
     record: bool = True  # keep the truth for the pictures
     pins: bool = False  # record the edges of an emulated board's pins
-    saveable: bool = True  # the simulation can be saved
     noise: bool = True
     without: Sequence[str] = ()  # imperfections of this robot that are switched off, by name
     imperfections: Mapping[str, float] = field(default_factory=dict)  # magnitudes of others, by name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import weakref
 from collections.abc import Callable
 from pathlib import Path
@@ -23,27 +22,23 @@ class EmulatedBoard:
         description: str,
         release: Callable[[], None],
         keep: Any = None,
-        firmware: bytes = b"",
         elf: Path | None = None,
         assumed: str = "",
-        again: Callable[[], EmulatedBoard] | None = None,
     ) -> None:
-        """`release` frees the board, `again` makes one more like it; `firmware` is what it runs, `elf` the file
-        that says where in the source an address comes from, `assumed` what it does not say and was assumed.
+        """`release` frees the board; `elf` is the file that says where in the source an address comes from, `assumed`
+        what it does not say and was assumed.
 
         Raises:
             BoardError: the board was built for another version of this package.
         """
         self._address = address
         self.description = description
-        self.firmware = hashlib.sha256(firmware).hexdigest()
         self.elf = elf
         self.assumed = assumed
         self._release: Callable[[], None] | None = release
         self._free = weakref.finalize(self, release)  # for one that is dropped; at the exit its world may still hold it
         self._free.atexit = False
         self._keep = keep
-        self._again = again
         self.is_in_use: Callable[[], bool] = _in_no_simulation
         """whether a simulation runs it"""
         if lib.board_check(address) != lib.SIM_OK:
@@ -68,25 +63,6 @@ class EmulatedBoard:
         data = lib.board_memory(ffi.cast("board *", self.address))
         z = 0 if data == ffi.NULL else data[30] | data[31] << 8
         return with_place(why, self.elf, lib.board_fault_address(self.address), z)
-
-    @property
-    def can_repeat(self) -> bool:
-        """Whether it runs firmware, so that there can be one more like it."""
-        return self._again is not None
-
-    def again(self) -> EmulatedBoard:
-        """One more of its kind with the same firmware, just powered on.
-
-        Raises:
-            BoardError: it runs no firmware, or the file is another one by now.
-        """
-        if self._again is None:
-            raise BoardError(f"the {self.description} runs no firmware; expected an emulated board that does")
-        board = self._again()
-        if board.firmware != self.firmware:
-            board.close()
-            raise BoardError(f"the firmware of the {self.description} has changed on disk since it was loaded")
-        return board
 
     def close(self) -> None:
         """Frees the board. May be called twice.
@@ -133,8 +109,6 @@ def native_board(library: Path) -> EmulatedBoard:
         address,
         "emulated native board",
         lambda: lib.board_destroy(address),
-        firmware=library.read_bytes(),
-        again=lambda: native_board(library),
     )
 
 
@@ -152,10 +126,8 @@ def avr_board(image: Path) -> EmulatedBoard:
         "emulated ATmega328P",
         board.close,
         keep=board,
-        firmware=image.read_bytes(),
         elf=image,
         assumed=board.assumed_chip,
-        again=lambda: avr_board(image),
     )
 
 

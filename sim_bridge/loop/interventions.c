@@ -1,4 +1,4 @@
-/* interventions.c: see loop.h. Here: what a test does to a simulation, past its parts; all of it is noted. */
+/* interventions.c: see loop.h. Here: what a test does to a simulation, past its parts. */
 #include <math.h>
 #include <string.h>
 
@@ -26,8 +26,6 @@ int sim_place(sim *self, int number, double x, double y, double heading) {
   robot *r = sim_robot(self, number);
   if (r == NULL || bad_pose(x, y, heading)) return SIM_BAD_ARGUMENT;
   if (!world_is_free(&self->world, x, y, r->body->body_reach, r->chassis.self_id)) return SIM_NOT_FREE;
-  const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
-  sim_note(self, number, INPUT_PLACE, words, 3, NULL, 0);
   lift(r, x, y, heading);
   r->chassis.x = x;
   r->chassis.y = y;
@@ -39,8 +37,6 @@ int sim_place(sim *self, int number, double x, double y, double heading) {
 int sim_place_shape(sim *self, int shape, double x, double y, double heading) {
   if (shape < 0 || (size_t)shape >= self->world.obstacles || bad_pose(x, y, heading)) return SIM_BAD_ARGUMENT;
   if (!world_place_obstacle(&self->world, (size_t)shape, x, y, heading)) return SIM_NOT_FREE;
-  const uint64_t words[] = {input_of_double(x), input_of_double(y), input_of_double(heading)};
-  sim_note(self, shape, INPUT_SHAPE, words, 3, NULL, 0);
   const mover *m = &self->movers[shape];
   const sim_shift row = {(double)self->world_at / BOARD_CLOCK_HZ, shape, m->shift_x, m->shift_y, m->shift_heading};
   if (self->record_cycles > 0) buffer_append(&self->shifts, &row, sizeof row);
@@ -64,8 +60,6 @@ static int take_pin(robot *r, uint8_t pin) {
 int sim_drive(sim *self, int number, uint64_t at, uint8_t pin, uint8_t level) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || bad_pin(pin) || level > BOARD_RELEASED) return SIM_BAD_ARGUMENT;
-  const uint64_t words[] = {at, pin, level};
-  sim_note(self, number, INPUT_DRIVE, words, 3, NULL, 0);
   const int pulled_up = take_pin(r, pin);
   for (int i = 0; i < r->waves; i++) {
     if (r->wave[i].pin == pin) r->wave[i].end = 0;
@@ -84,8 +78,6 @@ int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t 
   if (i == r->waves) i = 0;
   while (i < r->waves && r->wave[i].pin != pin && r->wave[i].next <= r->wave[i].end) i++;
   if (i == WAVES_MAXIMUM) return SIM_BAD_ARGUMENT;
-  const uint64_t words[] = {pin, half_cycles, duration};
-  sim_note(self, number, INPUT_WAVE, words, 3, NULL, 0);
   take_pin(r, pin);
   if (i == r->waves) r->waves++;
   const uint64_t start = self->world_at + PART_GUARD; /* edges up to there are queued already */
@@ -113,8 +105,6 @@ int sim_hold_whisker(sim *self, int number, uint8_t pin, int held) {
   for (int i = 0; i < r->part_count; i++) {
     whisker *w = whisker_of(r->parts[i]);
     if (w == NULL || w->part.pins[0].pin != pin) continue;
-    const uint64_t words[] = {pin, (uint64_t)(int64_t)held};
-    sim_note(self, number, INPUT_WHISKER, words, 2, NULL, 0);
     whisker_hold(w, held);
     return SIM_OK;
   }
@@ -131,8 +121,6 @@ int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
     pings++;
   }
   if (pings == 0) return SIM_BAD_ARGUMENT;
-  const uint64_t word = (uint64_t)echo_cycles;
-  sim_note(self, number, INPUT_PING, &word, 1, NULL, 0);
   return SIM_OK;
 }
 
@@ -148,16 +136,12 @@ int sim_unplug(sim *self, int number, uint8_t pin, int unplugged) {
     }
   }
   if (parts == 0) return SIM_BAD_ARGUMENT;
-  const uint64_t words[] = {pin, unplugged != 0};
-  sim_note(self, number, INPUT_UNPLUG, words, 2, NULL, 0);
   return SIM_OK;
 }
 
 int sim_set_supply(sim *self, int number, double volts) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || !(volts >= 0.0) || !isfinite(volts)) return SIM_BAD_ARGUMENT;
-  const uint64_t word = input_of_double(volts);
-  sim_note(self, number, INPUT_SUPPLY, &word, 1, NULL, 0);
   r->held_supply = volts / BOARD_NOMINAL_VOLTS;
   robot_update_supply(r);
   return SIM_OK;
@@ -168,9 +152,6 @@ int sim_set_brown_out(sim *self, int number, const brown_out_parameters *paramet
   const brown_out_parameters *p = parameters;
   if (r == NULL || !(p->reset_v >= 0.0 && p->reset_v < p->erratic_v && p->hysteresis_v >= 0.0)) return SIM_BAD_ARGUMENT;
   if (!(p->upsets_per_s >= 0.0)) return SIM_BAD_ARGUMENT;
-  const uint64_t words[] = {input_of_double(p->reset_v), input_of_double(p->hysteresis_v),
-                            input_of_double(p->erratic_v), input_of_double(p->upsets_per_s)};
-  sim_note(self, number, INPUT_BROWN_OUT, words, 4, NULL, 0);
   r->brown_out.parameters = *p;
   return SIM_OK;
 }
@@ -178,8 +159,6 @@ int sim_set_brown_out(sim *self, int number, const brown_out_parameters *paramet
 int sim_reset(sim *self, int number, int cause) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || cause < BOARD_RESET_POWER || cause > BOARD_RESET_WATCHDOG) return SIM_BAD_ARGUMENT;
-  const uint64_t word = (uint64_t)cause;
-  sim_note(self, number, INPUT_RESET, &word, 1, NULL, 0);
   r->reset_at = self->now;
   r->board->op->reset(r->board, (board_reset_cause)cause);
   return SIM_OK;
@@ -187,13 +166,9 @@ int sim_reset(sim *self, int number, int cause) {
 
 /* ---- memory -------------------------------------------------------------------------------------------------------- */
 
-static int write_cells(sim *self, int number, input_kind kind, uint8_t *cells, size_t size, uint32_t address,
-                       const uint8_t *bytes, size_t count) {
+static int write_cells(uint8_t *cells, size_t size, uint32_t address, const uint8_t *bytes, size_t count) {
   if (cells == NULL || address > size || count > size - address) return SIM_BAD_ARGUMENT;
-  if (count == 0) return SIM_OK;
-  const uint64_t word = address;
-  sim_note(self, number, kind, &word, 1, bytes, count);
-  memcpy(cells + address, bytes, count);
+  if (count > 0) memcpy(cells + address, bytes, count);
   return SIM_OK;
 }
 
@@ -204,20 +179,18 @@ static board_eeprom *eeprom_of(const robot *r) {
 int sim_write_eeprom(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
   const board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
   uint8_t *cells = eeprom == NULL ? NULL : eeprom->bytes;
-  return write_cells(self, number, INPUT_EEPROM, cells, BOARD_EEPROM_SIZE, address, bytes, count);
+  return write_cells(cells, BOARD_EEPROM_SIZE, address, bytes, count);
 }
 
 int sim_write_memory(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
   const robot *r = sim_robot_with_board(self, number);
   uint8_t *cells = r == NULL ? NULL : r->board->op->extension(r->board, BOARD_DATA);
-  return write_cells(self, number, INPUT_MEMORY, cells, BOARD_DATA_SIZE, address, bytes, count);
+  return write_cells(cells, BOARD_DATA_SIZE, address, bytes, count);
 }
 
 int sim_damage_eeprom(sim *self, int number, int damage, uint8_t garbage) {
   board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
   if (eeprom == NULL || damage < BOARD_DAMAGE_ERASED || damage > BOARD_DAMAGE_GARBAGE) return SIM_BAD_ARGUMENT;
-  const uint64_t words[] = {(uint64_t)damage, garbage};
-  sim_note(self, number, INPUT_DAMAGE, words, 2, NULL, 0);
   eeprom->damage = (board_damage)damage;
   eeprom->garbage = garbage;
   return SIM_OK;

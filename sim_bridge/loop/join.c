@@ -46,7 +46,6 @@ void sim_destroy(sim *self) {
   if (self == NULL) return;
   for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
   free(self->robots);
-  buffer_free(&self->inputs);
   buffer_free(&self->waits);
   buffer_free(&self->shifts);
   free(self);

@@ -84,7 +84,6 @@ int sim_run_until(sim *self, uint64_t deadline);
 /* From that cycle on bytes from the robot end a run (2^64 - 1, as at first: never). `sim_speaks` says whether they have
  * come, and its line has been idle since. When a robot is heard does not depend on the other listeners. */
 int sim_listen(sim *self, int robot, uint64_t from);
-uint64_t sim_listens(const sim *self, int robot);
 int sim_speaks(const sim *self, int robot);
 
 /* Listens to a robot when `quiet` cycles from now have passed, and runs for `cycles` at most. Returns as
@@ -103,27 +102,6 @@ uint64_t sim_last_byte(const sim *self, int robot);
 /* Bytes to and from a robot's board. */
 int sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
 size_t sim_receive(sim *self, int robot, uint8_t *bytes, size_t capacity);
-
-/* All that has come from outside since power-on (bytes sent and whatever below changes something), with its cycles; NULL
- * where some of it is missing, or a board has crashed. Good until the next input. */
-const uint8_t *sim_inputs(const sim *self, size_t *count);
-
-/* Notes no input from now on, and forgets those so far. */
-void sim_keep_no_inputs(sim *self);
-
-/* Plays such inputs again, from byte `at` of them on, which goes on with them, and runs until that cycle; the simulation
- * has the same arena, robots, boards and firmware, and has heard nothing else. Returns 0, 1 + the number of a robot whose
- * board crashed, or SIM_BAD_ARGUMENT where they are no inputs of such a simulation. */
-int sim_replay(sim *self, const uint8_t *inputs, size_t size, size_t *at, uint64_t until);
-
-/* Forgets what was received of that robot but for the newest bytes. */
-void sim_forget_received(sim *self, int robot, size_t keep);
-
-/* Bytes that were received and not yet read. */
-size_t sim_waiting(const sim *self, int robot);
-
-/* Of all that can be had of the state: bodies, supplies, what boards did, counted and hold. */
-uint64_t sim_state_hash(const sim *self);
 
 /* Truth. The pointers stay good until the next run. */
 void sim_body(const sim *self, int robot, body_state *out);

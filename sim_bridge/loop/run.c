@@ -167,10 +167,7 @@ int sim_run_until(sim *self, uint64_t deadline) {
     for (int i = 0; i < self->robot_count; i++) {
       robot *r = self->robots[i];
       if (r->board == NULL) continue;
-      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) {
-        self->crashed = 1;
-        return 1 + r->number;
-      }
+      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) return 1 + r->number;
       take_bytes(r);
     }
     self->now = target;
@@ -184,11 +181,6 @@ int sim_listen(sim *self, int number, uint64_t from) {
   if (r == NULL) return SIM_BAD_ARGUMENT;
   r->listen_from = from;
   return SIM_OK;
-}
-
-uint64_t sim_listens(const sim *self, int number) {
-  const robot *r = sim_robot(self, number);
-  return r == NULL ? SIM_NEVER : r->listen_from;
 }
 
 int sim_run_for(sim *self, int number, uint64_t cycles, uint64_t quiet) {
@@ -209,7 +201,6 @@ int sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || count > UINT32_MAX) return SIM_BAD_ARGUMENT;
   if (count == 0) return SIM_OK;
-  sim_note(self, number, INPUT_SEND, NULL, 0, bytes, count);
   r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
   return SIM_OK;
 }
@@ -217,8 +208,6 @@ int sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
 int sim_line_rate(sim *self, int number, uint32_t baud) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || baud == 0) return SIM_BAD_ARGUMENT;
-  const uint64_t word = baud;
-  sim_note(self, number, INPUT_LINE_RATE, &word, 1, NULL, 0);
   r->idle = line_idle_cycles(baud);
   r->board->op->line_rate(r->board, baud);
   return SIM_OK;
@@ -227,11 +216,6 @@ int sim_line_rate(sim *self, int number, uint32_t baud) {
 uint64_t sim_last_byte(const sim *self, int number) {
   const robot *r = sim_robot(self, number);
   return r == NULL ? 0 : r->last_byte;
-}
-
-size_t sim_waiting(const sim *self, int number) {
-  const robot *r = sim_robot(self, number);
-  return r == NULL ? 0 : r->received.count;
 }
 
 size_t sim_receive(sim *self, int number, uint8_t *bytes, size_t capacity) {

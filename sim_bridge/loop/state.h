@@ -1,6 +1,5 @@
 /* state.h: what the files of the loop know of a simulation: run.c runs it, join.c builds it, truth.c reads
- * it, interventions.c lays a test's hands on it, inputs.c notes what comes from outside and plays it again,
- * vehicle.c has the robots without boards.
+ * it, interventions.c lays a test's hands on it, vehicle.c has the robots without boards.
  */
 #ifndef LOOP_STATE_H
 #define LOOP_STATE_H
@@ -76,38 +75,7 @@ struct sim {
   mover_clock clocks[SIM_OBSTACLES_MAXIMUM];
   buffer waits;  /* rows of sim_wait */
   buffer shifts; /* rows of sim_shift */
-  buffer inputs; /* from outside, as inputs.c notes them */
-  int crashed;   /* 1: a board has */
 };
-
-/* What comes from outside, and what its words and bytes are in the notes; the numbers are in saved simulations. */
-typedef enum {
-  INPUT_SEND = 1,      /* bytes */
-  INPUT_LINE_RATE = 2, /* bit/s */
-  INPUT_PLACE = 3,     /* x, y, heading */
-  INPUT_DRIVE = 4,     /* cycle, pin, level */
-  INPUT_WAVE = 5,      /* pin, half period, duration */
-  INPUT_WHISKER = 6,   /* pin, held */
-  INPUT_PING = 7,      /* cycles of the echo */
-  INPUT_SUPPLY = 8,    /* volts */
-  INPUT_BROWN_OUT = 9, /* the four parameters */
-  INPUT_RESET = 10,    /* cause */
-  INPUT_EEPROM = 11,   /* address; bytes */
-  INPUT_DAMAGE = 12,   /* damage, garbage */
-  INPUT_MEMORY = 13,   /* address; bytes */
-  INPUT_SIGNALS = 14,  /* left, right */
-  INPUT_UNPLUG = 15,   /* pin, unplugged */
-  INPUT_SHAPE = 16,    /* x, y, heading; its number is that of a moving shape */
-} input_kind;
-
-#define INPUT_WORDS 4 /* at most */
-
-/* Notes an input of now. */
-void sim_note(sim *self, int number, input_kind kind, const uint64_t *words, size_t count, const uint8_t *bytes,
-              size_t size);
-
-/* The bits of a double. */
-uint64_t input_of_double(double value);
 
 /* The robot of that number, or NULL. */
 robot *sim_robot(const sim *self, int number);

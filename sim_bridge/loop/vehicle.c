@@ -38,13 +38,7 @@ int sim_add_vehicle(sim *self, int number, const vehicle_model *model, double x,
 int sim_signals(sim *self, int number, double left, double right) {
   robot *r = sim_robot(self, number);
   if (r == NULL || r->vehicle == NULL || !isfinite(left) || !isfinite(right)) return SIM_BAD_ARGUMENT;
-  vehicle_state *s = &r->vehicle->worlds[0].state;
-  if (s->flag != VEHICLE_RUNS) return SIM_OK;
-  const double before[2] = {s->signals[0], s->signals[1]};
-  (void)vehicles_send(r->vehicle, 0, left, right);
-  if (s->signals[0] == before[0] && s->signals[1] == before[1]) return SIM_OK;
-  const uint64_t words[] = {input_of_double(left), input_of_double(right)};
-  sim_note(self, number, INPUT_SIGNALS, words, 2, NULL, 0);
+  if (r->vehicle->worlds[0].state.flag == VEHICLE_RUNS) (void)vehicles_send(r->vehicle, 0, left, right);
   return SIM_OK;
 }
 

@@ -21,10 +21,7 @@ void *buffer_room(buffer *self, size_t size) {
 
 void buffer_append(buffer *self, const void *bytes, size_t size) {
   void *room = buffer_room(self, size);
-  if (room == NULL) {
-    self->lost += size;
-    return;
-  }
+  if (room == NULL) return;
   memcpy(room, bytes, size);
   self->count += size;
 }

@@ -1,6 +1,6 @@
 /* logs.h: what a run leaves behind: growing arrays of bytes, and the board's newest output edges.
  *
- * Nothing here fails in the middle of a step: what finds no memory is left out and counted in `lost`.
+ * Nothing here fails in the middle of a step: what finds no memory is left out.
  */
 #ifndef PARTS_LOGS_H
 #define PARTS_LOGS_H
@@ -55,7 +55,6 @@ typedef struct {
 typedef struct {
   uint8_t *data;
   size_t start, count, capacity;
-  size_t lost; /* bytes for which there was no memory */
 } buffer;
 
 /* Room for `size` more bytes behind what is there, or NULL. */

@@ -26,16 +26,13 @@ def new_sim(request: BoardRequest, step_s: float) -> Sim:
     if unknown := request.options.keys() - {"world_step_s"}:
         raise BoardError(f"there is no option {min(unknown)!r} of a simulated world; expected world_step_s")
     step_cycles = round(float(request.options.get("world_step_s", step_s)) * CLOCK_HZ)
-    sim = Sim(
+    return Sim(
         load_arena(request.arena),
         seed=request.seed,
         noise=request.noise,
         record=request.record,
         step_cycles=step_cycles,
     )
-    if not request.saveable:
-        sim.keep_no_inputs()
-    return sim
 
 
 class Pace:

@@ -125,27 +125,6 @@ def test_a_robot_with_a_board_is_pinched_and_taken_away(disc: bool) -> None:
     check(truth_of(robot.robot), arena, seen)
 
 
-def test_saved_and_restored_in_between() -> None:
-    """Restored while it waits, the world gives the same path and goes on with the same bits."""
-
-    def build() -> Sim:
-        sim = Sim(press())
-        sim.add(None, load_robot("arsim"))
-        return sim
-
-    here, there = build(), build()
-    here.run(round(PINCHED_S * 1000) * MS)
-    there.run(100 * MS)
-    there.restore(here.save())
-    for sim in (here, there):
-        sim.robot(0).signals(1.0, 1.0)
-        sim.run(round(FREE_S * 1000) * MS)
-    (ours,), (theirs,) = here.lateness(), there.lateness()
-    assert np.array_equal(ours.time, theirs.time) and np.array_equal(ours.waited, theirs.waited)
-    assert ours.waited[-1] > 0.5 and there.hash() == here.hash()
-    assert there.save() == here.save()
-
-
 def test_without_a_record_it_is_told_by_the_path() -> None:
     sim = Sim(press(), record=False)
     sim.add(None, load_robot("arsim"))

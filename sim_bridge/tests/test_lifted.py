@@ -32,7 +32,6 @@ from boebot.record.truth import shifts, track_of
 from boebot.robot import Robot
 from boebot.running import runner, together
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, scripted, square
 
@@ -227,35 +226,6 @@ def test_the_plan_has_shapes_where_they_were() -> None:
     (later,) = floor_plan(arena, 3, 3.5, sim.lateness(), sim.shifts()).moving
     assert later.pose(3.2) == pytest.approx(shape.pose(3.2), abs=1e-9)
     assert robot.truth()["time"][-1] > 4.9
-
-
-def test_saved_and_restored_with_all_that_was_moved() -> None:
-    def build() -> Sim:
-        sim = Sim(street())
-        sim.add(None, ARSIM).signals(0.3, 0.2)
-        sim.add(native_board(native_library(SHIELDBOT.pin_map)), SHIELDBOT, pose=(2, 0, 0))
-        return sim
-
-    here, there = build(), build()
-    run(here, 0.5)
-    here.robot(0).place(-1, -1, 1)
-    here.robot(1).place(1, -1, 1)
-    here.place_shape(0, (0, 3, 1))
-    run(here, 0.3)
-    assert here.shifts()
-    there.restore(here.save())
-    for sim in (here, there):
-        run(sim, 0.5)
-        sim.place_shape(0, (0, -3, 1))
-        run(sim, 0.5)
-    assert there.save() == here.save() and there.hash() == here.hash()
-    assert there.shapes() == here.shapes() and there.shifts() == here.shifts()
-    for number in (0, 1):
-        for ours, theirs in zip(here.robot(number).truth().values(), there.robot(number).truth().values(), strict=True):
-            assert np.array_equal(ours, theirs)
-    elsewhere = build()
-    run(elsewhere, 1.8)
-    assert elsewhere.save() != here.save()
 
 
 # ---- whole runs ------------------------------------------------------------------------------------------------------

@@ -24,7 +24,6 @@ from boebot.record.result import RunResult
 from boebot.robot import Robot
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
-from sim_bridge.saved import SavedStateError
 from sim_bridge.sim import TICK_CYCLES, Sim, SimRobot
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import Vehicle
@@ -276,27 +275,3 @@ def test_wrong_wishes_are_refused() -> None:
     sim.run(TICK_CYCLES)
     with pytest.raises(BoardError, match="runs already"):
         sim.add(None, ARSIM, pose=(3.0, 0.0, 0.0))
-
-
-def test_it_is_saved_with_its_neighbours_and_goes_on_identically() -> None:
-    def build(x: float = 0.6) -> Sim:
-        sim = Sim(field(), seed=3)
-        sim.add(None, ARSIM, pose=(0.0, 0.0, 0.0))
-        sim.add(native_board(native_library(SHIELDBOT.pin_map)), SHIELDBOT, pose=(x, 0.0, math.pi))
-        sim.add(None, ARSIM, pose=(0.0, 0.9, -1.0))
-        return sim
-
-    here, there = build(), build()
-    for step in range(30):
-        here.robot(0).signals(0.3, 0.3 + 0.01 * step)
-        here.robot(2).signals(0.4, 0.4)
-        here.run(3 * MS + 5)
-    state = here.save()
-    there.restore(state)
-    for sim in (here, there):
-        sim.robot(0).signals(0.5, -0.2)
-        sim.run(CLOCK_HZ)
-    assert there.hash() == here.hash() and there.robot(2).readings() == here.robot(2).readings()
-    assert there.save() == here.save()
-    with pytest.raises(SavedStateError, match="robot 1, with its description"):
-        build(0.7).restore(state)

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -47,7 +48,7 @@ def mixed(word: int) -> int:
 
 
 def numbers_of(state: bytes) -> bytes:
-    return saved.decode(state, saved.World)[1]
+    return saved.decode(state)[1]
 
 
 def words_of(state: bytes) -> list[int]:
@@ -318,6 +319,13 @@ def test_switches_battery_whisker_and_table_are_the_models() -> None:
     assert refused(first, others) == 3
 
 
+def test_another_format_is_refused() -> None:
+    heading, numbers = saved.decode(driven().save())
+    other = saved.encode(msgspec.structs.replace(heading, format=saved.FORMAT - 1), numbers)
+    with pytest.raises(SavedStateError, match=f"in format {saved.FORMAT - 1}; expected format {saved.FORMAT}"):
+        driven().restore(other)
+
+
 def test_another_size_of_memory_is_refused() -> None:
     large = Batch(model(), load_arena("arsim"), [[0, 0, 0]], [3], state_bytes=640)
     with pytest.raises(SavedStateError, match="expected the same state_bytes"):
@@ -352,7 +360,7 @@ def test_a_spoilt_state_with_the_right_checksum_is_refused_or_goes_on_in_numbers
     """Somebody who makes states by hand gets an error or a world, never a crash or what is no number."""
     vehicle = driven(20)
     before = vehicle.hash()
-    heading, words = saved.decode(vehicle.save(), saved.World)[0], words_of(vehicle.save())
+    heading, words = saved.decode(vehicle.save())[0], words_of(vehicle.save())
     for _ in range(data.draw(st.integers(1, 4))):
         words[data.draw(st.integers(0, len(words) - 1))] = data.draw(spoilt_words)
     state = saved.encode(heading, struct.pack(f"<{len(words)}Q", *words))

@@ -92,7 +92,7 @@ def restore(who: str, handle: Any, index: int, model: VehicleModel, arena: Arena
     Raises:
         SavedStateError: it is of another model, format, arena, size of the brain's memory, or damaged.
     """
-    heading, numbers = saved.decode(state, saved.World)
+    heading, numbers = saved.decode(state)
     here = _heading(model, arena, state_bytes)
     if heading.model != here.model:
         raise SavedStateError(

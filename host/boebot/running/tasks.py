@@ -213,7 +213,6 @@ def _task(member: Member, request: Request, number: int) -> Task:
         arena=None if request.arena is None else str(request.arena),
         seed=int(request.seed),
         realtime=request.realtime,
-        saveable=False,
         record=request.record,
         pins=request.pins,
         start_pose=_pose(member.pose),
