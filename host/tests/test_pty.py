@@ -38,7 +38,7 @@ def test_run_over_a_port() -> None:
         assert served.peer.command == (0.0, 0.0), "the motors are stopped at the end"
     assert result.truth is None and result.true_contacts is None and result.whisker_touches == 0
     assert result.lost_frames == result.bad_frames == result.dead_man_stops == 0
-    assert 0.5 < result.wall_time < 2.0, "at the pace of the board, which catches up where this computer was busy"
+    assert 0.5 < (result.wall_time or 0.0) < 2.0, "at the pace of the board, which catches up"
     assert result.true_distance is None and (result.odometry_distance or 0.0) > 0.05
 
 
@@ -66,8 +66,8 @@ def test_late_brain_skips_steps_and_says_so() -> None:
 
     with pty(Peer()) as served:
         result = boebot.run(slow, on=served.path, seconds=0.8, step_timeout=10)
-    assert result.late_steps >= 3
-    assert result.steps + result.late_steps >= 14
+    assert (result.late_steps or 0) >= 3
+    assert result.steps + (result.late_steps or 0) >= 14
 
 
 def test_silent_port_is_given_up_in_time() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from collections.abc import Callable
@@ -357,9 +358,32 @@ def test_mended_record_of_one_whose_end_is_damaged_still_says_so(
     assert boebot(capsys, "run", "--again", str(run / "record-mended.mcap"))[0] == 1
 
 
+def test_what_only_the_end_of_a_record_knows_is_not_known_without_it(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path
+) -> None:
+    """Cut, or with an end that is damaged; also once it is mended."""
+    unknown = {"late_steps", "lost_frames", "bad_frames", "resets", "sessions_lost"}
+    changes: dict[str, Callable[[bytearray], object]] = {
+        "cut": lambda data: data.__delitem__(slice(chunk(data, 6), None)),
+        "damaged": lambda data: data.__setitem__(data.rindex(b'"steps": 40') + 9, ord("5")),
+    }
+    for name, change in changes.items():
+        run = copied(many, tmp_path / name, change)
+        boebot(capsys, "report", str(run), "--mend", "-q")
+        for record in (run, run / "record-mended.mcap"):
+            said = json.loads(boebot(capsys, "report", str(record), "--json")[1])
+            assert {said[figure] for figure in unknown} | set(said["wall_clock"].values()) == {None}
+            summary = json.loads((run / "summary.json").read_text())
+            assert {summary[figure] for figure in unknown} == {None} and summary["counters"] == {}
+            assert said["overruns"] == 0, "its telemetry says that"
+    whole = json.loads(boebot(capsys, "report", str(copied(many, tmp_path / "whole", len)), "--json")[1])
+    assert {whole[figure] for figure in unknown} == {0} and None not in whole["wall_clock"].values()
+
+
 def test_exit_codes_of_what_is_no_record(capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path) -> None:
     """2 in all commands; 0 for one that is cut; of one whose beginning and end are damaged nothing is known: 1."""
     (tmp_path / "notes").write_text("mine")
+    os.mkfifo(tmp_path / "pipe")
 
     def no_names(data: bytearray) -> None:
         for name in (b"begin.json", b"end.json"):
@@ -371,7 +395,12 @@ def test_exit_codes_of_what_is_no_record(capsys: pytest.CaptureFixture[str], tmp
     damaged, short = copied(many, tmp_path / "damaged", no_names), copied(many, tmp_path / "short", cut)
     old = copied(many, tmp_path / "old", lambda data: None)
     brain = ("--brain", str(many.parent / "mine.py"))
-    for folder, expected in {tmp_path / "notes": 2, tmp_path / "nowhere": 2, damaged: 1, short: 0, old: 0}.items():
+    for folder, expected in {
+        **dict.fromkeys((tmp_path / name for name in ("notes", "nowhere", "pipe")), 2),
+        damaged: 1,
+        short: 0,
+        old: 0,
+    }.items():
         for command in (("report", "{}"), ("plot", "{}", "tick"), ("replay", "{}", *brain), ("run", "--again", "{}")):
             asked = [str(folder) if word == "{}" else word for word in command]
             if command[0] == "plot":
@@ -451,6 +480,9 @@ def test_link_in_the_folder_of_a_stranger_is_not_followed(
         (run / name).symlink_to(mine)
     assert boebot(capsys, "report", str(run), "--mend")[0] == 0
     assert mine.read_text() == "mine" and not (run / "summary.json").is_symlink()
+    (run / "robot-2").symlink_to(tmp_path)
+    code, _, err = boebot(capsys, "report", str(run), "--mend")
+    assert code == 1 and "'robot-2' in" in err and "is a link to elsewhere; expected a folder, or nothing" in err
 
 
 @pytest.mark.parametrize("data", [b"\x09" + bytes(16), b"short"])

@@ -48,4 +48,4 @@ def lost_frames() -> float:
     result = execute(Request.single("wander", arena="room", on="avr", seconds=600.0))
     if result.error is not None:
         raise result.error
-    return float(result.lost_frames + result.bad_frames)
+    return float((result.lost_frames or 0) + (result.bad_frames or 0))

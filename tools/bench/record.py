@@ -21,7 +21,7 @@ def wall_s(record: bool) -> float:
     result = execute(request)
     if result.error is not None:
         raise result.error
-    return result.wall_time
+    return result.wall_time or 0.0
 
 
 @figure(

@@ -19,7 +19,7 @@ def times_real_time(on: str, seconds: float, period: float) -> float:
     result = execute(Request.single("wander", arena=ARENA, on=on, seconds=seconds, period=period))
     if result.error is not None:
         raise result.error
-    return float(result.run_time / result.wall_time)
+    return result.real_time_factor or 0.0
 
 
 @figure(

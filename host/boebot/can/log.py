@@ -413,10 +413,6 @@ class _LogReader:
             world=None,
             clock_offset=0.0,
             steps=count,
-            late_steps=0,
-            resets=0,
             lost_frames=sum(end.lost for end in self._ends),
-            bad_frames=0,
             run_time=times[last],
-            wall_time=0.0,
         )

@@ -249,7 +249,7 @@ def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, see
     result = execute(Request.single(loaded, robot=robot, seconds=5.0, seed=seed, force_timing=True))
     if result.error is not None:
         raise result.error
-    return result.longest_step, loaded.period
+    return result.longest_step or 0.0, loaded.period
 
 
 def _board_times(report: Report) -> Any:

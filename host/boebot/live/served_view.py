@@ -158,12 +158,7 @@ class ServedView:
             world=session.arena,
             clock_offset=0.0,
             steps=0,
-            late_steps=0,
-            resets=0,
-            lost_frames=0,
-            bad_frames=0,
             run_time=0.0,
-            wall_time=0.0,
             without=request.without,
             imperfections=request.imperfections,
         )

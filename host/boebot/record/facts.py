@@ -42,13 +42,13 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     tick: float
     clock_offset: float
     steps: int
-    late_steps: int
-    resets: int
-    lost_frames: int
-    bad_frames: int
+    late_steps: int | None
+    resets: int | None
+    lost_frames: int | None
+    bad_frames: int | None
     run_time: float
-    wall_time: float
-    sessions_lost: int
+    wall_time: float | None
+    sessions_lost: int | None
     link: dict[str, dict[str, int]]
     notices: list[str]
     watchdog_resets: list[WatchdogReset]
@@ -56,8 +56,8 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     without: list[str]
     imperfections: dict[str, float]
     odometry_source: str | None
-    long_steps: int
-    longest_step: float
+    long_steps: int | None
+    longest_step: float | None
     unrealisable: str | None
     error: str | None
     interrupted: bool

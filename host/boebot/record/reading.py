@@ -95,7 +95,8 @@ def _opened(path: str | Path) -> tuple[Path, RecordReader]:
     try:
         return file, RecordReader(regular(file).open("rb"), str(file)).read()
     except OSError as error:
-        what = "there is no record of a run" if error.errno == errno.ENOENT else error.strerror or error
+        what = str(error.strerror or error).partition(";")[0]
+        what = "there is no record of a run" if error.errno == errno.ENOENT else what
         raise NoRecordError(f"{file}: {what}; expected the folder of a run, or its {RECORD}") from None
 
 
@@ -130,14 +131,17 @@ def _arena(description: Any, file: Path) -> Arena:
 
 
 def _lack(result: RunResult, reader: RecordReader, file: Path, lost: Sequence[str], *, ends_there: bool) -> None:
-    """Notes what a result lacks. `ends_there`: what the end of the record would have said is taken from its streams, as
-    far as they say it."""
+    """Notes what a result lacks. `ends_there`: what the end of the record would have said is taken from its streams;
+    what they do not say is not known."""
     record, found = result.record, reader.found
     times = record.times_of("telemetry") if record.count("telemetry") else record.times_of("readings")
     end_s = float(times[-1]) if len(times) else 0.0
     if ends_there:
         result.run_time, result.steps = end_s, record.count("command")
         result.clock_offset = record.clock_offset
+        result.link, result.counters = {}, {}
+        result.late_steps = result.long_steps = result.resets = result.sessions_lost = None
+        result.lost_frames = result.bad_frames = result.wall_time = result.longest_step = None
         if lost and result.layout is None and not record.count("clock"):
             result.world = None  # at which of its times the truth was is lost
     cut = (

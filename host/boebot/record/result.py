@@ -50,13 +50,14 @@ class RunResult:
         tick: seconds from one control tick to the next.
         error: why the run ended before its time, or None.
         world: the arena, where somebody knows it (simulated runs).
-        steps: steps of the brain. late_steps: brain periods that passed without one (in real time only).
+        steps: steps of the brain. late_steps: brain periods that passed without one (in real time only). This and what
+            else is counted up to the run's end is None where it is not known, as of a record that is cut.
         long_steps: steps that took longer than the brain's period, by the wall clock, in any run. longest_step: the
             longest of all, in s of the wall clock.
         unrealisable: why sensors, period and line do not go together in time, where the run was forced; else None.
         resets: times the board restarted during the run. sessions_lost: times it had to be opened and armed again,
-            those included.
-        lost_frames, bad_frames: telemetry frames that never came; frames that came damaged.
+            those included. lost_frames, bad_frames: telemetry frames that never came; frames that came damaged. None
+            without a board.
         run_time: length of the run by the board's clock. wall_time: by the wall clock.
         link: what the two ends of the link counted, "host" and "board".
         without: imperfections of the simulated robot that were switched off. imperfections: magnitudes of others that
@@ -86,13 +87,13 @@ class RunResult:
     world: Arena | None
     clock_offset: float
     steps: int
-    late_steps: int
-    resets: int
-    lost_frames: int
-    bad_frames: int
     run_time: float
-    wall_time: float
-    sessions_lost: int = 0
+    late_steps: int | None = None
+    resets: int | None = None
+    lost_frames: int | None = None
+    bad_frames: int | None = None
+    wall_time: float | None = None
+    sessions_lost: int | None = None
     identity: Identity | None = None
     link: dict[str, dict[str, int]] = field(default_factory=dict)
     notices: list[str] = field(default_factory=list)
@@ -105,8 +106,8 @@ class RunResult:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     made_of: MadeOf | None = None
     odometry_source: str | None = None
-    long_steps: int = 0
-    longest_step: float = 0.0
+    long_steps: int | None = None
+    longest_step: float | None = None
     unrealisable: str | None = None
 
     def __repr__(self) -> str:
@@ -320,7 +321,7 @@ class RunResult:
     @property
     def real_time_factor(self) -> float | None:
         """How many times faster than the wall clock the run was; None: not known, as of a record that is cut."""
-        return self.run_time / self.wall_time if self.wall_time > 0 else None
+        return self.run_time / self.wall_time if self.wall_time else None
 
     @property
     def slow_reading_age(self) -> float | None:
@@ -359,13 +360,13 @@ class RunResult:
             "ticks": self.ticks,
             "slow_readings": None if slow_age is None else self.record.count(DevicesTelemetry.NAME),
             "slow_reading_age_s": _rounded(slow_age, 6),
-            "lost_frames": self.lost_frames if on_board else None,
-            "bad_frames": self.bad_frames if on_board else None,
+            "lost_frames": self.lost_frames,
+            "bad_frames": self.bad_frames,
             "overruns": self.overruns if on_board else None,
             "dead_man_stops": self.dead_man_stops if on_board else None,
             "fallback_takeovers": self.fallback_takeovers if on_board else None,
-            "resets": self.resets if on_board else None,
-            "sessions_lost": self.sessions_lost if on_board else None,
+            "resets": self.resets,
+            "sessions_lost": self.sessions_lost,
             "touched": self.touched,
             "hung_at": hangs.places(self.watchdog_resets),
             "firmware": None if identity is None else text(identity.firmware_version),
@@ -377,12 +378,11 @@ class RunResult:
 
     def wall_clock(self) -> dict[str, Any]:
         """Figures by the wall clock of the computer, in which runs that are equal differ; None: not known."""
-        is_known = self.wall_time > 0
         return {
-            "wall_time_s": round(self.wall_time, 3) if is_known else None,
+            "wall_time_s": _rounded(self.wall_time, 3),
             "real_time_factor": _rounded(self.real_time_factor, 2),
-            "long_steps": self.long_steps if is_known else None,
-            "longest_step_s": round(self.longest_step, 6) if is_known else None,
+            "long_steps": self.long_steps,
+            "longest_step_s": _rounded(self.longest_step, 6),
         }
 
     @property

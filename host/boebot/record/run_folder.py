@@ -57,12 +57,16 @@ class RunFolder:
             self._lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             there = {entry.name for entry in path.iterdir()}
+            links = sorted(name for name in there if _ROBOT.match(name) and (path / name).is_symlink())
         except BlockingIOError:
             self.close()
             raise BoebotError(f"another run writes to {path} now; expected a folder for this one alone") from None
         except OSError as error:
             self.close()
             raise unwritable(path, error) from None
+        if links:
+            self.close()
+            raise BoebotError(f"{links[0]!r} in {path} is a link to elsewhere; expected a folder, or nothing")
         if there and RECORD not in there:
             self.close()
             raise BoebotError(
@@ -139,4 +143,4 @@ def unwritable(folder: Path, error: OSError) -> BoebotError:
 
 
 def _is_of_robot(path: Path) -> bool:
-    return _ROBOT.match(path.name) is not None and path.is_dir() and not path.is_symlink()
+    return _ROBOT.match(path.name) is not None and path.is_dir()
