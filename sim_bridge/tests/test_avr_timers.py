@@ -464,7 +464,7 @@ Writes = list[tuple[str, int]]
 
 def place(register: str) -> str:
     """Its address in the data space; avr_program.PREAMBLE has those of IN and OUT without the 0x20 in front of them."""
-    return f"{register} + 0x20" if "0" in register or register == "GTCCR" else register
+    return f"{register} + 0x20" if "0" in register or register in ("GTCCR", "TIFR1") else register
 
 
 def writes(rows: Writes) -> str:
@@ -472,16 +472,19 @@ def writes(rows: Writes) -> str:
     return "".join(f" ldi r24, {value}\n sts {place(name)}, r24\n" for name, value in rows)
 
 
-def turning(timer: int, mode: int, before: Writes, behind: Writes, changes: dict[int, Writes]) -> list[int]:
-    """The count, once in each count of 64 cycles, of a timer that starts at 0. Written is something before its mode is
-    set and behind it, and behind the samples of some numbers."""
+def turning(
+    timer: int, mode: int, before: Writes, behind: Writes, changes: dict[int, Writes], *, flags: bool = False
+) -> list[int]:
+    """The count, or the flags, once in each count of 64 cycles, of a timer that starts at 0. Written is something
+    before its mode is set and behind it, and behind the samples of some numbers."""
+    sampled = f"TIFR{timer}" if flags else "TCNT0" if timer == 0 else "TCNT1L"
     clock = (mode & 12) << 1 | 3
     setting = [(f"TCCR{timer}A", mode & 3), (f"TCCR{timer}B", clock & ~3)]
     code = "main:\n ldi r26, 0\n ldi r27, 2\n" + writes([*before, *setting, *behind, ("GTCCR", 1)])
     code += writes([(f"TCCR{timer}B", clock)])
     for number in range(SAMPLES):
         change = changes.get(number, [])
-        code += f" lds r24, {place('TCNT0' if timer == 0 else 'TCNT1L')}\n st X+, r24\n" + writes(change)
+        code += f" lds r24, {place(sampled)}\n st X+, r24\n" + writes(change)
         code += f" .rept {64 - 4 - 3 * len(change)}\n nop\n .endr\n"
     machine = Machine(code + "1: rjmp 1b")
     machine.board.run(64 * (SAMPLES + 2))
@@ -537,3 +540,17 @@ def test_a_top_of_zero_that_is_raised_is_left() -> None:
     start = counts.index(1)
     assert start <= 5
     assert counts[start:] == [1, 2, 3, 2, 1, 0, 1, 2, 3, 2][: len(counts) - start]
+
+
+ICR1_3: Writes = [("ICR1H", 0), ("ICR1L", 3)]
+
+
+@pytest.mark.parametrize(
+    ("mode", "top"), [(5, [("OCR0A", 3)]), *((8, ICR1_3), (9, top_1(3)), (10, ICR1_3), (11, top_1(3)))]
+)
+def test_a_phase_correct_timer_overflows_where_it_leaves_bottom(mode: int, top: Writes) -> None:
+    """Figure 16-12 with BOTTOM for TOP, as its text says: at the clock at which OCR1x is updated in modes 8 and 9
+    (16.9.5). The count is 0 1 2 3 2 1 0 1 ..."""
+    timer = int(mode != PHASE)
+    flags = turning(timer, mode, top, [*top, *COUNT_0], {2: [(f"TIFR{timer}", 1)]}, flags=True)
+    assert [flag & 1 for flag in flags[:10]] == [0, 1, 1, 0, 0, 0, 0, 1, 1, 1]

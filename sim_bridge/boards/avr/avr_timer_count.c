@@ -75,8 +75,15 @@ static uint64_t nearer(uint64_t a, uint64_t b) { return a < b ? a : b; }
 /* Counts until the buffered compare values come into force (tables 15-8, 16-4): with the count that leaves TOP or BOTTOM
  * in the phase-correct modes, that reaches BOTTOM in fast PWM (figures 15-11, 16-12). */
 static uint64_t update_distance(const timer_state *t) {
-  if (!counts_down(t)) return rest_of_lap(t);
+  if (t->mode == COUNT_FAST_PWM) return rest_of_lap(t);
   return distance(t, t->mode == COUNT_PHASE_PWM ? top_of(t) : 0, false);
+}
+
+/* Counts until TOV: with the count that leaves MAX, in the phase-correct modes BOTTOM (figure 16-12, renamed as its text
+ * says; 16.9.5: with the update of OCR1x), in fast PWM TOP. */
+static uint64_t overflow_distance(const timer_state *t) {
+  if (t->mode == COUNT_FAST_PWM) return rest_of_lap(t);
+  return distance(t, counts_down(t) ? 0 : t->maximum, false);
 }
 
 static bool buffer_is_waiting(const timer_state *t) {
@@ -97,9 +104,7 @@ static uint64_t distance_to_next(const timer_state *t, uint32_t wanted) {
   bool pwm_output = t->mode == COUNT_FAST_PWM && (t->action[0] != ACTION_NONE || t->action[1] != ACTION_NONE);
   if (pwm_output) next = nearer(next, rest_of_lap(t));
   if (is_buffered(t) && buffer_is_waiting(t)) next = nearer(next, update_distance(t));
-  if (wanted & FLAG(t->vector_overflow)) {
-    next = nearer(next, is_buffered(t) ? rest_of_lap(t) : distance(t, t->maximum, false));
-  }
+  if (wanted & FLAG(t->vector_overflow)) next = nearer(next, overflow_distance(t));
   if (t->top_from == TOP_ICR && (wanted & FLAG(VECTOR_TIMER1_CAPT))) next = nearer(next, distance(t, top_of(t), false));
   return next;
 }
@@ -180,7 +185,7 @@ static void count_once(timer_state *t, uint64_t cycle) {
       level[channel] = t->action[channel] == ACTION_CLEAR;
     }
   }
-  if (is_buffered(t) ? wraps : t->count == t->maximum) raise_flag(b, t->vector_overflow);
+  if (overflow_distance(t) == 1) raise_flag(b, t->vector_overflow);
   if (t->top_from == TOP_ICR && !t->falling && t->count == top_of(t)) raise_flag(b, VECTOR_TIMER1_CAPT);
   bool updates = is_buffered(t) && buffer_is_waiting(t) && update_distance(t) == 1;
   bool at_bottom = t->mode == COUNT_PHASE_FREQUENCY_PWM;
