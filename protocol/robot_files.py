@@ -7,12 +7,14 @@ is checked by the library (`boebot.description.robots`), whenever somebody uses 
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
 FOLDER = Path(__file__).resolve().parent / "robots"
 NO_BOARD = "none"
+PIN_MAP = r"[A-Za-z0-9-]*"  # a name in C, with _ for -, and in files
 NEEDED = ("name", "title", "board", "body", "device")
 QUARTER = 0.25  # of the time between two edges of an encoder: what is shorter is a bounce
 
@@ -95,11 +97,14 @@ def load(path: Path) -> Robot:
     """The robot of a file.
 
     Raises:
-        ValueError: no valid TOML, a missing key, a robot that extends one that is not there, or two devices on one pin.
+        ValueError: no valid TOML, a missing key, a pin map that is no name in C, a robot that extends one that is not
+            there, or two devices on one pin.
     """
     robot = Robot(path.name, _read(path, ()))
     if missing := [key for key in NEEDED if key not in robot.table]:
         raise ValueError(f"{path.name}: {missing[0]} is missing")
+    if not re.fullmatch(PIN_MAP, robot.pin_map):
+        raise ValueError(f"{path.name}: pin_map is {robot.pin_map!r}; expected letters, digits and hyphens")
     owners: dict[int, str] = {}
     for device in robot.devices if robot.pin_map else ():
         for pin in robot.pins(device).values():

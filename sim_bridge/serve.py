@@ -83,10 +83,12 @@ def carry(
         if (now := port.baud()) is not None and now != baud:
             session.transport.set_baud(now)
             baud = now
-        sim.run(pace.due())  # first: bytes that came meanwhile reach the board at the end of that time
-        for sentence in (notes := session.notes())[noted:]:
-            visit(Visit("notes", "the board", sentence))
-        noted = len(notes)
+        try:
+            sim.run(pace.due())  # first: bytes that came meanwhile reach the board at the end of that time
+        finally:  # also what was noted just before a crash
+            for sentence in (notes := session.notes())[noted:]:
+                visit(Visit("notes", "the board", sentence))
+            noted = len(notes)
         if line.carry(port):
             brisk_until = time.monotonic() + BRISK_FOR_S
         if data := session.robot.receive():

@@ -84,6 +84,14 @@ def test_only_what_changes_is_written_and_the_pins_of_a_robot_that_is_gone_go(cl
     assert [name for name in after if after[name] != before[name]] == ["pin_map.h"]
 
 
+@pytest.mark.parametrize("name", ["lab.2", "lab_2", "lab 2"])
+def test_a_pin_map_that_would_be_no_name_in_c_or_another_file_is_refused(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "lab.toml"
+    file.write_text(f'name = "lab"\ntitle = "Lab"\nboard = "uno"\npin_map = "{name}"\n[body]\n[device]\n')
+    with pytest.raises(ValueError, match=rf"^lab\.toml: pin_map is '{name}'; expected letters, digits and hyphens$"):
+        robot_files.load(file)
+
+
 def test_a_stale_file_in_git_is_named(clone: Path) -> None:
     assert run_generator(sys.executable, clone, "--check").returncode == 0
     page = clone / "protocol" / "PROTOCOL.md"

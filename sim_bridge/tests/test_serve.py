@@ -166,6 +166,21 @@ def test_what_the_board_notes_is_heard_while_it_is_served(tmp_path: Path) -> Non
     assert note.why.startswith("the program writes to SPCR at address 0x")
 
 
+def test_what_the_board_notes_just_before_it_crashes_is_heard(tmp_path: Path) -> None:
+    image, visits = tmp_path / "program.elf", list[Visit]()
+    image.write_bytes(assemble("main: ldi r24, 0x51\n out SPCR, r24\n jmp 0x7000"))
+    with pytest.raises(BoardError, match="goes to 0x7000"):
+        serve(
+            "avr",
+            replace(request(), image=str(image)),
+            tcp=0,
+            announce=lambda _: None,
+            visit=visits.append,
+            running=lambda: True,
+        )
+    assert [visit.what for visit in visits] == ["notes"]
+
+
 def test_somebody_looks_where_the_robot_is() -> None:
     """With a client or without, twenty times a second and in order of time."""
     seen: list[tuple[TruthNow, float]] = []

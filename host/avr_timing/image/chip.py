@@ -28,7 +28,10 @@ def assumed_chip(path: object, data: bytes) -> str:
     """
     header = HEADER.unpack(data[: HEADER.size].ljust(HEADER.size, b"\0"))
     if data[:6] != b"\x7fELF\1\1" or header[2] != EM_AVR:
-        raise AnalysisError(f"{path} is not an ELF file for an AVR; expected an image for the {CHIP}")
+        raise AnalysisError(
+            f"{path} is not an ELF file for an AVR; expected the ELF file of a program for the {CHIP} "
+            "(a HEX file has neither the chip's name nor symbols)"
+        )
     core, name = header[7] & CORE_BITS, _name(data, *header[-3:], sections=header[6])
     if name not in ("", *SAME_PROGRAM):
         raise AnalysisError(f"{path} is for the {name}; expected an image for the {CHIP}")

@@ -161,7 +161,8 @@ EEPROM_HALTS = {0: 4, 1: 2}  # EERE begins a read, EEPE a write
 def _halt(mnemonic: str, operands: tuple[int, ...]) -> int:
     """Cycles for which the CPU stands still behind an instruction.
 
-    What `out` and `sts` write is not known here: they count as a read, which takes longest.
+    What `out` and `sts` write is not known here: they count as a read, which takes longest. Stores through pointers
+    are taken not to reach the EEPROM: else each of them would count four cycles more.
     """
     if mnemonic == "sbi" and operands[0] == EECR_IO:
         return EEPROM_HALTS.get(operands[1], 0)

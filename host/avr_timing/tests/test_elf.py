@@ -157,6 +157,8 @@ def test_what_is_no_image_is_refused(tmp_path: Path) -> None:
     text = tmp_path / "text.elf"
     text.write_text("an image", encoding="ascii")
     assert "is not an ELF file for an AVR" in refused(text)
+    text.write_text(":00000001FF\n", encoding="ascii")
+    assert "(a HEX file has neither the chip's name nor symbols)" in refused(text)
     text.write_bytes(b"")
     assert "is not an ELF file for an AVR" in refused(text)
     assert "is not an ELF file for an AVR" in refused(Path("/bin/true").resolve())

@@ -199,7 +199,10 @@ def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
     image = _image(elf, load_robot(robot))
     if image is None:
         raise TimingError(f"robot {robot!r} has no board, and so no image; expected --elf F")
-    path = worst_path(load_firmware(image), name)
+    firmware = load_firmware(image)
+    path = worst_path(firmware, name)
+    if firmware.image.assumed_chip:
+        output.say(firmware.image.assumed_chip)
     if json:
         output.print_json({"elf": str(image)} | path.as_dict())
     else:

@@ -213,15 +213,17 @@ static const board_operations OPERATIONS = {
 
 void avr_board_one_by_one(board *self) { ((avr_board *)self)->one_by_one = true; }
 
-static void say_nothing(avr_t *avr, const int level, const char *format, va_list arguments) {
-  (void)avr;
+/* Of what simavr says of a program, only that an address was "wrapped" is news. */
+static void hear_simavr(avr_t *avr, const int level, const char *format, va_list arguments) {
   (void)level;
-  (void)format;
   (void)arguments;
+  if (!strstr(format, "Wrapping")) return;
+  note(avr->custom.data, avr->pc, "reads or writes", "behind the memory's end",
+       "nothing is there; here it is RAM again");
 }
 
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size) {
-  avr_global_logger_set(say_nothing);
+  avr_global_logger_set(hear_simavr);
   avr_board *b = calloc(1, sizeof *b);
   avr_t *avr = b ? avr_make_mcu_by_name("atmega328p") : NULL;
   if (!avr) {

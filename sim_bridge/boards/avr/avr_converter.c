@@ -34,7 +34,8 @@ static uint64_t clock_cycles(const avr_board *b) {
 static void note_missing(avr_board *b) {
   const uint8_t selection = b->avr->data[REG_ADMUX], channel = selection & MUX;
   if (channel >= BOARD_ANALOG_COUNT && channel < MUX_BAND_GAP) {
-    note(b, b->avr->pc, "converts", "a channel without pin", "the temperature sensor is not built: it reads 0 V");
+    note(b, b->avr->pc, "converts", "a channel without pin",
+         "it has none (6, 7), is reserved, or is the temperature, which is not built: it reads 0 V");
   }
   if (!(selection & REFS)) {
     note(b, b->avr->pc, "converts with", "the reference AREF", "nothing is joined to it: it is at the supply");

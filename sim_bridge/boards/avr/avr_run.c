@@ -218,7 +218,8 @@ static void check_jump(avr_board *b, uint32_t address) {
   if (b->crashed || is_code(b, pc)) return;
   if (address >= b->code_end) address = b->code_end - 2u; /* it ran straight on, behind the last instruction */
   if (pc == 0 && !is_return(b->avr->flash[address] | (unsigned)b->avr->flash[address + 1] << 8)) {
-    note(b, address, "jumps to", "its start", "legal, but no reset: registers keep their values (or is a pointer 0?)");
+    note(b, address, "jumps to", "its start",
+         "no reset, registers keep their values (a null pointer? an interrupt without a handler?)");
   } else if (pc == 0) {
     crash_at(b, address, "the program returns to its start without a reset");
   } else {
