@@ -33,14 +33,15 @@ def of_error(error: BaseException, text: str) -> str:
 
 
 def has_no_truth(reading: type) -> None:
-    """Readings of that class are neither true nor a number: as tuples they would be true, and equal to none."""
+    """Readings of that class have no truth and compare with readings alone: as tuples they would be true, and equal to
+    no number, text or None."""
 
     def refuse(self: Any) -> bool:
         values = ", ".join(f".{name}" for name in self._fields if name not in ("age", "valid"))
         raise TypeError(of_sign("truth", reading=type(self).__name__, values=values))
 
     def guarded(compare: Callable[[Any, object], bool]) -> Callable[[Any, object], bool]:
-        return lambda self, other: refuse(self) if isinstance(other, int | float) else compare(self, other)
+        return lambda self, other: compare(self, other) if isinstance(other, tuple) else refuse(self)
 
     for name, method in (("__bool__", refuse), ("__eq__", guarded(tuple.__eq__)), ("__ne__", guarded(tuple.__ne__))):
         setattr(reading, name, method)
@@ -57,9 +58,12 @@ def say_unrun() -> None:
     """Says so at the end of a script that defines a brain and runs no robot."""
     main, script = vars(sys.modules["__main__"]), Path(*sys.argv[:1])
     is_script = (main.get("__name__"), main.get("__spec__")) == ("__main__", None)
-    if not is_script or hasattr(sys, "ps1") or hasattr(sys, "last_type") or "boebot.boards" in sys.modules:
-        return  # somebody types there, it has failed, or it runs robots
-    for name in ("step", "main"):
-        code = getattr(main.get(name), "__code__", None)
-        if code and code.co_varnames[: code.co_argcount] == ("robot",) and Path(code.co_filename).name == script.name:
-            print(f"boebot: {of_sign('unrun', file=script, name=f'{name}(robot)')}", file=sys.stderr)
+    has_run = {"boebot.boards", "multiprocessing"} & sys.modules.keys()  # perhaps in other processes
+    if not is_script or has_run or hasattr(sys, "ps1") or hasattr(sys, "last_type"):
+        return  # somebody types there, or it has failed
+    for name in ("step", "main", "brain"):
+        code = getattr(one := main.get(name), "__code__", None)
+        is_own = code and Path(code.co_filename).name == script.name
+        takes_robot = is_own and code.co_varnames[: code.co_argcount] == ("robot",)
+        if takes_robot or type(one).__module__ == "boebot.brain.brain":
+            print(f"boebot: {of_sign('unrun', file=script, name=name)}", file=sys.stderr)

@@ -4,8 +4,10 @@ none."""
 from __future__ import annotations
 
 import math
+import operator
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -44,8 +46,12 @@ ERRORS = [  # a brain, what Python says, the word of our sentence that helps
     ("import robot", "No module named 'robot'", "needs no import"),
     ("from boebot import robot\nrobot.drive(1, 1)", "has no attribute 'drive'", "the robot is no module"),
     ("import boebot\nboebot.drive(1, 1)", "has no attribute 'drive'", "the robot is no module"),
+    (STEP + "float(robot.ping.distance)", "not 'NoneType'", "is not None and"),
+    (STEP + "robot.ping + 0.1", "can only concatenate tuple", "as in robot.ping.distance"),
+    (STEP + "abs(robot.ping)", "bad operand type", "as in robot.ping.distance"),
+    (STEP + "robot.ping == None", "never None", "expected one of its values: .distance, .status"),
     (STEP + "if robot.whisker_left: pass", "neither true nor false", "expected one of its values: .pressed"),
-    (STEP + "if robot.infrared_left == True: pass", "and no number", "expected one of its values: .detected, "),
+    (STEP + "if robot.infrared_left == True: pass", "no number", "expected one of its values: .detected, "),
     (
         "def main(robot):\n    while True: robot.drive(0.5, 0.5)",
         "no wait for 0.2 s",
@@ -84,11 +90,11 @@ def test_error_that_is_none_of_the_table_is_python_s_alone(tmp_path: Path) -> No
 @pytest.mark.parametrize("reading", {kind.READING for kind in kinds()} - {None}, ids=lambda kind: kind.__name__)
 def test_reading_is_neither_true_nor_a_number_but_equal_to_its_like(reading: Any) -> None:
     one, same = (reading(*range(len(reading._fields))) for _ in range(2))
-    for ask in (bool, lambda it: it == 1, lambda it: it != 0.3, lambda it: it == True):  # noqa: E712
+    others: tuple[object, ...] = (1, 0.3, True, None, "pressed", [])
+    for ask in (bool, *(partial(compare, other) for compare in (operator.eq, operator.ne) for other in others)):
         with pytest.raises(TypeError, match=rf"{reading.__name__}\) is neither .*\.{reading._fields[0]}\b"):
             ask(one)
     assert one == same and hash(one) == hash(same) and one != one._replace(age=-1)
-    assert (one == None, one is None) == (False, False)  # noqa: E711
 
 
 SLEEPS = "import time\nHELPER\ndef step(robot):\n    robot.drive(0.5, 0.5)\n    REST\n    robot.stop()\n"
@@ -137,7 +143,7 @@ def test_turn_by_a_twelfth_of_pi_or_several_may_be_meant_in_radians(angle: float
     assert [notice.startswith(f"turn({angle:g}) turns by {angle:g} degrees") for notice in notices] == [True] * is_noted
 
 
-SAID = "boebot: {0} defines {1}(robot), and nothing has run it; expected: boebot run {0}\n"
+SAID = "boebot: {0} defines {1}, and nothing has run it; expected: boebot run {0}\n"
 
 
 def test_script_that_only_defines_a_brain_says_at_its_end_how_to_run_it(tmp_path: Path) -> None:
@@ -154,6 +160,13 @@ STEP_ONLY = "def step(robot): pass"
     [
         ("def main(robot): pass", "main", {}, False),
         (STEP_ONLY, "step", {}, False),
+        (
+            "from boebot.brain import Brain\nfrom boebot.behaviors import Wander\nbrain = Brain([Wander()])",
+            "brain",
+            {},
+            False,
+        ),
+        ("brain = 'Brain'", None, {}, False),
         (STEP_ONLY, None, {}, True),
         (STEP_ONLY, None, {"ps1": ">>> "}, False),
         (STEP_ONLY, None, {"last_type": ValueError}, False),
@@ -178,7 +191,7 @@ def test_it_is_said_of_no_other_script(
     monkeypatch.delattr(sys, "last_type", raising=False)
     for attribute, value in ({"argv": ["folder/first.py"]} | of_python).items():
         monkeypatch.setattr(sys, attribute, value, raising=False)
-    if not ran:
-        monkeypatch.delitem(sys.modules, "boebot.boards", raising=False)
+    for name_of_module in () if ran else ("boebot.boards", "multiprocessing"):
+        monkeypatch.delitem(sys.modules, name_of_module, raising=False)
     slips.say_unrun()
     assert capsys.readouterr() == ("", "" if name is None else SAID.format("folder/first.py", name))
