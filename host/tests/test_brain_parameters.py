@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot.behaviors import Avoid, FollowWall, Kinesis, Wander
+from boebot.behaviors import Avoid, Evade, FollowWall, Kinesis, Wander, Withdraw
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
 from boebot.brain.composition import composed, described
 from boebot.brains import load_brain
@@ -109,6 +109,14 @@ def test_what_a_process_has_made_of_a_parameter_follows_it() -> None:
         assert {step[1:] for step in run.record.steps} == {("signal", half, half)}
 
 
+def test_a_value_that_no_record_can_have_is_put_back_but_not_set() -> None:
+    brain = Brain([Wander(), Withdraw(fatigue=math.inf)])
+    boebot.run(brain, seconds=0.1, parameters={"withdraw.fatigue": 1.0})
+    assert brain.processes[1] == Withdraw(fatigue=math.inf)
+    with pytest.raises(BoebotError, match="withdraw: fatigue is inf; expected float, finite"):
+        boebot.run(brain, parameters={"withdraw.fatigue": math.inf})
+
+
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
@@ -125,6 +133,7 @@ def test_what_a_process_has_made_of_a_parameter_follows_it() -> None:
         ("avoid.utility.w.tired", 1.0, "brain 'brain' has no parameter 'avoid.utility.w.tired'"),
         ("avoid.turn", 10**400, r"avoid does not take turn = 1000.*\.\.\."),
         ("avoid.turn", {}, "avoid: turn is {}; expected a number"),
+        ("wander.turn", float("inf"), "wander: turn is inf; expected"),
         (3, 0.4, "brain 'brain' has no parameter '3'; expected one that begins with wander"),
         ("avoid.turn", [object()], "avoid: turn is .*; expected a number"),
         ("avoid.period", -1.0, "avoid: period is -1.0; expected seconds from step to step"),
@@ -170,7 +179,8 @@ def everything() -> Brain:
     bright = light.variable()
     return Brain(
         [
-            Wander(turn_probability=np.float64(0.00777), utility=Utility(b=0.5)),
+            Wander(turn_probability=np.float64(0.00777), turn=np.float32(0.75), utility=Utility(b=0.5)),
+            Evade(utility=Utility(b=-2.0)),
             FollowWall(name="along", side="left", period=0.1, utility=Utility(b=-1.0, w={"near": 3.0, "touch": -1.0})),
             Kinesis(stimulus=bright.read, utility=Utility(b=-3.0, c=2.0, tau_gamma=0.7)),
             Odometry(factors=(1.0, 1.01)),
@@ -260,6 +270,7 @@ class Mine(Wander):
     ("brain", "sentence"),
     [
         (lambda: Brain([Wander()], [StateVariable("odd", lambda robot: 0.5)]), "state variable 'odd' is read by"),
+        (lambda: Brain([Withdraw(fatigue=math.inf)]), "withdraw.fatigue is inf"),
         (lambda: Brain([Mine()]), "process 'mine' is a .*Mine"),
         (lambda: Brain([Kinesis(stimulus=lambda robot: 0.5)]), "kinesis.stimulus is <function"),
         (lambda: lambda robot: robot.drive(0.1, 0.1), "it is no Brain of processes"),

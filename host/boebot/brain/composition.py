@@ -131,7 +131,7 @@ class MadeOf(TypedDict):
 
 
 def described(brain: Brain) -> MadeOf:
-    """That of a brain, as it is now, as JSON has it."""
+    """That of a brain, as it is now, as JSON has it; without functions that a class has unless it is given others."""
     variables = {one.name: _source(one, brain) for one in brain.variables}
     odd = [] if type(brain) is Brain else [f"the brain is a {class_name(type(brain))}"]
     odd += [f"state variable {name!r} is read by a function" for name, one in variables.items() if one is None]
@@ -141,17 +141,16 @@ def described(brain: Brain) -> MadeOf:
         if type(process) not in process_kinds().values():
             odd.append(f"process {process.name!r} is a {table['kind']}")
         for field in dataclasses.fields(process):
-            if field.init and field.name not in _NO_PARAMETERS:
-                value = getattr(process, field.name)
+            value = getattr(process, field.name)
+            is_usual = callable(value) and value is field.default
+            if field.init and field.name not in _NO_PARAMETERS and not is_usual:
                 try:
                     table[field.name] = _plain(value, brain)
-                except TypeError:
+                except (TypeError, ValueError):
                     odd.append(f"{process.name}.{field.name} is {arguments.shown(value)}")
         numbers = {field.name: getattr(process.utility, field.name) for field in dataclasses.fields(Utility)}
         table["utility"] = numbers | {"w": dict(process.utility.w)}
-    whole = {"period_s": brain.PERIOD, "margin": brain.margin, "variable": variables, "process": processes}
-    made_of: MadeOf = json.loads(json.dumps(whole | {"undescribed": odd}))
-    return made_of
+    return MadeOf(period_s=brain.PERIOD, margin=brain.margin, variable=variables, process=processes, undescribed=odd)
 
 
 def class_name(kind: type) -> str:
@@ -170,9 +169,11 @@ def _source(variable: StateVariable, brain: Brain) -> dict[str, str] | None:
 
 
 def _plain(value: Any, brain: Brain) -> Any:
-    """A parameter as JSON has it: what reads a state variable is its name. Raises TypeError where it is neither."""
+    """A parameter as JSON has it: what reads a state variable is its name. Raises TypeError or ValueError where it is
+    neither, as a number that is not finite."""
     named = [one.name for one in brain.variables if callable(value) and value in (one.read, _Reading(one.name, {}))]
-    return msgspec.to_builtins(float(value) if isinstance(value, float) else value) if not named else named[0]
+    value = named[0] if named else value.tolist() if hasattr(value, "tolist") else value  # numpy's
+    return json.loads(json.dumps(msgspec.to_builtins(value), allow_nan=False))
 
 
 class _Places:

@@ -11,10 +11,11 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import inspect
+import json
 import math
 import re
 import typing
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
@@ -87,8 +88,8 @@ def sliders(brain: LoadedBrain) -> dict[str, float]:
     return {name: place.value for name, place in _places(brain).items() if place.is_slider}
 
 
-def set_parameters(brain: LoadedBrain, values: Mapping[str, Any]) -> None:
-    """Gives parameters other values, all or none.
+def set_parameters(brain: LoadedBrain, values: Mapping[str, Any]) -> list[tuple[Process, dict[str, Any]]]:
+    """Gives parameters other values, all or none. Returns processes and their fields as they were, for `Brain.change`.
 
     Raises:
         BrainError: there is no such parameter, or its process refuses the value.
@@ -103,21 +104,26 @@ def set_parameters(brain: LoadedBrain, values: Mapping[str, Any]) -> None:
         fields[field] = _changed(places[name], value, fields.get("utility", process.utility))
     for process, fields in changed.values():
         _check(process, fields)
-    for process, fields in changed.values():
-        assert brain.brain is not None
-        brain.brain.change(process, fields)
+    before = [(process, {field: getattr(process, field) for field in fields}) for process, fields in changed.values()]
+    _change(brain, changed.values())
+    return before
 
 
 @contextlib.contextmanager
 def in_force(brain: LoadedBrain, values: Mapping[str, Any]) -> Iterator[None]:
     """They have these values in the block, and those from before after it: a `Brain` may run again. Raises as
     `set_parameters`."""
-    before = {name: value for name, value in parameters(brain).items() if name in values}
-    set_parameters(brain, values)
+    before = set_parameters(brain, values)
     try:
         yield
     finally:
-        set_parameters(brain, before)
+        _change(brain, before)
+
+
+def _change(brain: LoadedBrain, changed: Iterable[tuple[Process, dict[str, Any]]]) -> None:
+    for process, fields in changed:
+        assert brain.brain is not None
+        brain.brain.change(process, fields)
 
 
 def _unknown(name: str, known: Collection[str], brain: str) -> BrainError:
@@ -144,17 +150,16 @@ def _changed(place: _Place, value: Any, utility: Utility) -> Any:
     key, _, variable = part.partition(".")
     plain = value.tolist() if hasattr(value, "tolist") else value  # numpy's
     try:
-        fitting = msgspec.convert(
-            msgspec.to_builtins(plain), float if part else _types(type(process)).get(field, _PLAIN)
-        )
+        kind = float if part else _types(type(process)).get(field, _PLAIN)
+        fitting = msgspec.convert(json.loads(json.dumps(plain, allow_nan=False)), kind)
         change: dict[str, Any] = {"w": {**utility.w, variable: fitting}} if variable else {key: fitting}
         return dataclasses.replace(utility, **change) if part else fitting
-    except (msgspec.ValidationError, TypeError, OverflowError):
+    except (TypeError, ValueError, OverflowError):
         if part:
-            raise BrainError(f"{process.name}: utility.{part} is {shown(value)}; expected a number") from None
+            raise BrainError(f"{process.name}: utility.{part} is {shown(value)}; expected a finite number") from None
         _check(process, {field: plain})  # its own sentence says more
         raise BrainError(
-            f"{process.name}: {field} is {shown(value)}; expected {place.declared}, as a TOML file can have it"
+            f"{process.name}: {field} is {shown(value)}; expected {place.declared}, finite, as a TOML file can have it"
         ) from None
     except BrainError as error:
         raise BrainError(f"{process.name}: {error}") from None
