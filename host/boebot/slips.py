@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+_BRAIN = "boebot.brain.brain"  # not imported here: most scripts need no more of the kit than they name
+
 
 @cache
 def _table() -> list[dict[str, str]]:
@@ -62,8 +64,7 @@ def say_unrun() -> None:
     if not is_script or has_run or hasattr(sys, "ps1") or hasattr(sys, "last_type"):
         return  # somebody types there, or it has failed
     for name in ("step", "main", "brain"):
-        code = getattr(one := main.get(name), "__code__", None)
-        is_own = code and Path(code.co_filename).name == script.name
-        takes_robot = is_own and code.co_varnames[: code.co_argcount] == ("robot",)
-        if takes_robot or type(one).__module__ == "boebot.brain.brain":
+        code: Any = getattr(one := main.get(name), "__code__", None)
+        is_own = code is not None and Path(code.co_filename).name == script.name
+        if (is_own and code.co_varnames[: code.co_argcount] == ("robot",)) or type(one).__module__ == _BRAIN:
             print(f"boebot: {of_sign('unrun', file=script, name=name)}", file=sys.stderr)

@@ -128,8 +128,8 @@ def test_a_value_that_no_record_can_have_is_put_back_but_not_set() -> None:
         ("avoid.turn", True, "avoid: turn is True; expected a number"),
         ("avoid.turn", float("nan"), "avoid: turn is nan; expected a number"),
         ("avoid.utility.tau", 0.0, "avoid: utility: tau is 0.0; expected more than 0"),
-        ("avoid.utility.b", float("inf"), "avoid: utility: b is inf; expected a finite number"),
-        ("avoid.utility.w.near", "far", "avoid: utility.w.near is 'far'; expected a number"),
+        ("avoid.utility.b", float("inf"), "avoid: utility.b is inf; expected a finite number"),
+        ("avoid.utility.w.near", "far", "avoid: utility.w.near is 'far'; expected a finite number"),
         ("avoid.utility.w.tired", 1.0, "brain 'brain' has no parameter 'avoid.utility.w.tired'"),
         ("avoid.turn", 10**400, r"avoid does not take turn = 1000.*\.\.\."),
         ("avoid.turn", {}, "avoid: turn is {}; expected a number"),
@@ -277,7 +277,7 @@ class Mine(Wander):
     ],
 )  # fmt: skip
 def test_what_a_record_cannot_describe_is_named(brain: Any, sentence: str, tmp_path: Path) -> None:
-    run = kept(tmp_path, Request.single(brain(), robot="arsim", seconds=0.1))
+    run = kept(tmp_path, Request.single(brain(), seconds=0.1))
     assert run.steps == 2
     with pytest.raises(BoebotError, match=rf"came from no file, and its record does not hold all of it: .*{sentence}"):
         recorded(tmp_path)
