@@ -179,7 +179,11 @@ def everything() -> Brain:
     bright = light.variable()
     return Brain(
         [
-            Wander(turn_probability=np.float64(0.00777), turn=np.float32(0.75), utility=Utility(b=0.5)),
+            Wander(
+                turn_probability=np.float64(0.00777),
+                turn=np.float32(0.75),  # type: ignore[arg-type]
+                utility=Utility(b=0.5),
+            ),
             Evade(utility=Utility(b=-2.0)),
             FollowWall(name="along", side="left", period=0.1, utility=Utility(b=-1.0, w={"near": 3.0, "touch": -1.0})),
             Kinesis(stimulus=bright.read, utility=Utility(b=-3.0, c=2.0, tau_gamma=0.7)),

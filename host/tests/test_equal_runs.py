@@ -80,7 +80,10 @@ def test_of_an_unrecorded_run_each_figure_is_right_or_none(robot: str) -> None:
     assert found.keys() == expected.keys()
     assert {name: value for name, value in found.items() if value not in (None, expected[name])} == {}
     assert (found["steps"], found["run_time_s"], found["ticks"], found["wander_share"]) == (60, 3.0, None, None)
-    assert unrecorded.summary() == f"brain on {robot} ({recorded.board}), 3.0 s, distance unknown, seed 1, complete"
+    assert (
+        unrecorded.summary()
+        == f"brain on {robot} ({recorded.board}) in {expected['arena']}, 3.0 s, distance unknown, seed 1, complete"
+    )
     for name, kind in inspect.getmembers_static(RunResult, lambda member: isinstance(member, FIGURES)):
         value = getattr(unrecorded, name)
         if isinstance(value, int | float) and name not in ("is_recorded", "has_truth", "real_time_factor"):

@@ -90,8 +90,10 @@ def test_error_that_is_none_of_the_table_is_python_s_alone(tmp_path: Path) -> No
 @pytest.mark.parametrize("reading", {kind.READING for kind in kinds()} - {None}, ids=lambda kind: kind.__name__)
 def test_reading_is_neither_true_nor_a_number_but_equal_to_its_like(reading: Any) -> None:
     one, same = (reading(*range(len(reading._fields))) for _ in range(2))
-    others: tuple[object, ...] = (1, 0.3, True, None, "pressed", [])
-    for ask in (bool, *(partial(compare, other) for compare in (operator.eq, operator.ne) for other in others)):
+    compared: list[Any] = [
+        partial(how, other) for how in (operator.eq, operator.ne) for other in (1, 0.3, True, None, "pressed")
+    ]
+    for ask in (bool, *compared):
         with pytest.raises(TypeError, match=rf"{reading.__name__}\) is neither .*\.{reading._fields[0]}\b"):
             ask(one)
     assert one == same and hash(one) == hash(same) and one != one._replace(age=-1)

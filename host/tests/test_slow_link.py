@@ -44,7 +44,7 @@ def run_on(
 ) -> RunResult:
     session = InProcess(peer, channel)
     monkeypatch.setattr(runner, "open_board", lambda url, request: session)
-    return runner.execute(Request.single(brain, robot=peer.robot, **options))  # type: ignore[arg-type]
+    return runner.execute(Request.single(brain, robot=peer.robot, **options))
 
 
 def test_brain_sees_what_the_board_sends(monkeypatch: pytest.MonkeyPatch) -> None:

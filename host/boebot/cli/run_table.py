@@ -97,9 +97,9 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
 
 
 def _changed(table: dict[str, Any]) -> str:
-    """What the simulated robot was without, and what it had in other magnitudes than usual, in words."""
-    parts = {"without": table["without"], "with": table["imperfections"]}
-    return "".join(f", {word} {names}" for word, names in parts.items() if names)
+    """What the simulated robot was without, and what it and the brain had in other magnitudes than usual."""
+    parts = ("without", table["without"]), ("with", table["imperfections"]), ("with", table["parameters"])
+    return "".join(f", {word} {names}" for word, names in parts if names)
 
 
 def _touched(result: RunResult) -> str:

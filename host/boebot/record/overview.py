@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from boebot.link.messages import DevicesTelemetry, EventKind, Status
 from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
-from boebot.record.record import Record, Unrecorded
+from boebot.record.record import Record
 from boebot.record.series import APART_S, Bools, Floats, Pose, Series
 from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions
@@ -39,7 +39,7 @@ class Overview:
         true_distance, odometry_distance: path lengths. None: as above.
         true_contacts, whisker_touches: how many. None: nobody knows, or the robot has none.
         contact_places, touch_places: where the robot was at them, shape (n, 2).
-        overruns, dead_man_stops, fallback_takeovers: counted. None: the run was not recorded.
+        overruns, dead_man_stops, fallback_takeovers: counted.
         slow_reading_age: the greatest that a slow device's reading had at a step of the brain; None: none had one.
         shown, layers: what the brain showed, and its sketches.
         brain: of a brain of processes, at most `POINTS` of its steps; None: a brain of another kind, or not recorded.
@@ -56,9 +56,9 @@ class Overview:
     whisker_touches: int | None
     contact_places: Floats
     touch_places: Floats
-    overruns: int | None
-    dead_man_stops: int | None
-    fallback_takeovers: int | None
+    overruns: int
+    dead_man_stops: int
+    fallback_takeovers: int
     slow_reading_age: float | None
     shown: Shown
     layers: list[Layer]
@@ -229,7 +229,7 @@ def overview(
         has_odometry: the robot has what it takes. has_truth: a simulator knows what happened.
         brain_names: of a brain of processes.
     """
-    ticks, is_recorded = record.ticks, not isinstance(record, Unrecorded)
+    ticks = record.ticks
     thinned, counts = _Thinned(record), _Counts()
     true_walk, odometry_walk = _Walk(), _Walk(ODOMETRY_S)
     contacts, touches = _Contacts(), _Places()
@@ -277,12 +277,10 @@ def overview(
         whisker_touches=counts.touches if whiskers and ticks else None,
         contact_places=contacts.places.found,
         touch_places=touches.found,
-        overruns=counts.overruns if is_recorded else None,
+        overruns=counts.overruns,
         # telemetry is not heard while a session is lost, and an event not while there is none
-        dead_man_stops=max(counts.dead_man, sum(kind == EventKind.DEAD_MAN for kind, _ in events))
-        if is_recorded
-        else None,
-        fallback_takeovers=max(counts.fallback, events.count((EventKind.FALLBACK, 1))) if is_recorded else None,
+        dead_man_stops=max(counts.dead_man, sum(kind == EventKind.DEAD_MAN for kind, _ in events)),
+        fallback_takeovers=max(counts.fallback, events.count((EventKind.FALLBACK, 1))),
         slow_reading_age=counts.oldest,
         shown=read_shown(record, POINTS),
         layers=read_layers(record),

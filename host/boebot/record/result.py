@@ -281,17 +281,17 @@ class RunResult:
     @property
     def overruns(self) -> int | None:
         """Control ticks whose work did not end in time; None: not recorded."""
-        return self.overview.overruns
+        return self.overview.overruns if self.is_recorded else None
 
     @property
     def dead_man_stops(self) -> int | None:
         """Times the motors stopped because no fresh set-point came; None: not recorded."""
-        return self.overview.dead_man_stops
+        return self.overview.dead_man_stops if self.is_recorded else None
 
     @property
     def fallback_takeovers(self) -> int | None:
         """Times the board's own brain took over because the host was silent; None: not recorded."""
-        return self.overview.fallback_takeovers
+        return self.overview.fallback_takeovers if self.is_recorded else None
 
     @property
     def has_odometry(self) -> bool:
@@ -340,10 +340,11 @@ class RunResult:
             "brain": self.brain,
             "robot": self.robot.name,
             "board": self.board,
-            "arena": self.plan.name if self.has_truth else self.arena,
+            "arena": self.arena if self.world is None else self.plan.name,
             "seed": self.seed,
             "without": ", ".join(self.without) or None,
             "imperfections": ", ".join(f"{name} {size:.10g}" for name, size in self.imperfections.items()) or None,
+            "parameters": ", ".join(f"{name} {value}" for name, value in self.parameters.items()) or None,
             "run_time_s": round(self.run_time, 3),
             "true_distance_m": _rounded(self.true_distance, 3),
             "odometry_distance_m": _rounded(self.odometry_distance, 3),
@@ -386,10 +387,10 @@ class RunResult:
         }
 
     @property
-    def touched(self) -> int:
+    def touched(self) -> int | None:
         """How often a person interfered with the run through a live view: drove by hand, lifted the robot, changed a
-        parameter."""
-        return touched(self.record)
+        parameter. None: not recorded."""
+        return touched(self.record) if self.is_recorded else None
 
     # ---- to look at ----------------------------------------------------------------------------------------
 

@@ -30,11 +30,10 @@ from boebot.link.frame import FRAME_OVERHEAD
 from boebot.link.link import Link
 from boebot.link.telemetry import StampedTelemetry as Received
 from boebot.link.transport import OnBus
-from boebot.record.brain_record import BrainNames
 from boebot.record.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import hangs
-from boebot.running.driver import PROGRESS_S, LinkQuality, Task, check_period, step_limit, whole_ticks
+from boebot.running.driver import PROGRESS_S, LinkQuality, Task, check_period, result_so_far, step_limit, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepLimit
 
 TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
@@ -423,36 +422,23 @@ class BoardDriver:
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """See `boebot.running.driver.Driver`."""
         link, watchdog_resets = self.link, self.session.watchdog_resets()
-        return RunResult(
-            brain=self.task.brain.name,
+        return result_so_far(
+            self.task,
+            self.session,
+            error,
+            elapsed_s,
             robot=self.description,
-            board=self.task.on,
-            description=self.session.description,
-            arena=self.task.request.arena,
-            seed=self.task.brain_seed,
             period=self.period_s,
             tick=self.tick_s,
-            error=error,
-            record=self.record,
-            world=self.session.arena,
             clock_offset=self.clock_offset_s,
-            steps=self.record.count("command"),
             late_steps=self.late_steps,
-            odometry_source=self.task.brain.odometry,
             resets=self.resets,
             sessions_lost=link.counts.sessions_lost,
             lost_frames=link.line.decoder.lost,
             bad_frames=link.line.decoder.bad,
             run_time=max(self._last_s, 0.0),
-            wall_time=elapsed_s,
             identity=self.identity,
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
             notices=[*self.notices, *self.session.notes(), *hangs.sentences(watchdog_resets)],
             watchdog_resets=watchdog_resets,
-            counters=dict(self.session.counters()),
-            without=self.task.request.without,
-            imperfections=self.task.request.imperfections,
-            brain_names=BrainNames.of(self.task.brain.brain),
-            parameters=self.task.parameters,
-            made_of=self.task.made_of,
         )

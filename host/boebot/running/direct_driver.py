@@ -11,11 +11,10 @@ from collections.abc import Iterator
 
 from boebot.boards import VehicleSession
 from boebot.errors import BoardError
-from boebot.record.brain_record import BrainNames
 from boebot.record.record import Unrecorded
 from boebot.record.result import RunResult
 from boebot.running.direct_robot import DirectRobot
-from boebot.running.driver import PROGRESS_S, Task, step_limit, whole_ticks
+from boebot.running.driver import PROGRESS_S, Task, result_so_far, step_limit, whole_ticks
 
 
 class DirectDriver:
@@ -87,30 +86,19 @@ class DirectDriver:
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """See `boebot.running.driver.Driver`."""
-        request = self.task.request
-        return RunResult(
-            brain=self.task.brain.name,
-            robot=request.robot,
-            board=self.task.on,
-            description=self.session.description,
-            arena=request.arena,
-            seed=self.task.brain_seed,
+        return result_so_far(
+            self.task,
+            self.session,
+            error,
+            elapsed_s,
+            robot=self.task.request.robot,
             period=self.period_s,
             tick=self.session.tick_s,
-            error=error,
-            record=self.record,
-            world=self.session.arena,
             clock_offset=0.0,
-            steps=self.record.count("command"),
             late_steps=self.late_steps,
-            odometry_source=self.task.brain.odometry,
+            resets=0,
+            lost_frames=0,
+            bad_frames=0,
             run_time=self._last_s,
-            wall_time=elapsed_s,
-            counters=dict(self.session.counters()),
             layout=self.session.layout,
-            without=request.without,
-            imperfections=request.imperfections,
-            brain_names=BrainNames.of(self.task.brain.brain),
-            parameters=self.task.parameters,
-            made_of=self.task.made_of,
         )

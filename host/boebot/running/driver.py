@@ -17,7 +17,7 @@ from boebot.brain.composition import MadeOf
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
 from boebot.link.transport import BusFigures
-from boebot.record.brain_record import append_brain
+from boebot.record.brain_record import BrainNames, append_brain
 from boebot.record.keepers import Temporary
 from boebot.record.record import Record
 from boebot.record.result import RunResult
@@ -111,6 +111,34 @@ class Driver(Protocol):
 
     def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
         """The run's result so far; `elapsed_s`: its length by the wall clock; `error`: why it ended before its time."""
+
+
+def result_so_far(
+    task: Task, session: BoardSession | VehicleSession, error: BaseException | None, elapsed_s: float, **own: Any
+) -> RunResult:
+    """A driver's `result`; `own`: what it alone knows."""
+    request, brain = task.request, task.brain
+    return RunResult(
+        brain=brain.name,
+        board=task.on,
+        description=session.description,
+        arena=request.arena,
+        seed=task.brain_seed,
+        error=error,
+        record=task.record,
+        world=session.arena,
+        steps=task.record.count("command"),
+        wall_time=elapsed_s,
+        counters=dict(session.counters()),
+        without=request.without,
+        imperfections=request.imperfections,
+        brain_names=BrainNames.of(brain.brain),
+        parameters=task.parameters,
+        made_of=task.made_of,
+        odometry_source=brain.odometry,
+        unrealisable=task.unrealisable,
+        **own,
+    )
 
 
 def keep_rows(driver: Driver, task: Task, time_s: float, *, ended: bool = False) -> None:

@@ -293,7 +293,6 @@ def result_of(driver: Driver, task: Task, times: StepTimes, error: BaseException
     if times.long and slips.sleeps(task.brain.step if main is None else main.function):
         result.notices.append(slips.of_sign("sleep"))
     result.longest_step, result.long_steps = times.longest, times.long
-    result.unrealisable = task.unrealisable
     request = task.request
     if not is_live(task.on):
         result.notices += notices(request.robot, request.without)

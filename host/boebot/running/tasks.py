@@ -24,6 +24,7 @@ from boebot.running.driver import Task
 from boebot.timing import realisable
 
 DEFAULT_PERIOD = 0.05  # s
+_OF_ONE = {"pose", "period", "without", "parameters", "imperfections"}
 
 
 class _NamesFiles:
@@ -92,25 +93,11 @@ class Request(_NamesFiles):
         cls,
         brain: object = "wander",
         robot: str | Path | RobotDescription = "shieldbot",
-        *,
-        pose: tuple[float, float, float] | None = None,
-        period: float | None = None,
-        without: Sequence[str] = (),
-        parameters: Mapping[str, Any] | None = None,
-        imperfections: Mapping[str, float] | None = None,
         **others: Any,
     ) -> Request:
-        """Of one robot: what a `Member` has, and `others` of the attributes above."""
-        member = Member(
-            brain=brain,
-            robot=robot,
-            pose=pose,
-            period=period,
-            without=without,
-            parameters=parameters,
-            imperfections=imperfections,
-        )
-        return cls(members=[member], **others)
+        """Of one robot: what a `Member` has but its seed, and `others` of the attributes above."""
+        own = {name: others.pop(name) for name in _OF_ONE & others.keys()}
+        return cls(members=[Member(brain=brain, robot=robot, **own)], **others)
 
     def check(self) -> None:
         """Raises BoebotError where one of them is wrong."""
@@ -136,9 +123,8 @@ class Request(_NamesFiles):
     def said(self, tasks: Sequence[Task]) -> dict[str, Any]:
         """What a record says of it, as values of JSON, so that the run can be repeated (boebot.running.again); `tasks`:
         those of its robots."""
-        arena = None if self.arena is None else str(self.arena)
         return {
-            "arena": str(Path(arena).resolve()) if arena is not None and Path(arena).is_file() else arena,
+            "arena": None if self.arena is None else str(self.arena),
             "on": self.on,
             "seconds": self.seconds if math.isfinite(self.seconds) else None,
             "seed": self.seed,
