@@ -227,9 +227,9 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, caps
 
 
 def test_page_begins_a_run_afresh_also_after_its_end() -> None:
-    """What the page switches off is no longer of another magnitude."""
+    """What the page switches off is no longer of another magnitude. The run lasts until the page is there."""
     given = ("--imperfection", "tyre_grip=0.3")
-    run = Run("run", "wander", "--view", "--seconds", "2", "--speed", "max", "--json", *given)
+    run = Run("run", "wander", "--view", "--seconds", "1", "--speed", "4", "--json", *given)
     with run.stream() as stream:
         page = Page(stream)
         assert page.until("end")["again"]
