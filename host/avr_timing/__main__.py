@@ -31,11 +31,13 @@ def main(arguments: list[str] | None = None) -> int:
             print(image.assumed_chip, file=sys.stderr)
         program = program_of(image)
         entries = {name: program.entry(name) for name in given.function}
-        judged = _show_paths(program, entries) if given.path else _show_bounds(image, program, entries)
+        if given.path:
+            _show_paths(program, entries)
+            return 0
+        return 0 if _show_bounds(image, program, entries) else 1
     except AnalysisError as error:
         print(error, file=sys.stderr)
         return 2
-    return 0 if judged else 1
 
 
 def _show_bounds(image: Image, program: Program, asked: dict[str, int]) -> bool:
@@ -65,14 +67,13 @@ def _text(bound: Callable[[int], int], entry: int) -> tuple[str, str]:
         return "-", str(error)
 
 
-def _show_paths(program: Program, asked: dict[str, int]) -> bool:
-    """True: all functions have bounds that were asked for. Raises AnalysisError where one has none."""
+def _show_paths(program: Program, asked: dict[str, int]) -> None:
+    """Raises AnalysisError where one has no bound."""
     for name, entry in asked.items():
         rows = worst_path(WorstCase(program), entry)
         print(f"{sum(row.cycles for row in rows):>10,}  {name}")
         for row in rows:
             print(f"{row.cycles:>10,}  {row.function} {row.line or '-'}, {row.runs:,} times")
-    return True
 
 
 if __name__ == "__main__":

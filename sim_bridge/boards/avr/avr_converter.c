@@ -12,19 +12,9 @@
 #define BAND_GAP_CYCLES (70u * (BOARD_CLOCK_HZ / 1000000u))
 #define STEPS 1024.0
 
-enum {
-  ADEN = 0x80,
-  ADSC = 0x40,
-  ADATE = 0x20,
-  ADIF = 0x10,
-  ADIE = 0x08,
-  ADPS = 0x07,
-  ADLAR = 0x20,
-  REFS = 0xC0,
-  ADTS = 0x07,
-  MUX = 0x0F,
-  MUX_BAND_GAP = 14
-};
+enum { ADEN = 0x80, ADSC = 0x40, ADATE = 0x20, ADIF = 0x10, ADIE = 0x08, ADPS = 0x07 }; /* ADCSRA */
+enum { REFS = 0xC0, ADLAR = 0x20, MUX = 0x0F, MUX_BAND_GAP = 14 };                      /* ADMUX */
+enum { ADTS = 0x07 };                                                                   /* ADCSRB */
 
 static uint64_t clock_cycles(const avr_board *b) {
   unsigned setting = b->avr->data[REG_ADCSRA] & ADPS;

@@ -48,7 +48,8 @@ static void end_write(avr_board *b) {
   raise_flag(b, VECTOR_EE_READY);
 }
 
-void eeprom_due(avr_board *b) {
+void eeprom_due(avr_board *b, uint64_t cycle) {
+  (void)cycle;
   b->eeprom.cells[b->eeprom.address] = b->eeprom.value;
   end_write(b);
 }

@@ -104,6 +104,7 @@ enum {
   REG_PCICR = 0x68,
   REG_EICRA = 0x69,
   REG_PCMSK0 = 0x6B,
+  REG_TIMSK0 = 0x6E,
   REG_ADCL = 0x78,
   REG_ADCH = 0x79,
   REG_ADCSRA = 0x7A,
@@ -173,9 +174,8 @@ typedef enum { TOP_FIXED, TOP_OCRA, TOP_ICR } top_source;
 typedef struct {
   struct avr_board *owner;
   /* what is built into this timer */
-  due_source source;
   uint8_t number;
-  uint8_t address_control_a, address_count, address_compare[2], address_mask;
+  uint8_t address_control_a, address_count, address_compare[2];
   uint8_t vector_overflow, vector_compare[2];
   uint8_t output_port[2], output_bit[2];
   const uint16_t *dividers;
@@ -485,7 +485,7 @@ void watchdog_free(avr_board *b);
 /* avr_eeprom.c */
 void eeprom_init(avr_board *b);
 void eeprom_reset(avr_board *b, bool power_failed);
-void eeprom_due(avr_board *b);
+void eeprom_due(avr_board *b, uint64_t cycle);
 
 /* avr_spans.c; all but spans_free only while there is a recorder */
 uint32_t run_recorded(avr_board *b, uint64_t until); /* as execute_instructions; stops where something is recorded */

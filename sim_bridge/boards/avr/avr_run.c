@@ -42,48 +42,25 @@ void set_due(avr_board *b, due_source source, uint64_t cycle) {
   }
 }
 
+static void (*const HAPPENS[DUE_COUNT])(avr_board *b, uint64_t cycle) = {
+    [DUE_DRIVEN_EDGE] = pins_due_driven,
+    [DUE_SEEN_EDGE] = pins_due_seen,
+    [DUE_NOISE_FILTER] = pins_due_noise_filter,
+    [DUE_TRANSMITTER] = usart_due_transmitter,
+    [DUE_BIT] = usart_due_bit,
+    [DUE_OUTSIDE] = usart_due_outside,
+    [DUE_RECEIVER] = usart_due_receiver,
+    [DUE_CONVERTER] = converter_due,
+    [DUE_WATCHDOG] = watchdog_due,
+    [DUE_EEPROM] = eeprom_due,
+    [DUE_TWI] = twi_due,
+};
+
 static void happen(avr_board *b, due_source source, uint64_t cycle) {
-  switch (source) {
-    case DUE_DRIVEN_EDGE:
-      pins_due_driven(b, cycle);
-      break;
-    case DUE_SEEN_EDGE:
-      pins_due_seen(b, cycle);
-      break;
-    case DUE_NOISE_FILTER:
-      pins_due_noise_filter(b, cycle);
-      break;
-    case DUE_TIMER0:
-    case DUE_TIMER1:
-    case DUE_TIMER2:
-      timer_due(&b->timer[source - DUE_TIMER0], cycle);
-      break;
-    case DUE_TRANSMITTER:
-      usart_due_transmitter(b, cycle);
-      break;
-    case DUE_BIT:
-      usart_due_bit(b, cycle);
-      break;
-    case DUE_OUTSIDE:
-      usart_due_outside(b, cycle);
-      break;
-    case DUE_RECEIVER:
-      usart_due_receiver(b, cycle);
-      break;
-    case DUE_CONVERTER:
-      converter_due(b, cycle);
-      break;
-    case DUE_WATCHDOG:
-      watchdog_due(b, cycle);
-      break;
-    case DUE_EEPROM:
-      eeprom_due(b);
-      break;
-    case DUE_TWI:
-      twi_due(b, cycle);
-      break;
-    case DUE_COUNT:
-      break;
+  if (source >= DUE_TIMER0 && source <= DUE_TIMER2) {
+    timer_due(&b->timer[source - DUE_TIMER0], cycle);
+  } else {
+    HAPPENS[source](b, cycle);
   }
 }
 

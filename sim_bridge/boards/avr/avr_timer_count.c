@@ -225,7 +225,7 @@ void timer_plan(timer_state *t) {
     uint64_t base = t->owner->timer_base[t->number == 2];
     due = base + ((t->known - base) / t->divider + next) * t->divider;
   }
-  set_due(t->owner, t->source, due);
+  set_due(t->owner, DUE_TIMER0 + t->number, due);
 }
 
 void timer_due(timer_state *t, uint64_t cycle) {

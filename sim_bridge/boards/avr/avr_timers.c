@@ -44,11 +44,9 @@ static const uint16_t DIVIDERS_OF_2[8] = {0, 1, 8, 32, 64, 128, 256, 1024};
 
 static const timer_state BUILT_IN[3] = {
     {.number = 0,
-     .source = DUE_TIMER0,
      .address_control_a = 0x44,
      .address_count = 0x46,
      .address_compare = {0x47, 0x48},
-     .address_mask = 0x6E,
      .vector_overflow = VECTOR_TIMER0_OVF,
      .vector_compare = {VECTOR_TIMER0_COMPA, VECTOR_TIMER0_COMPB},
      .output_port = {PORT_D, PORT_D},
@@ -56,11 +54,9 @@ static const timer_state BUILT_IN[3] = {
      .dividers = DIVIDERS,
      .maximum = 0xFF},
     {.number = 1,
-     .source = DUE_TIMER1,
      .address_control_a = 0x80,
      .address_count = 0x84,
      .address_compare = {0x88, 0x8A},
-     .address_mask = 0x6F,
      .vector_overflow = VECTOR_TIMER1_OVF,
      .vector_compare = {VECTOR_TIMER1_COMPA, VECTOR_TIMER1_COMPB},
      .output_port = {PORT_B, PORT_B},
@@ -68,11 +64,9 @@ static const timer_state BUILT_IN[3] = {
      .dividers = DIVIDERS,
      .maximum = 0xFFFF},
     {.number = 2,
-     .source = DUE_TIMER2,
      .address_control_a = 0xB0,
      .address_count = 0xB2,
      .address_compare = {0xB3, 0xB4},
-     .address_mask = 0x70,
      .vector_overflow = VECTOR_TIMER2_OVF,
      .vector_compare = {VECTOR_TIMER2_COMPA, VECTOR_TIMER2_COMPB},
      .output_port = {PORT_B, PORT_D},
@@ -241,20 +235,17 @@ void timers_reset(avr_board *b, uint64_t cycle) {
 }
 
 void timers_init(avr_board *b) {
-  static const uint8_t flags[3][8] = {
-      {VECTOR_TIMER0_OVF, VECTOR_TIMER0_COMPA, VECTOR_TIMER0_COMPB},
-      {VECTOR_TIMER1_OVF, VECTOR_TIMER1_COMPA, VECTOR_TIMER1_COMPB, 0, 0, VECTOR_TIMER1_CAPT},
-      {VECTOR_TIMER2_OVF, VECTOR_TIMER2_COMPA, VECTOR_TIMER2_COMPB},
-  };
   for (int i = 0; i < 3; i++) {
     timer_state *t = &b->timer[i];
     *t = BUILT_IN[i];
-    add_flag_register(b, (uint16_t)(REG_TIFR0 + i), flags[i]);
+    const uint8_t capture = is_wide(t) ? VECTOR_TIMER1_CAPT : 0;
+    const uint8_t flags[8] = {t->vector_overflow, t->vector_compare[0], t->vector_compare[1], 0, 0, capture};
+    add_flag_register(b, (uint16_t)(REG_TIFR0 + i), flags);
     on_write(b, t->address_control_a, write_control, t);
     on_write(b, t->address_control_a + CONTROL_B, write_control, t);
     on_read(b, t->address_count, read_count, t);
     on_write(b, t->address_count, write_count, t);
-    on_write(b, t->address_mask, write_mask, t);
+    on_write(b, (uint16_t)(REG_TIMSK0 + i), write_mask, t);
     for (int channel = 0; channel < 2; channel++) on_write(b, t->address_compare[channel], write_compare, t);
     if (!is_wide(t)) continue;
     on_write(b, t->address_control_a + CONTROL_C, write_control, t);
