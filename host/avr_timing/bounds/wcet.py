@@ -9,9 +9,11 @@ that loop is the start-up, of which only the stretches with interrupts off count
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from avr_timing.bounds.loop_bounds import check_sleep, marks_of
+from avr_timing.bounds.stack import Stack
 from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Context, Known, known, root
 from avr_timing.flow.paths import Graph, Mark, Walk, Way, longest
@@ -42,24 +44,30 @@ class Bound:
 class WorstCase:
     """Bounds of the functions of a program, each worked out once."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, given: Mapping[int, int] | None = None) -> None:
+        """`given`: cycles of functions, by entry, whatever they do: the rest is accounted for elsewhere."""
         self.program = program
+        self._given = given or {}
         self._bounds: dict[tuple[int, Context], Bound] = {}
         self._inside: dict[int, Known] = {}
         self._marks: dict[int, dict[int, list[Mark]]] = {}
+        self._stack = Stack(program, self._given)
         self._under_way: list[int] = []
 
     def of(self, function: str | int) -> Bound:
         """The bound of a function, by name or entry.
 
         Raises:
-            AnalysisError: no such function; a loop without a bound; recursion; it never returns, or waits asleep.
+            AnalysisError: no such function; a loop without a bound; recursion; it never returns, waits asleep, or may
+                return to elsewhere than where it was called (stack.py).
         """
         return self.bound(self.program.entry(function))
 
     def bound(self, entry: int, context: Context | None = None) -> Bound:
         """The same by entry; `context`: registers that hold constants there, else those of any call."""
         function = self.program.functions[entry]
+        if entry in self._given:
+            return Bound(self._given[entry], (), {})
         if entry in self.program.unproven:
             raise AnalysisError(self.program.unproven[entry])
         key = (entry, root(function) if context is None else context)
@@ -90,6 +98,7 @@ class WorstCase:
         walk = longest(graph)
         if walk is None:
             raise AnalysisError(f"{function.name} at {self.program.where(function.entry)} never returns; no bound")
+        self._stack.entered(function.entry, context)  # else it may return to anywhere
         return _told(walk)
 
     def ways(self, block: Block, inside: Known) -> list[Way[int]]:

@@ -124,6 +124,9 @@ def test_planted_change_raises_the_bound_by_what_it_takes(tmp_path: Path, old: s
     ("source", "words"),
     [
         (WHILE.replace("bounded 5", "nop"), "has no bound"),
+        ("main: push r30\n push r31\n ret", "returns at .* with 2 bytes on the stack"),
+        ("main: push r30\n push r31\n rjmp f\n .type f, @function\n f: ret", "main returns at .* with 2 bytes"),
+        ("main: rcall f\n ret\n .type f, @function\n f: out SPH, r25\n out SPL, r24\n ret", "stack pointer gets"),
         (NESTED.replace("bounded 3", "nop"), "has no bound"),
         (NESTED.replace("bounded 4", "nop"), "has no bound"),
         ("main: set\n bld r1, 3\n 1: lsr r24\n asr r1\n sec\n brcs 1b\n ret", "has no bound"),

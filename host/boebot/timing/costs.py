@@ -22,9 +22,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 from avr_timing.bounds.loop_bounds import sleeps
-from avr_timing.bounds.wcet import Bound, WorstCase
+from avr_timing.bounds.wcet import WorstCase
 from avr_timing.errors import AnalysisError
-from avr_timing.flow.constants import Context, Known
+from avr_timing.flow.constants import Known
 from avr_timing.flow.loops import Loop, loops_of
 from avr_timing.flow.paths import Graph, Way, longest
 from avr_timing.interrupts.byte_reads import RECEIVE, ByteReads
@@ -42,18 +42,6 @@ AROUND_TASK = ("task_begins", "task_has_ended")  # called once for each task tha
 CHANGES_POLL, LINK_POLL = "pin_changes_poll", "link_poll"
 WHEEL = "encoder_edge"  # called for each edge of a change
 SLOT_BEGINS = "scheduler"  # the piece before a slot's tasks, with all that the scheduler does
-
-
-class Given(WorstCase):
-    """Bounds in which certain functions take given cycles, whatever they do: the rest is accounted for elsewhere."""
-
-    def __init__(self, program: Program, cycles: Mapping[int, int]) -> None:
-        super().__init__(program)
-        self._given = cycles
-
-    def bound(self, entry: int, context: Context | None = None) -> Bound:
-        """See `WorstCase`."""
-        return Bound(self._given[entry], (), {}) if entry in self._given else super().bound(entry, context)
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +238,7 @@ def _edges(firmware: Firmware) -> tuple[int, int]:
         return 0, 0
     wheel = firmware.entries_of((WHEEL,))
     once = dict.fromkeys(wheel, 0)
-    none, one, two = (Given(_passed(program, entry, passes), once).bound(entry).cycles for passes in (0, 1, 2))
+    none, one, two = (WorstCase(_passed(program, entry, passes), once).bound(entry).cycles for passes in (0, 1, 2))
     return none, max(one - none, two - one) + sum(WorstCase(program).bound(callee).cycles for callee in wheel)
 
 
@@ -269,12 +257,12 @@ def _rounds(firmware: Firmware, edges: int) -> tuple[int, int]:
     elsewhere = dict.fromkeys(firmware.entries_of(names), 0)
     polls = dict.fromkeys(firmware.entries_of((CHANGES_POLL, LINK_POLL)), edges)
     alone = len(loops_of(program.functions[scheduler])) == 1  # else which of them drops ticks is not known
-    cycles = Given(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
+    cycles = WorstCase(_passed(program, scheduler, 0) if alone else program, elsewhere | polls).bound(scheduler).cycles
     done = dict.fromkeys((scheduler, *polls), 0)
     loop = firmware.entry_of(LOOP)
     if loop is None:
         return _main_loop(firmware, done, scheduler), cycles
-    return Given(program, done).bound(loop).cycles + _main_loop(firmware, {loop: 0}, loop), cycles
+    return WorstCase(program, done).bound(loop).cycles + _main_loop(firmware, {loop: 0}, loop), cycles
 
 
 def _main_loop(firmware: Firmware, elsewhere: Mapping[int, int], called: int) -> int:
@@ -282,14 +270,14 @@ def _main_loop(firmware: Firmware, elsewhere: Mapping[int, int], called: int) ->
     main = firmware.entry_of("main")
     if main is None:
         return 0
-    given = Given(firmware.program, elsewhere)
+    given = WorstCase(firmware.program, elsewhere)
     known = given.inside(main)
     function = known.function
     loops = [loop for loop in loops_of(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
     return sum(_once(loop, given, known) for loop in loops)
 
 
-def _once(loop: Loop[int], given: Given, known: Known) -> int:
+def _once(loop: Loop[int], given: WorstCase, known: Known) -> int:
     """Every block of a loop once. A loop within it that sleeps waits for work, and so counts once too; others with all
     their passes.
 
