@@ -418,6 +418,9 @@ def test_nothing_is_not_the_same_as_nothing(
     for asked in (("replay", "run", "--brain", "wander"), ("run", "--again", "run")):
         code, out, err = boebot(capsys, *asked)
         assert (code, out) == (2, "") and "there is nothing to compare" in err
+    copied(many, tmp_path / "damaged", lambda data: data.__setitem__(chunk(data, 0), 0))
+    code, out, err = boebot(capsys, "replay", "damaged", "--brain", "wander")
+    assert (code, out) == (1, "") and "the run from 0.00 s to 0.25 s is lost" in err
 
 
 def strangers(

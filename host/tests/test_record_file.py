@@ -192,6 +192,9 @@ def test_group_that_is_missing_or_there_twice_is_noticed(tmp_path: Path) -> None
     assert str(missing).endswith("the run from 1.00 s to 2.00 s is lost")
     twice = read(data[: begins[3]] + third + data[begins[3] : begins[5]])
     assert twice.found.damages and rows_of(list(twice.groups())) == rows_of(GROUPS[:5])
+    footer = data[-37:]  # and nothing between it and the chunk, not even the chunk's index
+    (missing,) = read(data[: begins[3] - 2 * 31] + footer).found.damages
+    assert str(missing).endswith("the run from 2.00 s to its end is lost")
 
 
 def test_checksum_of_nothing_is_none(tmp_path: Path) -> None:

@@ -62,19 +62,17 @@ def replay(
             if robot is not None:
                 raise BoebotError(f"{run} is a log of CAN frames; expected --node in place of --robot")
             result = read_log(run, kind, node, 1 if seed is None else seed)
-            with streams.kept():
-                commands = [as_on_the_wire(command) for command in replayed(result, brain)]
+        elif (kind, node, seed) != (None, None, None):
+            raise BoebotError(f"{run} is no log of CAN frames; expected no --kind, --node or --seed")
         else:
             result = _recorded(run, robot)
-            if (kind, node, seed) != (None, None, None):
-                raise BoebotError(f"{run} is no log of CAN frames; expected no --kind, --node or --seed")
-            with streams.kept():
-                commands = replayed(result, brain)
+        with streams.kept():
+            commands = replayed(result, brain)
     except BoebotError as error:
         output.say(str(error))
         raise typer.Exit(EXIT_DIFFERS if isinstance(error, CutError) else EXIT_USAGE) from None
     with ending.of_record(result):
-        _compare(result, commands)
+        _compare(result, [as_on_the_wire(command) for command in commands] if is_log(run) else commands)
 
 
 def _compare(result: RunResult, commands: list[Command]) -> None:
@@ -98,6 +96,8 @@ def _recorded(run: Path, number: int | None) -> RunResult:
     if len(robots) > 1:
         raise BoebotError(f"{run} is a run of {len(robots)} robots; expected --robot 1 to {len(robots)}")
     (result,) = robots.values()
+    if isinstance(result.error, CutError) and result.error.lost and not result.record.count("command"):
+        raise result.error
     return result
 
 

@@ -281,8 +281,8 @@ class RecordReader:
                 yield what
             else:
                 found.attachments |= what
-        if hole >= 0 and not found.is_cut:
-            found.damages.append(self._damage(hole, limit, last.end_s, math.inf))
+        if (hole >= 0 or crc is None) and not found.is_cut:
+            found.damages.append(self._damage(max(hole, found.whole_bytes), limit, last.end_s, math.inf))
         elif crc is not None and not found.damages and self._crc(limit) != crc:
             found.damages.append(Damage(0, limit, 0.0, math.inf, "something beside the run is wrong in these"))
 
