@@ -365,6 +365,16 @@ def test_log_ends_with_the_first_run(capsys: pytest.CaptureFixture[str], tmp_pat
     assert boebot(capsys, "replay", str(log), "--brain", "wander", "--seed", "5")[1] == "all 40 commands are the same\n"
 
 
+def test_frames_that_are_there_twice_end_no_run(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, run: RunResult
+) -> None:
+    whole = frames(frames_of(run))
+    begin = set_points(whole)[20]
+    log = write(tmp_path / "can.log", [*whole[: begin + 40], *whole[begin : begin + 40], *whole[begin + 40 :]])
+    code, out, err = boebot(capsys, "replay", str(log), "--brain", "wander", "--seed", "5")
+    assert (code, out, err) == (0, "all 40 commands are the same\n", "")
+
+
 @pytest.mark.parametrize(
     ("lost", "compared", "lacks"),
     [

@@ -340,8 +340,10 @@ class _LogReader:
         if is_other := came.session != self._session:  # has it gone on beside the one before?
             self.is_shared |= 0 < telemetry.tick - self._newest.get(came.session, telemetry.tick) < _SILENCE_TICKS
             self._session, self._accepted = came.session, telemetry.setpoint_sequence
-        self._newest[came.session] = telemetry.tick
         newest = self._telemetry[-1][1].tick if self._telemetry else -1
+        if not is_other and 0 <= newest - telemetry.tick < _SILENCE_TICKS:
+            return  # some of the log is there twice
+        self._newest[came.session] = telemetry.tick
         was_reset = telemetry.tick <= newest
         self._is_over |= bool(self.commands) and (was_reset or is_other)
         if self._is_over:
