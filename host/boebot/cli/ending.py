@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import struct
+import traceback
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -27,7 +28,8 @@ def of_sensible_rows() -> Iterator[None]:
     try:
         yield
     except (ValueError, LookupError, TypeError, ArithmeticError, struct.error, MemoryError) as error:
-        what = f"{type(error).__name__}: {error}"
+        *_, last = traceback.extract_tb(error.__traceback__)  # in case that the fault is the kit's
+        what = f"{type(error).__name__}: {error}; {Path(last.filename).name}, line {last.lineno}"
         raise NoRecordError(f"the record makes no sense ({what}); expected one that a run has written") from error
 
 

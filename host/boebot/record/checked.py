@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from functools import partial
+from itertools import islice
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -23,7 +25,8 @@ def group(body: bytes, most: int) -> Kept | None:
     try:
         stream = ReadDataStream(io.BytesIO(body))
         chunk = Chunk.read(stream)
-        data = _decompressed(chunk.data, most)
+        with ZstdDecompressor().stream_reader(chunk.data) as parts:  # piece by piece, whatever size it claims
+            data = b"".join(islice(iter(partial(parts.read, PIECE), b""), most // PIECE))
         is_whole = (stream.count, len(data), chunk.compression) == (len(body), chunk.uncompressed_size, "zstd")
         if not is_whole or zlib.crc32(data) != chunk.uncompressed_crc:
             return None
@@ -44,14 +47,3 @@ def attachment(body: bytes) -> dict[str, bytes] | None:
         return {found.name: found.data} if is_whole else None
     except _DAMAGES:
         return None
-
-
-def _decompressed(data: bytes, most: int) -> bytes:
-    """Only what there really is takes memory, whatever size the data claim. Raises one of `_DAMAGES`."""
-    found = bytearray()
-    with ZstdDecompressor().stream_reader(data) as stream:
-        while part := stream.read(PIECE):
-            found += part
-            if len(found) > most:
-                raise ValueError(f"a chunk of more than {most:,} B")
-    return bytes(found)

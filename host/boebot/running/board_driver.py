@@ -15,6 +15,7 @@ import contextlib
 import math
 import time as wall
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 from boebot.arguments import duration
@@ -58,13 +59,8 @@ _TICK = reader(messages.Telemetry, "tick")
 _UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
 _SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
 _NOT_YET = 1 << 32  # no tick is later
-
-
-def host_clock() -> float:
-    """Time (s) that goes on while the computer sleeps, where the system has such a clock; else the monotonic one."""
-    if not hasattr(wall, "clock_gettime"):
-        return wall.monotonic()
-    return wall.clock_gettime(getattr(wall, "CLOCK_BOOTTIME", wall.CLOCK_MONOTONIC))
+# Time (s) that goes on while the computer sleeps, where the system has such a clock:
+_host_clock = partial(wall.clock_gettime, getattr(wall, "CLOCK_BOOTTIME", wall.CLOCK_MONOTONIC))
 
 
 def message_ticks(devices_period: int, byte_s: float, tick_s: float) -> int:
@@ -299,25 +295,25 @@ class BoardDriver:
         awaited = -1  # the tick that was looked for
         started_s = received_s = now_s = look_s = transport.now()
         nap_s = link.session.time_out_s / _NAPS if transport.realtime else math.inf
-        awake_s, took_s = host_clock(), 0.0  # as of `now_s`; the brain's step since then
+        awake_s, took_s = _host_clock(), 0.0  # as of `now_s`; the brain's step since then
         wait_until_s = received_s + (period + 1) * tick_s
         started = next_progress = wall.perf_counter()
         meanwhile: list[Received] = []  # what came during a late step of a paced run
         while True:
             received = meanwhile + poll(look_s, min(wait_until_s, now_s + nap_s))
             meanwhile = []
-            stood_s = host_clock() - awake_s - (took_s if took_s <= self.step_limit.seconds else 0.0)
+            stood_s = _host_clock() - awake_s - (took_s if took_s <= self.step_limit.seconds else 0.0)
             if stood_s > (_NAPS - 1) * nap_s:
                 raise BoardError(
                     f"this program stood still for {stood_s:.1f} s, as when a computer sleeps; expected "
-                    f"{(_NAPS - 1) * nap_s:g} s at most: the board at {transport.name} has stopped its motors meanwhile"
+                    f"{(_NAPS - 1) * nap_s:g} s at most: the board at {transport.name} had no host, its motors are off"
                 )
             now_s, took_s = link.polled_s, 0.0
             if link.counts.sessions != self._session:
                 received = self._in_new_session(received)
                 equipment = self.equipment
                 now_s = transport.now()
-            awake_s = host_clock()
+            awake_s = _host_clock()
             restarted = link.counts.board_resets != self.resets
             if not received:
                 if now_s - received_s > silence_s + period * tick_s:
