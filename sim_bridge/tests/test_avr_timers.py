@@ -546,6 +546,17 @@ ICR1_3: Writes = [("ICR1H", 0), ("ICR1L", 3)]
 
 
 @pytest.mark.parametrize(
+    ("mode", "toggles"), [(1, 0), (5, 0), (8, 0), (9, 1), (10, 0), (11, 1), (12, 1), (14, 1), (15, 1)]
+)
+def test_oc1a_toggles_in_the_modes_of_its_tables(mode: int, toggles: bool) -> None:
+    """COM1A = 1: tables 16-1 to 16-3."""
+    settings: Writes = [("TCCR1A", 0x40 | mode & 3), ("TCCR1B", (mode & 12) << 1 | 1), *ICR1_3, *top_1(3)]
+    machine = Machine(f"main: sbi DDRB, 1\n{writes(settings)} 1: rjmp 1b")
+    machine.board.run(1000)
+    assert (len(edges_of(machine.board.log(), 9)) > 50) == toggles
+
+
+@pytest.mark.parametrize(
     ("mode", "top"), [(5, [("OCR0A", 3)]), *((8, ICR1_3), (9, top_1(3)), (10, ICR1_3), (11, top_1(3)))]
 )
 def test_a_phase_correct_timer_overflows_where_it_leaves_bottom(mode: int, top: Writes) -> None:

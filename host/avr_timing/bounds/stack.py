@@ -68,9 +68,9 @@ class Stack:
             AnalysisError: no such function; recursion; a depth that is not the same on all ways or depends on data.
         """
         entry = self.program.entry(function)
-        return self.entered(entry, root(self.program.functions[entry]))
+        return self.bound(entry, root(self.program.functions[entry]))
 
-    def entered(self, entry: int, context: Context) -> Depth:
+    def bound(self, entry: int, context: Context) -> Depth:
         """Of a function that is entered with these registers: ways that they close do not count (wcet.py)."""
         key, function = (entry, context), self.program.functions[entry]
         if entry in self._left_out:
@@ -132,7 +132,7 @@ class Stack:
         last = block.instructions[-1]
         own = ADDRESS if is_call(last) else 0
         for callee in block.calls:
-            called = self.entered(callee, inside.handed(block))
+            called = self.bound(callee, inside.handed(block))
             if state.depth + own + called.bytes > deepest.bytes:
                 deepest = Depth(state.depth + own + called.bytes, (function.name, *called.chain))
         if not (block.edges or is_call(last)) and state.depth != 0:  # a callee of a tail call would return into it, too

@@ -98,7 +98,7 @@ class WorstCase:
         walk = longest(graph)
         if walk is None:
             raise AnalysisError(f"{function.name} at {self.program.where(function.entry)} never returns; no bound")
-        self._stack.entered(function.entry, context)  # else it may return to anywhere
+        self._stack.bound(function.entry, context)  # refuses what may return to elsewhere than its call
         return _told(walk)
 
     def ways(self, block: Block, inside: Known) -> list[Way[int]]:

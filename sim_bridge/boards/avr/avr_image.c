@@ -85,7 +85,7 @@ bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size
   if (begin >= BOOT_BEGIN && begin < b->code_end) {
     b->avr->reset_pc = begin;
   } else {
-    b->code_begin = 1; /* who jumps to 0 has no reset */
+    b->code_begin = 1; /* address 0 is for resets: a jump there is noticed */
   }
   if (!loaded) snprintf(error, error_size, "it holds no program");
   return loaded;

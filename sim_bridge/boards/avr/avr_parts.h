@@ -366,7 +366,7 @@ typedef struct avr_board {
   uint32_t code_begin;    /* a jump to what is below is a soft reset, */
   uint32_t code_end;      /* no instruction of the image stands from here on */
   uint16_t variables_end; /* in data memory */
-  uint16_t lowest_stack;  /* lowest address that the stack may write: there, or lower as long as it is elsewhere */
+  uint16_t lowest_stack;  /* that the stack may write: variables_end, or RAM_BEGIN while it lies among the variables */
   bool one_by_one;        /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   board_counters counters;

@@ -134,7 +134,8 @@ static uint8_t level_after_match(const timer_state *t, int channel, bool down) {
 bool timer_takes_over_pin(const timer_state *t, int channel) {
   if (t->action[channel] == ACTION_NONE) return false;
   if (t->action[channel] != ACTION_TOGGLE || !is_buffered(t)) return true;
-  return channel == 0 && t->top_from != TOP_FIXED; /* else reserved: the port keeps its pin */
+  /* Tables 15-2 to 15-4, 16-2, 16-3: OCnA only; else the port keeps its pin. */
+  return channel == 0 && (t->top_from == TOP_OCRA || (t->top_from == TOP_ICR && t->mode == COUNT_FAST_PWM));
 }
 
 void timer_force_match(timer_state *t, int channel, uint64_t cycle) {

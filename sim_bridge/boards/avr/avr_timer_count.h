@@ -18,8 +18,8 @@ static inline bool is_buffered(const timer_state *t) { return t->mode >= COUNT_F
 
 static inline bool is_wide(const timer_state *t) { return t->maximum > 0xFF; }
 
-/* The register TCNTn is written, or its mode has changed: its way goes on in the same direction, from 0 and without a way
- * down upwards. */
+/* TCNTn gets a value, by a write or because the mode has changed: the timer counts on in its direction, up where that is 0
+ * or the mode has no way down. */
 void timer_set_count(timer_state *t, uint32_t count);
 
 /* Whether a channel drives its pin in place of the port. */

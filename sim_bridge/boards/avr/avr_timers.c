@@ -158,10 +158,11 @@ static void write_high_byte(avr_t *avr, avr_io_addr_t address, uint8_t value, vo
   t->high_byte = value;
 }
 
-/* What a write of a low byte writes. */
+/* The value that a write of a low byte completes. It waits for no other half if a high byte, which has an odd address,
+ * came just before. */
 static uint32_t whole(timer_state *t, avr_io_addr_t address, uint8_t low) {
   if (!is_wide(t)) return low;
-  t->open_half = t->open_half & 1 ? 0 : address; /* high bytes have odd addresses */
+  t->open_half = t->open_half & 1 ? 0 : address;
   return (uint32_t)t->high_byte << 8 | low;
 }
 
