@@ -100,7 +100,7 @@ def messages_header(spec: schema.Schema) -> str:
 
 def parameters_header(spec: schema.Schema) -> str:
     """firmware/src/generated/parameters.h"""
-    lines = [""]
+    lines = ["", "#include <stdint.h>", ""]
     for p in spec.parameter:
         unit = schema.unit_per_count(p.scale, p.unit)
         lines.append(f"#define PARAMETER_{p.name.upper()} {p.id}u /* {unit}: {p.doc} */")

@@ -314,11 +314,12 @@ BAD_LINE = SCRIPT.splitlines().index("        robot.drive(0.1, 7)") + 1
 
 
 def expected_lines(file: str) -> list[str]:
+    slip = "1 is all ahead, and 50 percent of it are 0.5"
     return [
         "step 20 0.4",
         "brain 20 -0.4",
         "brain 20 0.5",
-        f"{file}, line {BAD_LINE}: process 'bad': drive(0.1, 7): motor signals go from -1 to 1",
+        f"{file}, line {BAD_LINE}: process 'bad': drive(0.1, 7): motor signals go from -1 to 1; {slip}",
     ]
 
 
