@@ -380,6 +380,21 @@ def test_what_only_the_end_of_a_record_knows_is_not_known_without_it(
     assert {whole[figure] for figure in unknown} == {0} and None not in whole["wall_clock"].values()
 
 
+def test_mended_record_of_one_that_is_cut_still_says_so(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path
+) -> None:
+    """Else a repetition would differ where it was cut, and commands that are the same would be all that there were."""
+    run = copied(many, tmp_path / "run", lambda data: data.__delitem__(slice(chunk(data, 6), None)))
+    assert boebot(capsys, "report", str(run), "--mend", "-q")[0] == 0
+    for record in (run, run / "record-mended.mcap"):
+        for asked in (
+            ("run", "--again", str(record)),
+            ("replay", str(record), "--brain", str(many.parent / "mine.py")),
+        ):
+            code, out, err = boebot(capsys, *asked)
+            assert code == 0 and "as far as it goes" in out and "the record is cut: it ends at 1.5" in err, asked
+
+
 def test_exit_codes_of_what_is_no_record(capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path) -> None:
     """2 in all commands; 0 for one that is cut; of one whose beginning and end are damaged nothing is known: 1."""
     (tmp_path / "notes").write_text("mine")

@@ -1,6 +1,7 @@
 """A record that is cut or damaged, made whole: what can be read of it, in a new file with an end.
 
-What was damaged stays said in it, and groups keep their numbers: so who reads it finds where something is missing.
+What was damaged, and where it was cut, stays said in it, and groups keep their numbers: so who reads it finds where
+something is missing.
 """
 
 from __future__ import annotations
@@ -23,8 +24,12 @@ def mend(path: Path, result: RunResult | TogetherResult) -> Path:
     """
     mended = path.with_name(MENDED)
     robots = [result] if isinstance(result, RunResult) else result.robots
-    lost = robots[0].error.lost if isinstance(robots[0].error, CutError) else ()
-    said = [replace(one, error=one.error.other) if isinstance(one.error, CutError) and lost else one for one in robots]
+    errors = [one.error for one in robots if isinstance(one.error, CutError)]
+    end = say(
+        [replace(one, error=error.other) for one, error in zip(robots, errors, strict=True)],
+        lost=errors[0].lost,
+        cut=errors[0].cut,
+    )
 
     def write(part: Path) -> None:
         with path.open("rb") as old, part.open("wb", buffering=0) as file:
@@ -34,7 +39,7 @@ def mend(path: Path, result: RunResult | TogetherResult) -> Path:
                     writer.attach(name, data)
             for kept in reader.groups():
                 writer.write(kept.group, kept.end_s, kept.begin_s, kept.number)
-            writer.attach(END, say(said, lost=lost))
+            writer.attach(END, end)
             writer.finish()
 
     return write_whole(mended, write)

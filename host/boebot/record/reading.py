@@ -27,12 +27,15 @@ class CutError(RecordError):
 
     Attributes:
         lost: what is damaged, in words; empty: nothing, it is cut.
+        cut: where it is cut, in words; empty: it is not.
         other: why the run itself ended before its time, as far as the record says.
     """
 
-    def __init__(self, sentence: str, lost: Sequence[str] = (), other: BaseException | None = None) -> None:
+    def __init__(
+        self, sentence: str, lost: Sequence[str] = (), cut: str = "", other: BaseException | None = None
+    ) -> None:
         super().__init__(sentence)
-        self.lost, self.other = lost, other
+        self.lost, self.cut, self.other = lost, cut, other
         self.exit_code = 1 if lost else 0
         self.brief = "record damaged" if lost else "record cut"
 
@@ -58,11 +61,18 @@ def read_run(path: str | Path, *, up_to_damage: bool = False) -> RunResult | Tog
         ]
     except (ValueError, TypeError) as error:
         raise RecordError(f"{file}: {END} in it does not describe a run: {error}") from None
+    # a group that is missing where no byte is wrong: of a record that was mended that was said already
     here = [str(damage) for damage in reader.found.damages if damage.begin < damage.end or not said["lost"]]
-    lost = [*said["lost"], *here]
-    if reader.found.is_cut or lost:
+    lost, cut = [*said["lost"], *here], said["cut"]
+    if reader.found.is_cut:
+        end_s = max(result.record.span(result.record.tick_stream)[1] for result in results)
+        cut = (
+            f"the record is cut: it ends at {end_s:.2f} s of the run, after {reader.found.whole_bytes:,} whole bytes "
+            f"of {file.stat().st_size:,} in {file.name}"
+        )
+    if cut or lost:
         for result in results:
-            _lack(result, reader, file, lost, ends_there=up_to_damage or END not in reader.found.attachments)
+            _lack(result, lost, cut, ends_there=up_to_damage or END not in reader.found.attachments)
     if count == 1:
         return results[0]
     ended = next((result.error for result in results if result.error is not None), None)
@@ -115,7 +125,7 @@ def _said(reader: RecordReader, file: Path) -> dict[str, Any]:
         said: dict[str, Any] = json.loads(text)
         said["arena"], said["robots"][0]
         version = said["format"]
-        said["lost"] = [str(one) for one in said.get("lost", ())]
+        said["lost"], said["cut"] = [str(one) for one in said.get("lost", ())], str(said.get("cut", ""))
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise NoRecordError(f"{file}: {BEGIN} in it cannot be read: {error}") from None
     if version != FORMAT:
@@ -130,29 +140,19 @@ def _arena(description: Any, file: Path) -> Arena:
         raise RecordError(f"{file}: the arena in it cannot be read: {error}") from None
 
 
-def _lack(result: RunResult, reader: RecordReader, file: Path, lost: Sequence[str], *, ends_there: bool) -> None:
+def _lack(result: RunResult, lost: Sequence[str], cut: str, *, ends_there: bool) -> None:
     """Notes what a result lacks. `ends_there`: what the end of the record would have said is taken from its streams;
     what they do not say is not known."""
-    record, found = result.record, reader.found
-    times = record.times_of("telemetry") if record.count("telemetry") else record.times_of("readings")
-    end_s = float(times[-1]) if len(times) else 0.0
+    record, other = result.record, result.error
     if ends_there:
-        result.run_time, result.steps = end_s, record.count("command")
+        result.run_time, result.steps = record.span(record.tick_stream)[1], record.count("command")
         result.clock_offset = record.clock_offset
         result.link, result.counters = {}, {}
         result.late_steps = result.long_steps = result.resets = result.sessions_lost = None
         result.lost_frames = result.bad_frames = result.wall_time = result.longest_step = None
         if lost and result.layout is None and not record.count("clock"):
             result.world = None  # at which of its times the truth was is lost
-    cut = (
-        f"the record is cut: it ends at {end_s:.2f} s of the run, after {found.whole_bytes:,} whole bytes of "
-        f"{file.stat().st_size:,} in {file.name}"
-    )
-    if not lost:
-        result.error = CutError(cut)
-        return
-    other = result.error
-    parts = [f"the record is damaged: {in_words(lost)}; figures are of what is left"]
-    parts += [cut] if found.is_cut else []
+    parts = [f"the record is damaged: {in_words(lost)}; figures are of what is left"] if lost else []
+    parts += [cut] if cut else []
     parts += [] if other is None else [f"the run ended early: {why(other)}"]
-    result.error = CutError("; ".join(parts), [*lost, *([cut] if found.is_cut else [])], other)
+    result.error = CutError("; ".join(parts), lost, cut, other)

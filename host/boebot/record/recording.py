@@ -63,7 +63,7 @@ class Recording:
             keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD), waits=waits)
             for name, data in sources.items():
                 self._disk.writer.attach(as_utf8(name), data)
-            self._disk.writer.attach(BEGIN, say(results, requested), JSON)
+            self._disk.writer.attach(BEGIN, say(results, request=requested), JSON)
         for number, record in enumerate(self.records, 1):
             record.keep_in(keeper if len(self.records) == 1 else Shared(keeper, number))
 
@@ -82,9 +82,9 @@ class Recording:
         return failure
 
 
-def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None, lost: Sequence[str] = ()) -> bytes:
-    """What a record says of a run, as JSON; as it begins, also what was requested. `lost`: what was damaged in the
-    record that this one is mended from."""
+def say(results: Sequence[RunResult], **more: Any) -> bytes:
+    """What a record says of a run, as JSON. `more`: as it begins, the `request`; of a record that is mended, what is
+    `lost` of the one before and where that is `cut`."""
     from boebot.record.facts import facts_of
 
     said: dict[str, Any] = {
@@ -94,8 +94,5 @@ def say(results: Sequence[RunResult], requested: Mapping[str, Any] | None = None
         "written": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "arena": next((result.world.description for result in results if result.world is not None), None),
         "robots": [facts_of(result) for result in results],
-        "lost": lost,
-    }
-    if requested is not None:
-        said["request"] = requested
+    } | more
     return json.dumps(msgspec.to_builtins(said, enc_hook=plain), indent=1).encode()
