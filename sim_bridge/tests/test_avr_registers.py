@@ -197,6 +197,17 @@ def test_an_access_behind_the_memory_is_noted(access: str) -> None:
     assert (address, does) == (entry_of(assemble(source), "at"), "reads or writes behind the memory's end")
 
 
+def test_spm_outside_of_the_boot_section_is_dropped_and_noted() -> None:
+    """27.3.2. A page is to be erased; what is there stays."""
+    source = "main: ldi r30, lo8(page)\n ldi r31, hi8(page)\n ldi r24, 3\n out SPMCSR, r24\nat: spm\n"
+    source += "1: in r24, SPMCSR\n sbrc r24, 0\n rjmp 1b\n lpm r2, Z\n2: rjmp 2b\n .balign 128\npage: .byte 0x5A"
+    machine = Machine(source)
+    machine.board.run(1000)
+    assert machine.avr.data(2) == b"\x5a"
+    ((_, address, does, _),) = machine.board.notes()
+    assert (address, does) == (entry_of(assemble(source), "at"), "executes SPM")
+
+
 # ---- legal, though seldom meant ----
 
 

@@ -18,7 +18,6 @@
 #define SEGMENT_EXECUTABLE 1u
 #define DATA_BASE 0x800000u
 #define EEPROM_BASE 0x810000u
-#define BOOT_BEGIN 0x7000u /* of the largest boot section */
 
 static uint32_t half(const uint8_t *p) { return p[0] | (uint32_t)p[1] << 8; }
 static uint32_t word(const uint8_t *p) { return half(p) | half(p + 2) << 16; }

@@ -16,6 +16,7 @@
 #define REG_SPMCSR 0x57u
 #define SP 0x5Du
 #define ERASED 0xFFFFu
+#define SPM 0x95E8u
 #define FRAME_WORDS 12u /* from IN to OUT where a function makes room for its variables */
 
 enum { Y = 28, Z = 30 };
@@ -163,8 +164,11 @@ static bool uncommon(avr_board *b, uint32_t *pc, uint64_t *until) {
   avr->run_cycle_count = 1; /* one instruction; what wants the core to stop makes it 0 */
   const uint32_t at = *pc, before = word_at(avr->data, SP);
   const uint16_t lowest = b->lowest_stack;
-  if (at < avr->reset_pc && word_at(avr->flash, at) == ERASED) { /* as the chip does, a cycle a word */
-    note(b, at, "runs through", "erased flash", "no program is there: it goes on into the boot section");
+  const unsigned opcode = at < BOOT_BEGIN ? word_at(avr->flash, at) : 0;
+  const bool is_erased = opcode == ERASED && at < avr->reset_pc;
+  if (is_erased || opcode == SPM) { /* nothing, as the chip does, in a cycle */
+    if (is_erased) note(b, at, "runs through", "erased flash", "no program is there: it goes on into the boot section");
+    if (opcode == SPM) note(b, at, "executes", "SPM", "it is dropped: it works in the boot section only (27.3.2)");
     *pc = at + 2;
     avr->cycle++;
   } else {

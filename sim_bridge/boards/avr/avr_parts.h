@@ -28,6 +28,7 @@
 #define NEVER UINT64_MAX
 #define NO_ADDRESS UINT32_MAX
 #define RAM_BEGIN 0x100u
+#define BOOT_BEGIN 0x7000u /* of the largest boot section */
 
 /* From an edge at a pin to the flag or the capture that it causes: synchronizer and edge detector, 2.5 to 3.5 cycles
  * (13.2.1, 17.3). */
