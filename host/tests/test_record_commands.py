@@ -399,6 +399,12 @@ def test_exit_codes_of_what_is_no_record(capsys: pytest.CaptureFixture[str], tmp
     """2 in all commands; 0 for one that is cut; of one whose beginning and end are damaged nothing is known: 1."""
     (tmp_path / "notes").write_text("mine")
     os.mkfifo(tmp_path / "pipe")
+    with (tmp_path / "odd").open("wb") as file:  # its checksums are right
+        writer = RecordWriter(file, "it")
+        writer.attach(
+            "begin.json", json.dumps(json.loads(attachments_of(many)["begin.json"]) | {"robots": [{}]}).encode()
+        )
+        writer.finish()
 
     def no_names(data: bytearray) -> None:
         for name in (b"begin.json", b"end.json"):
@@ -411,7 +417,7 @@ def test_exit_codes_of_what_is_no_record(capsys: pytest.CaptureFixture[str], tmp
     old = copied(many, tmp_path / "old", lambda data: None)
     brain = ("--brain", str(many.parent / "mine.py"))
     for folder, expected in {
-        **dict.fromkeys((tmp_path / name for name in ("notes", "nowhere", "pipe")), 2),
+        **dict.fromkeys((tmp_path / name for name in ("notes", "nowhere", "pipe", "odd")), 2),
         damaged: 1,
         short: 0,
         old: 0,

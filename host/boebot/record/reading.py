@@ -60,7 +60,7 @@ def read_run(path: str | Path, *, up_to_damage: bool = False) -> RunResult | Tog
             for facts, kept in zip(said["robots"], keepers, strict=True)
         ]
     except (ValueError, TypeError) as error:
-        raise RecordError(f"{file}: {END} in it does not describe a run: {error}") from None
+        raise NoRecordError(f"{file}: {END} in it does not describe a run: {error}") from None
     # a group that is missing where no byte is wrong: of a record that was mended that was said already
     here = [str(damage) for damage in reader.found.damages if damage.begin < damage.end or not said["lost"]]
     lost, cut = [*said["lost"], *here], said["cut"]
@@ -137,7 +137,7 @@ def _arena(description: Any, file: Path) -> Arena:
     try:
         return Arena(msgspec.convert(description, ArenaDescription))
     except (ArenaError, msgspec.ValidationError) as error:
-        raise RecordError(f"{file}: the arena in it cannot be read: {error}") from None
+        raise NoRecordError(f"{file}: the arena in it cannot be read: {error}") from None
 
 
 def _lack(result: RunResult, lost: Sequence[str], cut: str, *, ends_there: bool) -> None:
