@@ -6,6 +6,8 @@ message that it speaks in, `<device>_report_<message>()`. Which devices an image
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import schema
 
 
@@ -46,12 +48,12 @@ def devices_header(spec: schema.Schema) -> str:
         "/* how long the payload of one is, */",
         "static inline uint8_t device_message_length(uint8_t number) {",
     ]
-    lines += _switch(others, lambda m: [f"return MSG_{m.name.upper()}_LENGTH;"], "return 0;")
+    lines += _switch(others, lambda m: f"return MSG_{m.name.upper()}_LENGTH;", "return 0;")
     for message in others:
         lines += _sender(message)
     lines += ["", "/* and sends it, if one of its devices has something to say. */"]
     lines += ["static inline bool device_message_send(uint8_t number) {"]
-    lines += _switch(others, lambda m: [f"return send_{m.name}();"], "return false;")
+    lines += _switch(others, lambda m: f"return send_{m.name}();", "return false;")
     doc = "the devices of this image, from protocol/messages.toml and the pin map."
     return schema.c_header("devices.h", doc, lines)
 
@@ -91,10 +93,9 @@ def _sum(messages: list[schema.Message]) -> str:
     return " + ".join(f"BUILDS_{message.name.upper()}" for message in messages) or "0"
 
 
-def _switch(messages: list[schema.Message], body: object, otherwise: str) -> list[str]:
+def _switch(messages: list[schema.Message], body: Callable[[schema.Message], str], otherwise: str) -> list[str]:
     lines = ["  switch (number) {"]
     for number, message in enumerate(messages):
         lines += [f"#if BUILDS_{message.name.upper()}", f"    case {_sum(messages[:number])}:"]
-        lines += [f"      {line}" for line in body(message)]  # type: ignore[operator]
-        lines += ["#endif"]
+        lines += [f"      {body(message)}", "#endif"]
     return [*lines, "    default:", f"      {otherwise}", "  }", "}"]

@@ -56,7 +56,7 @@ print(*sys.modules)
     ended = subprocess.run([sys.executable, "-c", run], cwd=ROOT / "build", capture_output=True, text=True, check=True)
     loaded = set(ended.stdout.splitlines()[-1].split())
     assert "sim_bridge" in loaded and "elftools" not in loaded
-    which_chip = {"avr_timing", "avr_timing.errors", "avr_timing.image", "avr_timing.image.chip"}
+    which_chip = {f"avr_timing{each}" for each in ("", ".errors", ".image", ".image.chip", ".image.section")}
     assert {name for name in loaded if name.startswith("avr_timing")} <= which_chip
 
 

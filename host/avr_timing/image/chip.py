@@ -11,11 +11,12 @@ import re
 import struct
 
 from avr_timing.errors import AnalysisError
+from avr_timing.image.section import HEADER, MAGIC, section_of
 
 CHIP = "ATmega328P"
 SAME_PROGRAM = (CHIP, "ATmega328")  # one data sheet; they differ in the signature and the brown-out detector's switch
-NOTE = b".note.gnu.avr.deviceinfo\0"
-EM_AVR, HEADER, SECTION = 83, struct.Struct("<16sHHIIIIIHHHHHH"), "<IIIIII"
+NOTE = ".note.gnu.avr.deviceinfo"
+EM_AVR = 83
 CORE_BITS, CORE = 0x7F, 5
 
 
@@ -27,12 +28,12 @@ def assumed_chip(path: object, data: bytes) -> str:
         AnalysisError: it is no ELF file for an AVR, or is for another chip than the ATmega328P.
     """
     header = HEADER.unpack(data[: HEADER.size].ljust(HEADER.size, b"\0"))
-    if data[:6] != b"\x7fELF\1\1" or header[2] != EM_AVR:
+    if not data.startswith(MAGIC) or header[2] != EM_AVR:
         raise AnalysisError(
             f"{path} is not an ELF file for an AVR; expected the ELF file of a program for the {CHIP} "
             "(a HEX file has neither the chip's name nor symbols)"
         )
-    core, name = header[7] & CORE_BITS, _name(data, *header[-3:], sections=header[6])
+    core, name = header[7] & CORE_BITS, _name(data)
     if name not in ("", *SAME_PROGRAM):
         raise AnalysisError(f"{path} is for the {name}; expected an image for the {CHIP}")
     if core != CORE:
@@ -40,21 +41,17 @@ def assumed_chip(path: object, data: bytes) -> str:
     return "" if name else f"{path} does not say which chip it is for: it is taken for an {CHIP}"
 
 
-def _name(data: bytes, size: int, count: int, names: int, *, sections: int) -> str:
-    """The chip's name in the note, by the table of sections; empty where no note can be found.
+def _name(data: bytes) -> str:
+    """The chip's name in the note; empty where no note can be found.
 
     Behind the note's header (16 bytes) are six words of memories, the size of a table of offsets, that table, the
     name's offset first, and strings.
     """
     try:
-        strings = struct.unpack_from(SECTION, data, sections + names * size)[4]
-        for place in range(sections, sections + count * size, size or 1):
-            name, _, _, _, begin, length = struct.unpack_from(SECTION, data, place)
-            if data.startswith(NOTE, strings + name):
-                table, offset = struct.unpack_from("<II", data, begin + 40)
-                text = data[begin + 40 + table + offset : begin + length].split(b"\0")[0]
-                name = ascii(text.decode("latin-1"))[1:-1]  # a damaged one may hold orders to the terminal
-                return re.sub(r"^at(\D+)(.*)", lambda m: f"AT{m[1]}{m[2].upper()}", name) or "chip without a name"
-    except struct.error:  # the file ends before
-        pass
-    return ""
+        note = section_of(data, NOTE)
+        table, offset = struct.unpack_from("<II", note, 40)
+    except struct.error:  # there is none, or the file ends before
+        return ""
+    text = note[40 + table + offset :].split(b"\0")[0]
+    name = ascii(text.decode("latin-1"))[1:-1]  # a damaged one may hold orders to the terminal
+    return re.sub(r"^at(\D+)(.*)", lambda m: f"AT{m[1]}{m[2].upper()}", name) or "chip without a name"

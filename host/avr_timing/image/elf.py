@@ -7,7 +7,7 @@ which a firmware may say how often its loops run. The file need not have the las
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -19,6 +19,7 @@ from elftools.elf.sections import SymbolTableSection
 
 from avr_timing.errors import AnalysisError
 from avr_timing.image.chip import assumed_chip
+from avr_timing.image.section import section_of
 from avr_timing.image.source_lines import source_lines
 from avr_timing.program import LoopBound
 
@@ -81,13 +82,14 @@ def _read(path: Path, data: bytes) -> Image:
     """Read once for the same bytes."""
     assumed = assumed_chip(path, data)
     try:
-        return replace(_image(path, ELFFile(BytesIO(data))), assumed_chip=assumed)
+        return _image(path, data, assumed)
     except DAMAGE as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise AnalysisError(f"{path} is not an ELF file, or is damaged: {reason}") from error
 
 
-def _image(path: Path, elf: ELFFile) -> Image:
+def _image(path: Path, data: bytes, assumed: str) -> Image:
+    elf = ELFFile(BytesIO(data))
     if elf["e_type"] != "ET_EXEC":
         raise AnalysisError(f"{path} is not linked ({elf['e_type']}): an image as it is written to flash is expected")
     code, written = _flash(path, elf)
@@ -102,7 +104,8 @@ def _image(path: Path, elf: ELFFile) -> Image:
         ram_bytes=_ram(elf),
         stack_start=stack_start,
         lines=_lines(elf, len(code)),
-        bounds=_bounds(path, _section(path, elf, LOOPS), len(code)),
+        bounds=_bounds(path, section_of(data, LOOPS), len(code)),
+        assumed_chip=assumed,
     )
 
 
@@ -172,16 +175,6 @@ def _symbols(elf: ELFFile) -> tuple[tuple[Symbol, ...], int]:
                 strength = STRENGTH.get(info["bind"], 2)
                 found.append(Symbol(symbol.name, address, symbol["st_size"], info["type"], strength))
     return tuple(sorted(found, key=lambda symbol: (symbol.address, symbol.name))), stack_start
-
-
-def _section(path: Path, elf: ELFFile, name: str) -> bytes:
-    section = elf.get_section_by_name(name)
-    if section is None:
-        return b""
-    data: bytes = section.data()
-    if len(data) < section["sh_size"]:
-        raise AnalysisError(f"{path} is cut off: section {name} is not whole")
-    return data
 
 
 def _bounds(path: Path, data: bytes, end: int) -> tuple[LoopBound, ...]:

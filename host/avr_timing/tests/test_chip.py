@@ -88,7 +88,7 @@ def test_a_note_that_contradicts_is_refused(tmp_path: Path) -> None:
     assert "is for the core avr:6 " in refused(with_flags(data, AVR6))
     assert "is for the ATmega329P" in refused(data.replace(b"atmega328p", b"atmega329p"))
     assert "is for the chip without a name" in refused(data.replace(b"atmega328p\0", bytes(11)))
-    assert "does not say which chip" in assumed_chip("image.elf", data.replace(NOTE, b"x" + NOTE[1:]))
+    assert "does not say which chip" in assumed_chip("image.elf", data.replace(NOTE.encode(), b"x" + NOTE[1:].encode()))
 
 
 CHIPS = ("atmega2560", "atxmega128a1", "attiny85", "atmega32u4", "atmega32", "atmega328p")
@@ -104,7 +104,7 @@ def places(data: bytes) -> list[range]:
     """Bytes of the header, of the table of sections, of the chip's note, of the code, and of all that there is."""
     elf = ELFFile(BytesIO(data))
     found = [range(52), range(elf["e_shoff"], len(data)), range(len(data))]
-    for name in (NOTE[:-1].decode(), ".text"):
+    for name in (NOTE, ".text"):
         section = elf.get_section_by_name(name)
         assert section is not None
         found.append(range(section["sh_offset"], section["sh_offset"] + section["sh_size"]))

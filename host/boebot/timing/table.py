@@ -1,9 +1,4 @@
-"""The timing table that an image carries, from its section `.boebot.timing` alone.
-
-Every run with a board reads it, so the file's section headers are read here and not by a library that knows all of ELF
-and takes longer to load than the table to read. Format: "Tool Interface Standard, Executable and Linking Format",
-version 1.2, book I: the file's header, its section headers, and the table of their names.
-"""
+"""The timing table that an image carries, from its section `.boebot.timing` alone."""
 
 from __future__ import annotations
 
@@ -12,17 +7,15 @@ import struct
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from avr_timing.image.section import section_of
 from boebot.errors import TimingError
 from boebot.files import regular
 
 SECTION = ".boebot.timing"
-MAGIC = b"\x7fELF\x01\x01"  # 32 bits, little-endian
 MOST = 0xFFFFFFFF  # of any number in a row
 VECTORS = 25  # interrupts of the ATmega328P (data sheet, table 12-6), the reset not counted
 LONGEST_CYCLE = 4096  # slots until the schedule repeats: ten seconds
 _DIGITS = 12  # of a number; longer ones are too large anyway
-_HEADER = struct.Struct("<16sHHIIIIIHHHHHH")
-_SECTION = struct.Struct("<10I")
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,9 +118,10 @@ def read_table(path: Path) -> Table:
         data = regular(path).read_bytes()
     except OSError as error:
         raise TimingError(f"{path} cannot be read: {error.strerror or error}") from error
-    if not data.startswith(MAGIC):
-        raise TimingError(f"{path} is not an ELF file, or is damaged: expected one of 32 bits, little-endian")
-    return table_of(path, _section(path, data))
+    try:
+        return table_of(path, section_of(data, SECTION))
+    except struct.error as error:
+        raise TimingError(f"{path} is not an ELF file, or is damaged: {error}") from error
 
 
 def table_of(path: Path, data: bytes) -> Table:
@@ -162,26 +156,6 @@ def _constants(path: Path, found: dict[str, int]) -> Constants | None:
             f"{path}: of the constants of its timing table {missing[0]!r} is missing; expected {', '.join(CONSTANTS)}"
         )
     return Constants(**{name: found[name] for name in CONSTANTS}) if found else None
-
-
-def _section(path: Path, data: bytes) -> bytes:
-    """The contents of the section; empty where there is none."""
-    try:
-        header = _HEADER.unpack_from(data)
-        start, size, count, names = header[6], header[11], header[12], header[13]
-        if not count:
-            return b""
-        headers = [_SECTION.unpack_from(data, start + size * number) for number in range(count)]
-        first = headers[names][4]
-    except (struct.error, IndexError) as error:
-        raise TimingError(f"{path} is not an ELF file, or is damaged: {error}") from error
-    wanted = SECTION.encode() + b"\0"
-    for name, _, _, _, offset, length, *_ in headers:
-        if data[first + name : first + name + len(wanted)] == wanted:
-            if offset + length > len(data):
-                raise TimingError(f"{path} is cut off: section {SECTION} is not whole")
-            return data[offset : offset + length]
-    return b""
 
 
 def _row(path: Path, data: bytes) -> Row:
