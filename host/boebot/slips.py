@@ -3,14 +3,17 @@ of it."""
 
 from __future__ import annotations
 
+import dis
 import re
 import sys
 import tomllib
 from collections.abc import Callable
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+_COMMANDS = {"drive", "drive_speed", "stop", "forward", "turn", "wait", "wait_until"}
 _BRAIN = "boebot.brain.brain"  # not imported here: most scripts need no more of the kit than they name
 
 
@@ -47,6 +50,16 @@ def has_no_truth(reading: type) -> None:
 
     for name, method in (("__bool__", refuse), ("__eq__", guarded(tuple.__eq__)), ("__ne__", guarded(tuple.__ne__))):
         setattr(reading, name, method)
+
+
+def uncalled(function: object) -> tuple[str, int | None]:
+    """A command of the robot that this function names and does not call, as in a line `robot.stop`, and the number of
+    the line; ("", None): it has none."""
+    code = getattr(function, "__code__", None)
+    pairs = () if code is None else pairwise(dis.get_instructions(code))
+    dropped = [one for one, after in pairs if (one.opname, after.opname) == ("LOAD_ATTR", "POP_TOP")]
+    found = (one for one in dropped if one.argval in _COMMANDS)
+    return next(((one.argval, one.positions and one.positions.lineno) for one in found), ("", None))
 
 
 def sleeps(function: object) -> bool:

@@ -46,6 +46,8 @@ ERRORS = [  # a brain, what Python says, the word of our sentence that helps
     ("import robot", "No module named 'robot'", "needs no import"),
     ("from boebot import robot\nrobot.drive(1, 1)", "has no attribute 'drive'", "the robot is no module"),
     ("import boebot\nboebot.drive(1, 1)", "has no attribute 'drive'", "the robot is no module"),
+    (STEP + "robot.stop", "names robot.stop and does not call it", "expected parentheses"),
+    ("class Brain:\n    def step(self, robot):\n        robot.drive", "robot.drive and does not", "parentheses"),
     (STEP + "float(robot.ping.distance)", "not 'NoneType'", "is not None and"),
     (STEP + "robot.ping + 0.1", "can only concatenate tuple", "as in robot.ping.distance"),
     (STEP + "abs(robot.ping)", "bad operand type", "as in robot.ping.distance"),

@@ -311,6 +311,9 @@ def _check_function(function: Callable[..., object], where: str, name: str) -> N
         raise BrainError(f"{where}: {slips.of_sign('async', name=name)}")
     if any(inspect.isgeneratorfunction(part) or inspect.isasyncgenfunction(part) for part in whole):
         raise BrainError(f"{where}: {slips.of_sign('yield', name=name)}")
+    command, line = slips.uncalled(function)
+    if command:
+        raise BrainError(f"{where}, line {line}: {slips.of_sign('uncalled', name=name, command=command)}")
     try:
         inspect.signature(function).bind("the robot")
     except TypeError as error:
