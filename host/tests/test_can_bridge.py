@@ -236,7 +236,7 @@ def test_what_an_interface_brings_back_is_not_of_another_program() -> None:
     name = "virtual:mirror?receive_own_messages=true"
     with bridged(PythonCanBus(BusName.parse(name))) as board:
         result = boebot.run(straight, on=f"can:{name}", seconds=0.3)
-        assert board.error is None and result.resets == 0 and result.steps == 6
+        assert board.error is result.error is None and result.resets == 0 and result.steps > 0
 
 
 def test_board_with_a_number_that_is_taken_does_not_join() -> None:
