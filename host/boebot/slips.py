@@ -6,6 +6,7 @@ from __future__ import annotations
 import dis
 import re
 import sys
+import time
 import tomllib
 from collections.abc import Callable
 from functools import cache
@@ -63,10 +64,15 @@ def uncalled(function: object) -> tuple[str, int | None]:
 
 
 def sleeps(function: object) -> bool:
-    """That function, or one that it names, calls something named sleep."""
-    named = getattr(getattr(function, "__code__", None), "co_names", ())
-    helpers = [getattr(function, "__globals__", {}).get(name) for name in named]
-    return any("sleep" in getattr(getattr(one, "__code__", None), "co_names", ()) for one in (function, *helpers))
+    """That function, or a function or method that it names, calls something named sleep, or it is time.sleep."""
+    owner, known = getattr(function, "__self__", None), getattr(function, "__globals__", {})
+    named = [known.get(name, getattr(owner, name, None)) for name in _names(function)]
+    return time.sleep in named or any("sleep" in _names(one) for one in (function, *named))
+
+
+def _names(function: object) -> tuple[str, ...]:
+    """Of all that it uses and has not made itself."""
+    return getattr(getattr(function, "__code__", None), "co_names", ())
 
 
 def say_unrun() -> None:

@@ -46,6 +46,7 @@ ERRORS = [  # a brain, what Python says, the word of our sentence that helps
     ("import robot", "No module named 'robot'", "needs no import"),
     ("from boebot import robot\nrobot.drive(1, 1)", "has no attribute 'drive'", "the robot is no module"),
     ("import boebot\nboebot.drive(1, 1)", "has no attribute 'drive'", "the robot is no module"),
+    ("\nimport boebot\nboebot.run(__file__)", "is run again while it is loaded", "below if __name__ == '__main__':"),
     (STEP + "robot.stop", "names robot.stop and does not call it", "expected parentheses"),
     ("class Brain:\n    def step(self, robot):\n        robot.drive", "robot.drive and does not", "parentheses"),
     (STEP + "float(robot.ping.distance)", "not 'NoneType'", "is not None and"),
@@ -101,6 +102,12 @@ def test_reading_is_neither_true_nor_a_number_but_equal_to_its_like(reading: Any
     assert one == same and hash(one) == hash(same) and one != one._replace(age=-1)
 
 
+METHOD = """
+import time
+class Brain:
+    def rest(self): time.sleep(0.06)
+    def step(self, robot): self.rest()
+"""
 SLEEPS = "import time\nHELPER\ndef step(robot):\n    robot.drive(0.5, 0.5)\n    REST\n    robot.stop()\n"
 
 
@@ -109,6 +116,8 @@ SLEEPS = "import time\nHELPER\ndef step(robot):\n    robot.drive(0.5, 0.5)\n    
     [
         (SLEEPS.replace("HELPER", "").replace("REST", "time.sleep(0.06)"), "calls sleep"),
         (SLEEPS.replace("HELPER", "def rest(): time.sleep(0.06)").replace("REST", "rest()"), "calls sleep"),
+        (SLEEPS.replace("HELPER", "from time import sleep as rest").replace("REST", "rest(0.06)"), "calls sleep"),
+        (METHOD, "calls sleep"),
         (SLEEPS.replace("HELPER", "").replace("REST", "time.sleep(0.001)"), None),
         ("import time\ndef main(robot):\n    robot.wait(0.1)\n    time.sleep(0.06)\n", "calls sleep"),
         ("def main(robot):\n    robot.drive(0.5, 0.5)\n", "main has ended at once"),

@@ -23,6 +23,7 @@ import importlib.util
 import inspect
 import os
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -43,6 +44,7 @@ FOLDER = Path(__file__).resolve().parent
 _OTHERS = (FOLDER.parent, *map(get_path, ("stdlib", "purelib", "platlib")))  # the kit, Python, other packages
 _NOBODYS = ("<frozen ", *(f"{folder}{os.sep}" for folder in _OTHERS))  # what files begin with that are not the user's
 PYTHON, TOML = ".py", ".toml"  # what brains are written in
+_executing: set[tuple[Path, int]] = set()  # files that are being loaded, each with its thread
 
 
 @dataclass(frozen=True)
@@ -208,6 +210,8 @@ def _find(source: str | Path) -> Path:
 
 def _execute(path: Path) -> ModuleType:
     """Runs the brain's file as a new module."""
+    if (loading := (path, threading.get_ident())) in _executing:
+        raise BrainError(slips.of_sign("itself", file=path.name))
     bundled = path.parent == FOLDER
     name = f"{__name__}.{path.stem}" if bundled else f"boebot_brain_{path.stem}"  # pickles name a class by its module
     spec = importlib.util.spec_from_file_location(name, path)
@@ -217,6 +221,7 @@ def _execute(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         process = os.getpid()
+        _executing.add(loading)
         with _neighbours(path.parent):
             code = compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
             exec(code, module.__dict__)
@@ -225,6 +230,7 @@ def _execute(path: Path) -> ModuleType:
     except BaseException as error:  # also SystemExit, and what the brain itself derives from it
         raise BrainError(explain(error, path)) from error
     finally:
+        _executing.remove(loading)
         leave_copy(process)
     return module
 
