@@ -217,7 +217,7 @@ def test_imperfections_are_switched_off_by_name(capsys: pytest.CaptureFixture[st
     assert code == 0
     assert [table["without"] for table in values.get("robots", [values])] == int(robots) * ["slip, bounce"]
     code, _, err = boebot(capsys, *arguments, "slip,bouncy")
-    assert code == 1 and "no imperfection 'bouncy' to switch off; expected some of" in err
+    assert code == 1 and "no imperfection 'bouncy' to switch off; `boebot list switches` has the names" in err
     assert len(err.splitlines()) == 1
 
 
