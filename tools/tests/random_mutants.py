@@ -38,6 +38,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from avr_timing.closed_pipe import exit_as
 from tools.house import ROOT, sources
 from tools.tests.mutations import KINDS, mutation
 
@@ -48,7 +49,7 @@ UNITS = "tools/pio test -e native_sanitized -e native_quad -e native_boebot -e n
 OUTCOMES = ("caught by ", "survived", "moved", "no end of ")
 # How pytest, PlatformIO and faulthandler (after a crash, or 180 s) name the test that failed.
 FAILED = re.compile(
-    r"^(?:FAILED|ERROR) (.+?)(?: - |$)|^(\S+:test_units.*?)\s*\[FAILED\]|/(test_\w+\.py\", line \d+ in test_\w+)",
+    r"^(?:FAILED|ERROR) (.+?)(?: - |$)|^(\S+\.cpp:\d+: .*): $|/(test_\w+\.py\", line \d+ in test_\w+)",
     re.MULTILINE,
 )
 
@@ -96,7 +97,7 @@ def make(seed: int, count: int) -> None:
                 found = mutation(*place, kind, chance)
             lines[room].remove(place)
             begin = {"id": f"{room}-{number}", "room": room, "file": place[0], "kind": kind}
-            mutants.append({**begin, **found._asdict(), "results": {}, "seconds": {}})
+            mutants.append({**begin, **found._asdict(), "results": {}, "seconds": {}, "commits": {}})
             print(f"{room}-{number} {place[0]}:{place[1]} {kind}", flush=True)
     content = {"seed": seed, "mutants": mutants}
     LIST.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
@@ -166,7 +167,7 @@ def run(when: str, tree: Path, rooms: list[str], only: list[str], limit: float, 
     """Runs what is not run; see above."""
     os.nice(15)
     resource.setrlimit(resource.RLIMIT_FSIZE, (2**32, 2**32))  # a mutant may write without end
-    update(tree, commit)
+    commit = updated(tree, commit)
     mutants = [one for one in listed() if not rooms or one["room"] in rooms]
     if only:
         waiting = [one for one in mutants if one["id"] in only]
@@ -190,20 +191,23 @@ def run(when: str, tree: Path, rooms: list[str], only: list[str], limit: float, 
             result, seconds = "moved", 0
         with kept() as content:
             one = next(one for one in content["mutants"] if one["id"] == mutant["id"])
-            one["results"][when], one["seconds"][when] = result, seconds
+            one["results"][when], one["seconds"][when], one["commits"][when] = result, seconds, commit
         left = (time.monotonic() - begin) / (number + 1) * (len(waiting) - number - 1)
         print(f"{number + 1}/{len(waiting)}, {left / 60:.0f} min left: {mutant['id']} {result}", flush=True)
 
 
-def update(tree: Path, commit: str) -> None:
-    """Brings the copy to a commit and sets it up. Ends the program if that fails."""
-    found = subprocess.run(["git", "rev-parse", commit], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+def updated(tree: Path, commit: str) -> str:
+    """Brings the copy to a commit and sets it up; returns the commit's hash. Ends the program if that fails."""
+    found = subprocess.run(
+        ["git", "rev-parse", "--short=8", commit], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
     if not tree.exists():
         subprocess.run(["git", "clone", "--quiet", "--shared", ROOT, tree], check=True)
     subprocess.run(["git", "checkout", "--quiet", "--force", "--detach", found.strip()], cwd=tree, check=True)
     print(f"Preparing {tree}", flush=True)
     if subprocess.run(["make", "--silent", "setup"], cwd=tree, check=False).returncode:
         sys.exit(f"{tree}: `make setup` failed")
+    return found.strip()
 
 
 def listed() -> list[Mutant]:
@@ -225,7 +229,7 @@ def show() -> None:
             print(f"{one['id']} {one['file']}: {before}; afterwards: {after}")
 
 
-def main() -> None:
+def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -247,7 +251,8 @@ def main() -> None:
         run(asked.when, asked.tree.resolve(), asked.room, asked.only, asked.limit, asked.commit)
     else:
         show()
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    exit_as(main)
