@@ -140,6 +140,7 @@ def test_page_fits_and_can_be_read(url: str, size: tuple[int, int], open_page: O
 
 
 def test_every_control_has_a_name_and_is_reached_by_tab(page: Page) -> None:
+    page.click("#parameters summary")
     page.keyboard.press("w")
     wait_for(page, "!$('release').disabled")
     found = controls(page)
@@ -150,6 +151,7 @@ def test_every_control_has_a_name_and_is_reached_by_tab(page: Page) -> None:
     page.evaluate("document.activeElement.blur()")
     reached = reached_by_tab(page, len(found) + 3)
     assert [name for number, name, _ in found if number not in reached] == [] and all(reached.values())
+    page.click("#parameters summary")
 
 
 def test_pause_step_and_speed(page: Page) -> None:
