@@ -171,7 +171,7 @@ def test_a_null_pointer_that_is_called_is_noted_with_its_source_line(
     """The program begins anew, as on the robot; the run says where that came from, and so does its record."""
     out = tmp_path / "out"
     _, error = command(variants.one(NULL, tmp_path), "--out", str(out))
-    told = rf"the program jumps to its start at address 0x[0-9A-F]{{4}} in cycle \d+ {variants.place(NULL)}: legal, but"
+    told = rf"the program jumps to its start at address 0x[0-9A-F]{{4}} in cycle \d+ {variants.place(NULL)}: no reset, "
     assert len(re.findall(told, error)) == 1, error
     result = robots_of(read_run(out))[1]
     assert [notice for notice in result.notices if re.match(told, notice)] != []
