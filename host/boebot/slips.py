@@ -4,6 +4,7 @@ of it."""
 from __future__ import annotations
 
 import dis
+import inspect
 import re
 import sys
 import time
@@ -66,8 +67,8 @@ def uncalled(function: object) -> tuple[str, int | None]:
 def sleeps(function: object) -> bool:
     """That function, or a function or method that it names, calls something named sleep, or it is time.sleep."""
     owner, known = getattr(function, "__self__", None), getattr(function, "__globals__", {})
-    named = [known.get(name, getattr(owner, name, None)) for name in _names(function)]
-    return time.sleep in named or any("sleep" in _names(one) for one in (function, *named))
+    named = [known.get(name, inspect.getattr_static(owner, name, None)) for name in _names(function)]
+    return any(one is time.sleep or "sleep" in _names(one) for one in (function, *named))
 
 
 def _names(function: object) -> tuple[str, ...]:

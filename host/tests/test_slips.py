@@ -110,10 +110,24 @@ class Brain:
 """
 SLEEPS = "import time\nHELPER\ndef step(robot):\n    robot.drive(0.5, 0.5)\n    REST\n    robot.stop()\n"
 
+BUSY = """
+import time
+import numpy as np
+heard = np.zeros((2, 2))
+class Brain:
+    @property
+    def far(self): raise ValueError("asked too early")
+    def step(self, robot):
+        if robot.time > 100: heard[0, 0] = self.far
+        end = time.perf_counter() + 0.06
+        while time.perf_counter() < end: pass
+"""
+
 
 @pytest.mark.parametrize(
     ("code", "note"),
     [
+        (BUSY, None),
         (SLEEPS.replace("HELPER", "").replace("REST", "time.sleep(0.06)"), "calls sleep"),
         (SLEEPS.replace("HELPER", "def rest(): time.sleep(0.06)").replace("REST", "rest()"), "calls sleep"),
         (SLEEPS.replace("HELPER", "from time import sleep as rest").replace("REST", "rest(0.06)"), "calls sleep"),

@@ -48,8 +48,8 @@ LOCKS = "lock = ctypes.create_string_buffer(64); [ctypes.{kind}(None).pthread_mu
 BACKTRACKS = 're.match("(a+)+b", "a" * 60)  # holds the interpreter, and no signal reaches it outside the main thread'
 LEAVES = "boebot: the brain went on after Ctrl-C, so the whole program was ended; expected no `except:` that catches it"
 SCRIPT = "import boebot\nboebot.run(step, seconds=60, step_timeout=float('inf'))\n"
-THREAD = "threading.Thread(target=time.sleep, args=(1e6,)).start()"
-RETURNS = "\n        ".join((THREAD, "try: time.sleep(1e6)", "except BaseException: pass"))
+THREAD = "threading.Thread(target=threading.Event().wait, args=(1e6,)).start()"
+RETURNS = "\n        ".join((THREAD, "try: threading.Event().wait(1e6)", "except BaseException: pass"))
 MISSING = "boebot: interrupted; the brain gave Python no turn, so what is written at the end of a run is missing"
 
 
