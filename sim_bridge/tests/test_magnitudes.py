@@ -232,6 +232,7 @@ def test_options_say_what_is_wrong() -> None:
     for given, sentence in (
         (["servo_lag_s"], "--imperfection has 'servo_lag_s' without a value; expected NAME=VALUE"),
         (["servo_lag_s=1", "servo_lag_s=2"], "--imperfection has 'servo_lag_s' twice"),
+        (["servo_lg_s=80ms"], "there is no imperfection 'servo_lg_s'; .*did you mean 'servo_lag_s'"),
         (["servo_lag_s=1m"], "--imperfection servo_lag_s: '1m' is no time; expected a number, in s"),
         (["ping_miss=much"], "--imperfection ping_miss: 'much' is no share or number; expected a number"),
     ):

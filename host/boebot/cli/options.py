@@ -123,7 +123,7 @@ def magnitudes(given: list[str] | None) -> dict[str, float]:
     """
     if not given:
         return {}
-    from boebot.imperfections import checked, imperfections  # here: the list of all commands needs none of it
+    from boebot.imperfections import checked, imperfections, unknown  # here: the list of all commands needs none of it
 
     table = imperfections()
     found: dict[str, float] = {}
@@ -132,9 +132,10 @@ def magnitudes(given: list[str] | None) -> dict[str, float]:
         if not equals or name in found:
             wrong = "twice" if equals else "without a value"
             raise BoebotError(f"--imperfection has {name!r} {wrong}; expected NAME=VALUE, once for each name")
-        unit = table[name].unit if name in table else ""
+        if name not in table:
+            raise BoebotError(f"--imperfection: {unknown(name)}")
         try:
-            found[name] = quantity.parse(value, unit)
+            found[name] = quantity.parse(value, table[name].unit)
         except BoebotError as error:
             raise BoebotError(f"--imperfection {name}: {error}") from None
     return checked(found, "--imperfection")
