@@ -79,7 +79,7 @@ def test_refused_with_the_place(tmp_path: Path, source: str, words: str) -> None
 
 
 def test_ways_that_cannot_be_gone_count_neither_for_cycles_nor_for_the_stack(tmp_path: Path) -> None:
-    """Of a weak function that nobody defines the call is there, to address 0, and the test in front of it fails."""
+    """A weak function without a definition: its call goes to address 0, and the test in front of the call fails."""
     source = (
         "extern void hook(void) __attribute__((weak));\nvolatile unsigned char n;\n"
         "__attribute__((noinline)) void tick(void) { if (hook) hook(); n++; }\nint main(void) { tick(); return 0; }\n"

@@ -232,7 +232,7 @@ def _take_leave(connection: socket.socket) -> None:
 
 
 def _check_listener(name: BusName, settings: dict[str, Any]) -> None:
-    """python-can would ask for ten seconds where nobody listens, and for ever where nobody answers."""
+    """python-can would ask for ten seconds where no program listens, and for ever where none answers."""
     port = settings.get("port")
     if not isinstance(port, int):
         raise BoardError(f"{name.text!r} names no port; expected socketcand:CHANNEL?host=HOST&port=PORT")
