@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import subprocess
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -31,6 +32,8 @@ FLAGS = (
     *("-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fno-omit-frame-pointer"),
     *(SANITIZE, "-fno-sanitize-recover=all", "-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}", f"-I{ARENAS}"),
 )
+
+MOST_MB = 2048  # of memory, libFuzzer's own limit
 
 
 class Fuzzer(NamedTuple):
@@ -155,8 +158,10 @@ def run(program: Path, folder: Path, limits: Sequence[str]) -> subprocess.Comple
     name = program.name
     write_seeds(name, folder / "seeds")
     (folder / "corpus").mkdir(exist_ok=True)
-    command = [str(program), f"-max_len={FUZZERS[name].size}", "-timeout=5", f"-artifact_prefix={folder}/", *limits]
-    command += [str(folder / "corpus"), str(folder / "seeds")]
+    # The peak of this process counts as the fuzzer's: it is kept when another program begins in its copy.
+    inherited_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    command = [str(program), f"-max_len={FUZZERS[name].size}", "-timeout=5", f"-rss_limit_mb={MOST_MB + inherited_mb}"]
+    command += [f"-artifact_prefix={folder}/", *limits, str(folder / "corpus"), str(folder / "seeds")]
     return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
 
 
