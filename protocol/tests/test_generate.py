@@ -251,7 +251,7 @@ def grown(clone: Path, robot: str) -> Any:
 
 
 def test_tasks_that_only_some_images_have_are_numbered_once(clone: Path) -> None:
-    """Boe-Bot has a buzzer and no line sensors: of its own tasks `second` would be the one before."""
+    """Boe-Bot has a buzzer and no line sensors. Counted in its image alone, `second` would have a lower number."""
     tasks = clone / "firmware" / "src" / "tasks.def"
     text = tasks.read_text()
     assert text.count("\n#ifdef PIN_LINE_LEFT\nTASK(line, ") == 1

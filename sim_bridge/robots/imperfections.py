@@ -61,8 +61,8 @@ AS_BUILT = Draw(0, noise=False)
 def applied(
     robot: robots.RobotDescription, without: Sequence[str] = (), given: Any = None, *, noise: bool = True
 ) -> robots.RobotDescription:
-    """The robot as a run wants it: the neutral values of what is switched off and the magnitudes that are `given` take
-    the place of its own, in its devices, body, supply and `imperfections`.
+    """The robot as a run wants it. Neutral values of what is switched off, and the magnitudes in `given`, replace the
+    robot's values in its devices, body, supply and `imperfections`.
 
     Raises:
         BoardError: there is no such name; a magnitude is out of its range, is switched off as well, or changes nothing

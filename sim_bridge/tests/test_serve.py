@@ -148,36 +148,27 @@ def test_what_cannot_be_served_is_told() -> None:
         serve("toaster", request(), tcp=0, announce=print, visit=print, running=lambda: False)
 
 
+def serve_program(folder: Path, then: str, visits: list[Visit], running: Callable[[], bool]) -> None:
+    """Serves a board whose program asks for the SPI, which is not built, and goes on with `then`."""
+    image = folder / "program.elf"
+    image.write_bytes(assemble(f"main: ldi r24, 0x51\n out SPCR, r24\n{then}"))
+    asked = replace(request(), image=str(image))
+    serve("avr", asked, tcp=0, announce=lambda _: None, visit=visits.append, running=running)
+
+
 def test_what_the_board_notes_is_heard_while_it_is_served(tmp_path: Path) -> None:
-    image = tmp_path / "program.elf"
-    image.write_bytes(assemble("main: ldi r24, 0x51\n out SPCR, r24\n1: rjmp 1b"))
     visits: list[Visit] = []
-    begun = time.monotonic()
-    serve(
-        "avr",
-        replace(request(), image=str(image)),
-        tcp=0,
-        announce=lambda _: None,
-        visit=visits.append,
-        running=lambda: not visits and time.monotonic() < begun + 5,
-    )
+    until = time.monotonic() + 5
+    serve_program(tmp_path, "1: rjmp 1b", visits, lambda: not visits and time.monotonic() < until)
     (note,) = visits
     assert (note.what, note.client) == ("notes", "the board")
     assert note.why.startswith("the program writes to SPCR at address 0x")
 
 
 def test_what_the_board_notes_just_before_it_crashes_is_heard(tmp_path: Path) -> None:
-    image, visits = tmp_path / "program.elf", list[Visit]()
-    image.write_bytes(assemble("main: ldi r24, 0x51\n out SPCR, r24\n jmp 0x7000"))
+    visits: list[Visit] = []
     with pytest.raises(BoardError, match="goes to 0x7000"):
-        serve(
-            "avr",
-            replace(request(), image=str(image)),
-            tcp=0,
-            announce=lambda _: None,
-            visit=visits.append,
-            running=lambda: True,
-        )
+        serve_program(tmp_path, "jmp 0x7000", visits, lambda: True)
     assert [visit.what for visit in visits] == ["notes"]
 
 
