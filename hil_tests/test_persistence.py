@@ -14,7 +14,7 @@ from boebot.link import messages
 from hil_tests.bootloader import with_bootloader
 from hil_tests.minimal_host import CYCLES_PER_S, TICK_S, MinimalHost, power_on
 from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
-from sim_bridge.tests.symbols import DATA_BASE, entry_of
+from sim_bridge.tests.boards.symbols import DATA_BASE, entry_of
 from tools.avr_program import IMAGES
 
 pytestmark = pytest.mark.emulated

@@ -13,7 +13,7 @@ BOEBOT_SANITIZE=1 $python setup.py --quiet build --build-base build/sanitized --
 # What a run gives must not depend on how the C was compiled: the usual build leaves its bits for the other to compare.
 export BOEBOT_STATE_FILE="$PWD/build/state-bits"
 rm -f "$BOEBOT_STATE_FILE"
-$python -m pytest -q sim_bridge/tests/test_loop.py -k however_it_was_compiled
+$python -m pytest -q sim_bridge/tests/loop/test_run.py -k however_it_was_compiled
 test -s "$BOEBOT_STATE_FILE"
 
 # The tests go beside the libraries that they are to test, or pytest would take those of the checkout; with their compiled

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from boebot.link import messages
 from sim_bridge.boards.board import Level
-from sim_bridge.tests.symbols import find_symbol
+from sim_bridge.tests.boards.symbols import find_symbol
 from sim_bridge.timing.jitter import lost, servo_pulses
 from sim_bridge.timing.jitter_run import drive
 from sim_bridge.timing.loads import FIGURES, Bench

@@ -20,7 +20,7 @@ from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.transport import Transport
 from sim_bridge.serve import Look, serve
-from sim_bridge.tests.avr_program import assemble
+from sim_bridge.tests.boards.avr.avr_program import assemble
 
 pytestmark = pytest.mark.wall_clock
 

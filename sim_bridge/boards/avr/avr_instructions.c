@@ -1,5 +1,5 @@
 /* avr_instructions.c: see avr_instructions.h. After the AVR instruction set manual; cycles are those of AVRe+ with a
- * 16-bit program counter. sim_bridge/tests/test_avr_common_instructions.py has all of them executed here and by simavr.
+ * 16-bit program counter. sim_bridge/tests/boards/avr/test_avr_common_instructions.py has all of them executed here and by simavr.
  *
  * Left to simavr is whatever reaches an I/O register or the interrupt system, or leaves flash or RAM, or would take the
  * stack into the variables: so the check of the stack costs the others nothing.

@@ -175,7 +175,7 @@ def placed(shape: Any, x: float, y: float, heading: float) -> Any:
 @pytest.fixture
 def angular(tmp_path: Path) -> Path:
     """The file in docs/reference/robots.md."""
-    page = (Path(__file__).parents[2] / "docs/reference/robots.md").read_text("utf-8")
+    page = (Path(__file__).parents[3] / "docs/reference/robots.md").read_text("utf-8")
     text = next(block for block in page.split("```toml\n")[1:] if "outline_m = [" in block).partition("```")[0]
     (tmp_path / "angular.toml").write_text(text)
     return tmp_path / "angular.toml"

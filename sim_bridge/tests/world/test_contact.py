@@ -14,8 +14,8 @@ from boebot.description.robots import load_robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots.imperfections import AS_BUILT
-from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World, constant, outline_of
 from sim_bridge.tests.simulated import arena_of, square
+from sim_bridge.tests.world.bodies import CHASSIS, RADIUS, Body, Points, World, constant, outline_of
 
 BOX = [(-0.08, -0.05), (0.06, -0.05), (0.06, 0.05), (-0.08, 0.05)]
 # A fork: open ahead, with a slot that things can enter.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from sim_bridge.boards.board import Damage, ResetCause
-from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
-from sim_bridge.tests.symbols import find_symbol
+from sim_bridge.tests.boards.avr.avr_program import Machine, assemble, edges_of, gaps
+from sim_bridge.tests.boards.symbols import find_symbol
 
 MS = 16_000  # cycles
 BOTH, ONE = 3.4 * MS, 1.8 * MS  # table 8-1: erase and write; one of the two

@@ -18,8 +18,8 @@ from boebot.errors import BoardError
 from sim_bridge.boards.avr import AvrBoard, create
 from sim_bridge.boards.board import BoardAccess
 from sim_bridge.sessions.with_board import open_avr
-from sim_bridge.tests.avr_program import PREAMBLE, Machine, assemble, gaps
-from sim_bridge.tests.symbols import entry_of
+from sim_bridge.tests.boards.avr.avr_program import PREAMBLE, Machine, assemble, gaps
+from sim_bridge.tests.boards.symbols import entry_of
 
 # Bits that are not built, by the names of 36; what the README of boards/avr says in words.
 NOT_BUILT = {

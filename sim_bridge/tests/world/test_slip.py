@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from sim_bridge._core import lib
-from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body, constant
 from sim_bridge.tests.simulated import arena_of, square
+from sim_bridge.tests.world.bodies import ARSIM, BOE_BOT, Body, constant
 
 G = 9.81
 FREE: dict[str, Any] = {"linear_damping": 0.0, "angular_damping": 0.0}

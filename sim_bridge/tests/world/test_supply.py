@@ -13,7 +13,7 @@ from boebot.description.robots import load_robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
-from sim_bridge.tests.bodies import BOE_BOT, Body
+from sim_bridge.tests.world.bodies import BOE_BOT, Body
 
 PACK: dict[str, Any] = {
     "full_v": 7.75,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from sim_bridge._core import ffi, lib
-from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body, World, constant
+from sim_bridge.tests.world.bodies import ARSIM, BOE_BOT, Body, World, constant
 
 FREE: dict[str, Any] = {"linear_damping": 0.0, "angular_damping": 0.0}
 

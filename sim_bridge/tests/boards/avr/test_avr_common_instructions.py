@@ -14,7 +14,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from sim_bridge.boards import avr
 from sim_bridge.boards.emulated import avr_image
-from sim_bridge.tests.avr_program import Machine
+from sim_bridge.tests.boards.avr.avr_program import Machine
 from sim_bridge.timing import measure
 
 WORDS = 12_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim_bridge.boards.board import Level
-from sim_bridge.tests.avr_program import Machine, edges_of, gaps, pairs
+from sim_bridge.tests.boards.avr.avr_program import Machine, edges_of, gaps, pairs
 
 CAPTURE_PIN = 8
 INPUT_LATENCY = 3  # synchronizer and edge detector: 2.5 to 3.5 cycles

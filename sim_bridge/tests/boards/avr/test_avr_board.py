@@ -12,8 +12,8 @@ import pytest
 from boebot.errors import BoardError
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Edge, Level, ResetCause, SentByte
-from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
-from sim_bridge.tests.symbols import entry_of
+from sim_bridge.tests.boards.avr.avr_program import Machine, assemble, edges_of, gaps
+from sim_bridge.tests.boards.symbols import entry_of
 
 # ---- images ----
 

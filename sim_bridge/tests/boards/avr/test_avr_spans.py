@@ -11,8 +11,8 @@ import pytest
 from boebot.errors import BoardError
 from sim_bridge.boards.avr import FUNCTION_IDS, Watch
 from sim_bridge.boards.board import Level, ResetCause
-from sim_bridge.tests.avr_program import Machine, assemble, edges_of
-from sim_bridge.tests.symbols import entry_of
+from sim_bridge.tests.boards.avr.avr_program import Machine, assemble, edges_of
+from sim_bridge.tests.boards.symbols import entry_of
 
 ENTRY, VECTOR_JUMP, RETURN, WAKE_UP = 4, 3, 4, 4  # cycles
 COMPARE_A, COMPARE_B, INT0 = 11, 12, 1  # vectors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sim_bridge.tests.avr_program import Machine, edges_of, gaps
+from sim_bridge.tests.boards.avr.avr_program import Machine, edges_of, gaps
 
 # Two conversions of a channel; PINB5 toggles at the start of each and when its interrupt comes. The CPU sleeps
 # meanwhile, so that the interrupt comes at once: 4 + 4 cycles, jmp 3, sbi 2.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim_bridge.boards.board import Edge, Level
-from sim_bridge.tests.avr_program import Machine, edges_of, gaps
+from sim_bridge.tests.boards.avr.avr_program import Machine, edges_of, gaps
 
 INPUT_LATENCY = 3  # cycles from an edge to the flag of its interrupt
 

@@ -11,8 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sim_bridge._core import ffi, lib
-from sim_bridge.tests.bodies import BOE_BOT, CHASSIS, RADIUS, Body, World, constant
 from sim_bridge.tests.simulated import arena_of, square
+from sim_bridge.tests.world.bodies import BOE_BOT, CHASSIS, RADIUS, Body, World, constant
 
 FREE: dict[str, Any] = {"linear_damping": 0.0, "angular_damping": 0.0}
 ICE: dict[str, Any] = {**FREE, "grip": 0.0}

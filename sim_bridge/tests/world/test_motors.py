@@ -15,7 +15,7 @@ from boebot.description.robots import load_robot
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
-from sim_bridge.tests.bodies import ARSIM, BOE_BOT, Body
+from sim_bridge.tests.world.bodies import ARSIM, BOE_BOT, Body
 
 C_T = C_E = 0.0333
 R_A, C_C, C_V, GEAR = 0.62, 0.008, 0.02, 2.0

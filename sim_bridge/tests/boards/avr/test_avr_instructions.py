@@ -9,8 +9,8 @@ import pytest
 from boebot.errors import BoardError
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level, ResetCause
-from sim_bridge.tests.avr_program import Machine, assemble, edges_of, gaps
-from sim_bridge.tests.symbols import entry_of
+from sim_bridge.tests.boards.avr.avr_program import Machine, assemble, edges_of, gaps
+from sim_bridge.tests.boards.symbols import entry_of
 
 SBI_CYCLES = 2
 

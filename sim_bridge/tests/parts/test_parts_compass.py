@@ -17,9 +17,9 @@ from sim_bridge.boards.emulated import avr_board
 from sim_bridge.devices.part import Part
 from sim_bridge.robots.wiring import add_part
 from sim_bridge.sim import Sim
-from sim_bridge.tests.avr_program import assemble
+from sim_bridge.tests.boards.avr.avr_program import assemble
+from sim_bridge.tests.boards.avr.test_avr_twi import MACROS, RESULTS
 from sim_bridge.tests.simulated import MS, Scripted, arena_of, scripted, square
-from sim_bridge.tests.test_avr_twi import MACROS, RESULTS
 
 SDA, SCL = 18, 19
 HALF = 20  # cycles: 400 kHz

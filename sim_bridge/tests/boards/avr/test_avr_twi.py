@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from sim_bridge.boards.board import Edge, Level
-from sim_bridge.tests.avr_program import Machine, edges_of, gaps
+from sim_bridge.tests.boards.avr.avr_program import Machine, edges_of, gaps
 
 SDA, SCL, MARK = 18, 19, 13
 

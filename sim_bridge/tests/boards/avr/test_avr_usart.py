@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sim_bridge.boards.board import Level
-from sim_bridge.tests.avr_program import Machine, edges_of, gaps
+from sim_bridge.tests.boards.avr.avr_program import Machine, edges_of, gaps
 
 BYTE_CYCLES = 320  # 10 bits at 500,000 baud
 SETUP = """

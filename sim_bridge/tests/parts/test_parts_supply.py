@@ -16,7 +16,7 @@ from sim_bridge.boards.emulated import avr_board, native_board, native_library
 from sim_bridge.devices import battery as battery_model
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim, SimRobot
-from sim_bridge.tests.avr_program import assemble
+from sim_bridge.tests.boards.avr.avr_program import assemble
 from sim_bridge.tests.simulated import MS, SUPPLY, Scripted, arena_of, scripted
 
 TOGGLE = """

@@ -6,7 +6,7 @@ import pytest
 
 from boebot.errors import BoardError
 from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
-from sim_bridge.tests.native_program import native_program
+from sim_bridge.tests.boards.native.native_program import native_program
 
 MS = 16_000  # cycles
 BYTE = 320

@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from boebot.arenas import Arena, ArenaDescription, Moving, Waypoint, load_arena
 from sim_bridge._core import ffi, lib
 from sim_bridge.saved import SavedStateError
-from sim_bridge.tests.bodies import CHASSIS, RADIUS, Body, Points, World
 from sim_bridge.tests.simulated import arena_of, square
+from sim_bridge.tests.world.bodies import CHASSIS, RADIUS, Body, Points, World
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim
 
 DEPTH = 1e-6  # m that a body may be in something

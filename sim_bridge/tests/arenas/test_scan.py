@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from boebot.arenas.arena import Floats
 from sim_bridge._core import ffi, lib
-from sim_bridge.tests.shapes import Shapes, angles, coordinates, ring_of, scenes
+from sim_bridge.tests.arenas.shapes import Shapes, angles, coordinates, ring_of, scenes
 from sim_bridge.tests.simulated import square
 
 LRF = (-math.radians(239.77) / 2, math.radians(239.77) / 2, 683)

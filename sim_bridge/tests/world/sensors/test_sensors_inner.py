@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from sim_bridge._core import ffi, lib
 from sim_bridge.tests.simulated import arena_of
-from sim_bridge.tests.test_sensors import OUTLINE, View, made, source
+from sim_bridge.tests.world.sensors.test_sensors import OUTLINE, View, made, source
 
 # ---- compass, accelerometer ------------------------------------------------------------------------------------------
 
