@@ -2,8 +2,8 @@
 
 One URL names a board: an emulated one by its kind (`avr`, `native`: whatever the entry point group
 `boebot.boards` offers), a real or served one by its port (`/dev/ttyACM0`, `COM3`,
-`serial:/dev/ttyUSB0?baud=250000&reset=no`, `socket://localhost:5000`, `rfc2217://server:2217?baud=115200`,
-`can:socketcan:can0?node=2`). The host library knows emulated boards only through the interfaces below; it never
+`serial:/dev/ttyUSB0?baud=250000&reset=no`, `socket://localhost:5000`, `rfc2217://server:2217?baud=115200`), or by a
+scheme of a guest's. The host library knows emulated boards only through the interfaces below; it never
 imports the simulator.
 """
 
@@ -12,12 +12,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.errors import BoardError, did_you_mean
+from boebot.guests import PORTS, Guest, guests
 from boebot.link.ports.holders import holder_of as holder_of  # for those who serve boards
 from boebot.link.ports.rfc2217 import Rfc2217Transport
 from boebot.link.ports.serial_port import open_serial
@@ -316,7 +316,7 @@ class LiveSession:
 
 def board_kinds() -> list[str]:
     """The emulated boards that are installed."""
-    return sorted(point.name for point in entry_points(group=BOARDS_GROUP))
+    return list(guests(BOARDS_GROUP))
 
 
 def open_board(url: str, request: BoardRequest) -> BoardSession:
@@ -326,8 +326,8 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
         BoardError: no such board, or it cannot be opened, or the robot has none; no such imperfection.
     """
     check_board(url, request.robot)
-    for point in entry_points(group=BOARDS_GROUP, name=url):
-        factory: BoardFactory = _load(point.load, url)
+    if point := guests(BOARDS_GROUP).get(url):
+        factory: BoardFactory = _load(point)
         return factory(request)
     if is_live(url):
         if request.without or request.imperfections:
@@ -350,8 +350,8 @@ def open_together(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
     with_boards = [request.robot for request in requests if request.robot.has_board]
     for robot in with_boards or [request.robot for request in requests]:
         check_board(url, robot)
-    for point in entry_points(group=BOARDS_GROUP if with_boards else VEHICLES_GROUP, name=url):
-        factory = _load(point.load, url)
+    if point := guests(BOARDS_GROUP if with_boards else VEHICLES_GROUP).get(url):
+        factory = _load(point)
         if not isinstance(factory, TogetherFactory):
             raise BoardError(f"board {url!r} cannot share a world with others")
         return factory.together(requests)
@@ -380,8 +380,8 @@ def open_vehicle(url: str, request: BoardRequest) -> VehicleSession:
         BoardError: `url` names a board, or there is no simulator.
     """
     check_board(url, request.robot)
-    for point in entry_points(group=VEHICLES_GROUP):
-        factory: VehicleFactory = _load(point.load, point.name)
+    for point in guests(VEHICLES_GROUP).values():
+        factory: VehicleFactory = _load(point)
         return factory(request)
     raise BoardError("there is no world for a robot without a board: the simulator is not installed")
 
@@ -397,15 +397,16 @@ def find_server() -> Server:
     Raises:
         BoardError: nobody does.
     """
-    for point in entry_points(group=SERVERS_GROUP):
-        server: Server = _load(point.load, point.name)
+    for point in guests(SERVERS_GROUP).values():
+        server: Server = _load(point)
         return server
     raise BoardError("there is nobody to serve an emulated robot: the simulator is not installed")
 
 
 def is_live(url: str) -> bool:
     """Whether `url` names a port rather than an emulated board."""
-    return bool(re.match(r"(serial:|socket://|rfc2217://|can:|/|COM\d+(\?|$)|\\\\\.\\)", url))
+    scheme = url.partition(":")[0]
+    return scheme in guests(PORTS) or bool(re.match(r"(serial:|socket://|rfc2217://|/|COM\d+(\?|$)|\\\\\.\\)", url))
 
 
 def open_port(url: str, baud: int) -> Transport:
@@ -414,7 +415,7 @@ def open_port(url: str, baud: int) -> Transport:
         PORT or serial:PORT       its path, such as /dev/ttyACM0 or a pty's, or COM3
         socket://HOST:PORT        a TCP connection
         rfc2217://HOST:PORT       a serial port that another computer shares
-        can:INTERFACE:CHANNEL     a board on a CAN bus (boebot.can.transport)
+        SCHEME:...                whatever a guest's scheme means
 
     Serial ports, shared ones too, take settings after a question mark, joined by `&`: `baud=RATE` (bit/s, else
     `baud`) and `reset=no` (do not reset the board by DTR; boebot.link.ports.serial_port says how far that goes).
@@ -422,10 +423,9 @@ def open_port(url: str, baud: int) -> Transport:
     Raises:
         BoardError: the URL is malformed, or the port is missing, busy, forbidden or refused.
     """
-    if url.startswith("can:"):
-        from boebot.can.transport import open_can  # not before it is asked for: few have CAN
-
-        return open_can(url)
+    if point := guests(PORTS).get(url.partition(":")[0]):
+        opened: Transport = point.load()(url)
+        return opened
     address, _, query = url.partition("?")
     if address.startswith("socket://"):
         if query:
@@ -480,15 +480,16 @@ def _default_baud(robot: RobotDescription) -> int:
 def _unknown(url: str) -> str:
     kinds = board_kinds()
     emulated = ", ".join(kinds) if kinds else "none: the simulator is not installed"
+    schemes = "".join(f", {scheme}:..." for scheme in guests(PORTS))
     return (
         f"there is no board {url!r}; expected an emulated board ({emulated}), "
-        "a port such as /dev/ttyACM0 or serial:PORT, socket://HOST:PORT, rfc2217://HOST:PORT, or can:INTERFACE:CHANNEL"
+        f"a port such as /dev/ttyACM0 or serial:PORT, socket://HOST:PORT, rfc2217://HOST:PORT{schemes}"
         + did_you_mean(url, kinds)
     )
 
 
-def _load(load: Callable[[], Any], name: str) -> Any:
+def _load(point: Guest) -> Any:
     try:
-        return load()
+        return point.load()
     except ImportError as error:
-        raise BoardError(f"the emulated board {name!r} is not usable here: {error}") from None
+        raise BoardError(f"the emulated board {point.name!r} is not usable here: {error}") from None

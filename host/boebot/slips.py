@@ -8,7 +8,6 @@ import inspect
 import re
 import sys
 import time
-import tomllib
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
@@ -21,6 +20,8 @@ _BRAIN = "boebot.brain.brain"  # not imported here: most scripts need no more of
 
 @cache
 def _table() -> list[dict[str, str]]:
+    import tomllib  # few processes need it
+
     slips: list[dict[str, str]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["slip"]
     return slips
 

@@ -24,16 +24,16 @@ def test_list_of_commands_needs_none_of_them() -> None:
         "finally: print(sorted({name.partition('.')[0] for name in sys.modules}), file=sys.stderr)\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
-    assert all(name in done.stdout for name in app.COMMANDS)
+    assert all(name in done.stdout for name in app.all_commands())
     for heavy in ("numpy", "matplotlib", "mcap", "msgspec", "serial", "rich", "sim_bridge"):
         assert f"'{heavy}'" not in done.stderr, heavy
 
 
-@pytest.mark.parametrize("name", app.COMMANDS)
+@pytest.mark.parametrize("name", app.all_commands())
 def test_command_says_of_itself_what_the_list_says(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = boebot(capsys, name, "--help")
     assert (code, err) == (0, "")
-    assert app.COMMANDS[name][1].rstrip(".") in " ".join(out.split())
+    assert app.described(name).line.rstrip(".") in " ".join(out.split())
 
 
 def test_shell_completes_commands_options_names_and_files(

@@ -11,59 +11,89 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from boebot.cli.options import SETTINGS
+from boebot.guests import COMMANDS as GUESTS
+from boebot.guests import Command, guests
 
 COMMANDS = {
-    "run": ("run.run", "Let a brain drive a robot, and say what happened."),
-    "report": ("report.report", "Print a run's figures and write its files anew, from its record."),
-    "plot": ("plot.plot", "Draw columns of a run over time, a panel for each."),
-    "replay": ("replay.replay", "Run a brain on what was sensed in a run, and name the first command that differs."),
-    "new": ("new.new", "Write a brain, NAME.py, to start from."),
-    "list": ("names.list_names", "List what is bundled, by the names that other commands and Python understand."),
-    "arena": ("arena.arena", "Show an arena: a picture, its size, where a robot starts, and its shapes."),
-    "robot": (
-        "robot.robot",
+    "run": Command("Let a brain drive a robot, and say what happened.", "boebot.cli.run:run"),
+    "report": Command("Print a run's figures and write its files anew, from its record.", "boebot.cli.report:report"),
+    "plot": Command("Draw columns of a run over time, a panel for each.", "boebot.cli.plot:plot"),
+    "replay": Command(
+        "Run a brain on what was sensed in a run, and name the first command that differs.", "boebot.cli.replay:replay"
+    ),
+    "new": Command("Write a brain, NAME.py, to start from.", "boebot.cli.new:new"),
+    "list": Command(
+        "List what is bundled, by the names that other commands and Python understand.", "boebot.cli.names:list_names"
+    ),
+    "arena": Command(
+        "Show an arena: a picture, its size, where a robot starts, and its shapes.", "boebot.cli.arena:arena"
+    ),
+    "robot": Command(
         "Show a robot: a picture from above with its wiring, its measures, and a table of its wires.",
+        "boebot.cli.robot:robot",
     ),
-    "experiment": ("experiment.experiment", "Run experiments of the notes: figures, measured against expected."),
-    "serve": ("serve.serve", "Offer the emulated robot to other programs, until Ctrl-C."),
-    "bridge": ("bridge.bridge", "Put a board on a CAN bus: every message both ways, until Ctrl-C."),
-    "dbc": ("dbc.dbc", "Write the CAN database of a robot's messages, for CAN tools; or check one."),
-    "doctor": (
-        "doctor.doctor",
+    "experiment": Command(
+        "Run experiments of the notes: figures, measured against expected.", "boebot.cli.experiment:experiment"
+    ),
+    "serve": Command("Offer the emulated robot to other programs, until Ctrl-C.", "boebot.cli.serve:serve"),
+    "bridge": Command("Put a board on a CAN bus: every message both ways, until Ctrl-C.", "boebot.cli.bridge:bridge"),
+    "dbc": Command("Write the CAN database of a robot's messages, for CAN tools; or check one.", "boebot.cli.dbc:dbc"),
+    "doctor": Command(
         "Examine port, firmware and each device of a robot that stands still; say what is not as it should be.",
+        "boebot.cli.doctor:doctor",
     ),
-    "info": ("info.info", "Say who is at a port: firmware, compiler, image, devices."),
-    "teleop": ("teleop.teleop", "Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end."),
-    "link": ("link.link", "Watch the link: counters of both ends, round trips, the board's clock."),
-    "parameters": ("parameters.app", "List, read, set, save and reset the board's parameters."),
-    "timing": ("timing.timing", "What the firmware may take, what it took, and whether that fits its budgets."),
+    "info": Command("Say who is at a port: firmware, compiler, image, devices.", "boebot.cli.info:info"),
+    "teleop": Command(
+        "Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end.", "boebot.cli.teleop:teleop"
+    ),
+    "link": Command("Watch the link: counters of both ends, round trips, the board's clock.", "boebot.cli.link:link"),
+    "parameters": Command("List, read, set, save and reset the board's parameters.", "boebot.cli.parameters:app"),
+    "timing": Command(
+        "What the firmware may take, what it took, and whether that fits its budgets.", "boebot.cli.timing:timing"
+    ),
 }
-"""Module and function in boebot.cli of each sub-command, and what the list of them says."""
+"""Those of the core; guests add theirs (boebot.guests)."""
 
 
 class Commands(TyperGroup):
-    """The sub-commands: only their lines, until one is asked for."""
+    """The sub-commands of the core and of its guests: only their lines, until one is asked for."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.commands = {name: TyperCommand(name, help=line) for name, (_, line) in COMMANDS.items()}
+        self.commands = dict.fromkeys(all_commands(), TyperCommand(None))  # for its "Did you mean"
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """A command that has only its line."""
+        return TyperCommand(cmd_name, help=described(cmd_name).line) if cmd_name in self.commands else None
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """All of them, with their lines."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+            formatter.write_dl([(name, described(name).line) for name in self.commands])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Of these arguments the command, as it is."""
-        if args[0] in COMMANDS:
-            self.commands[args[0]] = command(args[0])
-        return super().resolve_command(ctx, args)
+        name, found, rest = super().resolve_command(ctx, args)
+        return name, found and command(args[0]), rest
+
+
+def all_commands() -> list[str]:
+    """Their names."""
+    return [*COMMANDS, *guests(GUESTS)]
+
+
+def described(name: str) -> Command:
+    """The command of that name."""
+    if name in COMMANDS:
+        return COMMANDS[name]
+    found: Command = guests(GUESTS)[name].load()
+    return found
 
 
 def command(name: str) -> Any:
     """A sub-command with its options, imported."""
-    module, _, attribute = COMMANDS[name][0].partition(".")
-    work = getattr(import_module(f"boebot.cli.{module}"), attribute)
+    module, _, attribute = described(name).work.partition(":")
+    work = getattr(import_module(module), attribute)
     if not isinstance(work, typer.Typer):
         function, work = work, typer.Typer(add_completion=False, **SETTINGS)
         work.command()(function)

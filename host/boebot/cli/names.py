@@ -19,10 +19,11 @@ from boebot.brains import bundled_files
 from boebot.cli import completion, options, output
 from boebot.description.robots import load_robot, robot_names
 from boebot.errors import did_you_mean
+from boebot.guests import LISTS, guests
 from boebot.imperfections import imperfections, switches
 
 Row = dict[str, Any]
-KINDS = ("robots", "arenas", "brains", "behaviors", "experiments", "imperfections", "switches")
+KINDS = ("robots", "arenas", "brains", "behaviors", "experiments", "imperfections", "switches", *guests(LISTS))
 
 
 def list_names(
@@ -44,7 +45,7 @@ def list_names(
         raise typer.BadParameter(
             f"there is no list of {what!r}; expected {', '.join(KINDS)}{did_you_mean(what, KINDS)}"
         )
-    found = {name: rows() for name, rows in _ROWS.items() if what in (None, name)}
+    found = {name: _rows(name) for name in KINDS if what in (None, name)}
     if json:
         output.print_json(found)
         return
@@ -52,6 +53,11 @@ def list_names(
         if len(found) > 1:
             output.line(name)
         _print(rows)
+
+
+def _rows(kind: str) -> list[Row]:
+    rows: Callable[[], list[Row]] = _ROWS[kind] if kind in _ROWS else guests(LISTS)[kind].load()
+    return rows()
 
 
 def _print(rows: Sequence[Row]) -> None:

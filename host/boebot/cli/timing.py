@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +13,7 @@ import typer
 from boebot import resources
 from boebot.cli import completion, options, output, quantity, streams, timing_board
 from boebot.errors import BoebotError, TimingError
+from boebot.guests import guests
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
@@ -225,12 +225,12 @@ def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
 
 def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
     """What the entry point of that name measures of the image; None: it is not installed."""
-    points = list(entry_points(group=GROUP, name=name))
-    if not points:
+    point = guests(GROUP).get(name)
+    if point is None:
         output.say(f"nothing is measured: no emulator is installed that can ({GROUP}: {name})")
         return None
     try:
-        work = points[0].load()
+        work = point.load()
     except ImportError as error:
         raise TimingError(f"the image cannot be measured here: {error}") from None
     with output.share_bars([f"measuring {image.name}"]) as watch:

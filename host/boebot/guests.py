@@ -1,0 +1,89 @@
+"""What packages beside the core add to it. They join by entry points, each under a name in one of these groups:
+
+    boebot.boards     a kind of emulated board       boebot.boards.BoardFactory
+    boebot.vehicles   a world without boards         boebot.boards.VehicleFactory
+    boebot.servers    who offers emulated robots     boebot.boards.Server
+    boebot.ports      a scheme of URLs               Callable[[str], Transport], given the whole URL
+    boebot.commands   a sub-command                  Command
+    boebot.lists      a list of `boebot list`        Callable[[], list[dict[str, Any]]]: rows with a name and a title
+    boebot.formats    a format of `boebot report`    Callable[[Mapping[int, RunResult], Path], list[Path]]: it writes
+                                                     robots, by their numbers, into a folder
+    boebot.records    a foreign record, by suffix    boebot.guests.ReadRecord
+
+Nothing of a guest is imported before it is asked for. The entry points are looked up once per process; names of the
+core come before those of guests.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+if TYPE_CHECKING:
+    from boebot.record.result import RunResult
+
+PORTS, COMMANDS, LISTS, FORMATS, RECORDS = (
+    f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records")
+)
+
+
+class Command(NamedTuple):
+    """A sub-command. The entry point stands in a module that imports next to nothing: it is loaded for the list of
+    all, the work only when the command is given."""
+
+    line: str
+    """In the list of all commands."""
+    work: str
+    """`module:name` of a function, or of a typer.Typer."""
+
+
+class ReadRecord(Protocol):
+    """Reads a record that others have made, as far as a run shows in it."""
+
+    def __call__(self, path: Path, robot: str | None, node: str | None, seed: int) -> RunResult:
+        """The run of one board: of that kind (None: as it says itself), of that name there (None: the only one), with
+        that seed of the brain's chance.
+
+        Raises:
+            BoebotError: it cannot be read.
+        """
+
+
+class Guest(NamedTuple):
+    """An entry point."""
+
+    name: str
+    place: str
+    """`module:name`."""
+
+    def load(self) -> Any:
+        """What it names, imported."""
+        module, _, attribute = self.place.partition(":")
+        return getattr(import_module(module), attribute)
+
+
+def guests(group: str) -> Mapping[str, Guest]:
+    """The entry points of a group by name, in the order of their names."""
+    return {guest.name: guest for guest in sorted(_all().get(group, ()))}
+
+
+@cache
+def _all() -> dict[str, list[Guest]]:
+    """By group, as the packages that are installed declare them. importlib.metadata reads the same files, and takes
+    18 ms of each start for it, this 2 ms."""
+    found: dict[str, list[Guest]] = defaultdict(list)
+    for folder in sys.path:
+        for path in Path(folder).glob("*.dist-info/entry_points.txt"):
+            group = ""
+            for line in path.read_text("utf-8").splitlines():
+                name, _, place = line.partition("=")
+                if line.startswith("["):
+                    group = line.strip("[] ")
+                elif place and group.startswith("boebot."):
+                    found[group].append(Guest(name.strip(), place.strip()))
+    return found
