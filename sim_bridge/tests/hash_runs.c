@@ -18,7 +18,7 @@
 #include "../world/sensors/sonar.h"
 #include "../world/sensors/touch.h"
 
-#define WORLDS 9 /* a row (world/row.h) and one alone */
+#define WORLDS 9
 #define STEPS 600
 #define BODY 8
 

@@ -93,11 +93,6 @@ static void read_one(vehicles *self, size_t i, size_t number, const sensing *s) 
   if (sensor->period > 0.0) sample_hold_take(&slot->hold, s->time, *readings);
 }
 
-void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint *from) {
-  const sensing s = sensing_of(&self->worlds[i], from);
-  read_one(self, i, number, &s);
-}
-
 void vehicle_sense(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
   if (w->state.sensed == w->state.step + 1) return;

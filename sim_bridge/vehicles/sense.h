@@ -7,9 +7,6 @@
 /* Readings of world `i` after its present step; does nothing when they are there already. */
 void vehicle_sense(vehicles *self, size_t i);
 
-/* The same for one sensor, if it is due; `from`: where the body is. */
-void vehicle_sense_one(vehicles *self, size_t i, size_t number, const viewpoint *from);
-
 /* Each sensor's place for the numbers that it keeps. */
 void vehicle_sensors_give_numbers(vehicles *self);
 

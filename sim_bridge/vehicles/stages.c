@@ -16,6 +16,12 @@ int vehicles_send(vehicles *self, size_t i, double left, double right) {
   return VEHICLE_OK;
 }
 
+/* Torque of a quasi-static DC motor by its signal and the speed of its wheel. */
+static double dc_torque(const motor_dc_parameters *motor, double signal, double speed, double hold) {
+  const double volts = signal * motor->voltage_maximum; /* V = s V_max: a signal that was sent is limited */
+  return motor_dc_geared(motor, motor_dc_current(motor, volts, speed), speed, motor_dc_stopping(motor, hold));
+}
+
 /* Torques of both wheels for the next step. */
 static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   vehicle_state *s = &w->state;
@@ -26,8 +32,7 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
       const double speed = rims[side] / m->body.wheel_radius;
       out[side] = m->full ? motor_dc_step(motor, &s->currents[side], motor_dc_voltage(motor, s->signals[side]), speed,
                                           w->hold, m->dt)
-                          : vehicle_dc_torque(motor, m->body.wheel_radius, s->signals[side], rims[side],
-                                              motor_dc_stopping(motor, w->hold));
+                          : dc_torque(motor, s->signals[side], speed, w->hold);
     }
     return;
   }
@@ -57,12 +62,11 @@ static void begin_step(void *owner, double out[2]) {
   torques(w->all->model, w, out);
 }
 
-void vehicle_moved(vehicle *self) {
-  self->state.acceleration = (self->body.state.speed - self->speed_before) / self->all->model->dt;
-  self->state.step++;
+static void has_moved(void *owner) {
+  vehicle *w = owner;
+  w->state.acceleration = (w->body.state.speed - w->speed_before) / w->all->model->dt;
+  w->state.step++;
 }
-
-static void has_moved(void *owner) { vehicle_moved(owner); }
 
 static void end_step(void *owner) {
   vehicle *w = owner;

@@ -10,7 +10,6 @@
 #define VEHICLES_VEHICLE_H
 
 #include "../world/world.h"
-#include "geometry/numbers.h"
 #include "model.h"
 
 /* python: begin */
@@ -129,9 +128,6 @@ typedef struct {
  * signals any more. */
 extern const world_robot_operations VEHICLE_OPERATIONS;
 
-/* A part of it: the step that the body has made is counted. */
-void vehicle_moved(vehicle *self);
-
 struct vehicles {
   const vehicle_model *model;
   size_t count, state_size;
@@ -142,13 +138,5 @@ struct vehicles {
   double *readings;
   unsigned char *brains;
 };
-
-/* Torque of a quasi-static DC motor by its signal and the speed of its wheel's rim. `stopping`: of motor_dc_stopping. */
-NUMBERS_INLINE double vehicle_dc_torque(const motor_dc_parameters *motor, double wheel_radius, double signal,
-                                        double rim, double stopping) {
-  const double volts = signal * motor->voltage_maximum; /* V = s V_max: a signal that was sent is limited */
-  const double speed = rim / wheel_radius;
-  return motor_dc_geared(motor, motor_dc_current(motor, volts, speed), speed, stopping);
-}
 
 #endif

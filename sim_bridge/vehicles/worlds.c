@@ -6,7 +6,7 @@
 #include "sense.h"
 #include "vehicle.h"
 
-#define SPEED_LIMIT 100.0 /* m/s: as body_drive.h limits it */
+#define SPEED_LIMIT 100.0 /* m/s: as body_step.c limits it */
 #define TURN_LIMIT 1000.0 /* rad/s */
 
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {

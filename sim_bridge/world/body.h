@@ -14,7 +14,6 @@
 #include "geometry/arena.h"
 #include "geometry/scene.h"
 #include "outline.h"
-#include "row.h"
 
 /* python: begin */
 enum { BODY_HEADING_LIMIT = 100000 }; /* rad, that a body may be placed at: beyond it an angle loses its precision */

@@ -1,14 +1,15 @@
-/* body_step.c: see body_step.h; the parts of a step in body_drive.h. */
+/* body_step.c: see body_step.h. */
 #include "body_step.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "body_drive.h"
 #include "contact.h"
 #include "geometry/numbers.h"
 #include "ground.h"
 
+#define SPEED_LIMIT 100.0 /* m/s: a drive that diverges stays finite */
+#define TURN_LIMIT 1000.0 /* rad/s */
 #define SLIP_ROUNDS 40
 #define SLIP_SETTLED 1e-12 /* m/s */
 
@@ -46,34 +47,52 @@ static void hold_across(body *self, const scene *around, const double limits[2],
 }
 
 /* New speeds by the torques. */
-void body_drive(body *self, const scene *around, const double torque[2], double dt) {
+static void drive(body *self, const scene *around, const double torque[2], double dt) {
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   double limits[2];
   if (!s->slipping && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
-    double speed = s->speed;
-    double turn_rate = s->turn_rate;
-    body_speed_up(self, torque[0], torque[1], dt, &speed, &turn_rate);
-    if (!p->slip || s->lateral == 0.0) {
-      ground_limits(self, around->arena, limits);
-      if (!p->slip || ground_holds(self, limits, torque[0], torque[1], speed, turn_rate, dt)) {
-        s->speed = speed;
-        s->turn_rate = turn_rate;
-        if (s->lateral != 0.0) hold_across(self, around, limits, dt);
-        return;
-      }
+    /* (2.31), (2.32), (3.16), (3.17) */
+    const double force = self->force_gain * (torque[0] + torque[1]) - self->drag * s->speed;
+    const double moment = self->torque_gain * (torque[1] - torque[0]) - self->turn_drag * s->turn_rate;
+    const double speed = number_limited(s->speed + dt * force, SPEED_LIMIT);
+    const double turn_rate = number_limited(s->turn_rate + dt * moment, TURN_LIMIT);
+    if (p->slip ? s->lateral == 0.0 : s->lateral != 0.0) ground_limits(self, around->arena, limits);
+    if (!p->slip || (s->lateral == 0.0 && ground_holds(self, limits, torque[0], torque[1], speed, turn_rate, dt))) {
+      s->speed = speed;
+      s->turn_rate = turn_rate;
+      if (s->lateral != 0.0) hold_across(self, around, limits, dt);
+      return;
     }
   }
   ground_limits(self, around->arena, limits);
   slide(self, around, limits, torque, dt);
-  s->speed = number_limited(s->speed, BODY_SPEED_LIMIT);
-  s->lateral = number_limited(s->lateral, BODY_SPEED_LIMIT);
-  s->turn_rate = number_limited(s->turn_rate, BODY_TURN_LIMIT);
-  s->rim_left = number_limited(s->rim_left, 10.0 * BODY_SPEED_LIMIT);
-  s->rim_right = number_limited(s->rim_right, 10.0 * BODY_SPEED_LIMIT);
+  s->speed = number_limited(s->speed, SPEED_LIMIT);
+  s->lateral = number_limited(s->lateral, SPEED_LIMIT);
+  s->turn_rate = number_limited(s->turn_rate, TURN_LIMIT);
+  s->rim_left = number_limited(s->rim_left, 10.0 * SPEED_LIMIT);
+  s->rim_right = number_limited(s->rim_right, 10.0 * SPEED_LIMIT);
 }
 
 /* ---- steps -------------------------------------------------------------------------------------------------------- */
+
+/* While motors drive, a mover that waited presses on nobody: what it pinches would have to have two speeds. */
+static void rest_movers(const scene *around, double dt) {
+  for (size_t i = 0; i < around->movers_count; i++) around->movers[i].stops = around->movers[i].waits ? 0.0 : dt;
+}
+
+/* All movers go, until contacts stop one. */
+static void start_movers(const scene *around, double dt) {
+  for (size_t i = 0; i < around->movers_count; i++) around->movers[i].stops = dt;
+}
+
+static void count_waits(const scene *around, double dt) {
+  for (size_t i = 0; i < around->movers_count; i++) {
+    mover *m = &around->movers[i];
+    m->waits = m->stops < dt;
+    m->waited += dt - m->stops;
+  }
+}
 
 /* Distance of a mover from the circle that holds the body. */
 static double mover_gap(const body *self, const mover *m) {
@@ -102,7 +121,7 @@ static int is_long(const body *self, const scene *around, double way, double dt)
 /* 1 if nothing can come within the body's reach during the step, in which its middle moves by `way`: it stays within the
  * clear circle around where it looked, and no mover is near. Where it looked last must not show: what goes through
  * contact without touching anything comes out the same. */
-int body_stays_clear(body *self, const scene *around, double way, double dt) {
+static int stays_clear(body *self, const scene *around, double way, double dt) {
   const body_state *s = &self->state;
   const body_surroundings *near = &self->near;
   if (is_long(self, around, way, dt)) return 0;
@@ -120,17 +139,18 @@ int body_stays_clear(body *self, const scene *around, double way, double dt) {
   return 1;
 }
 
-/* Heading, (3.18), then position, where nothing is in the way. */
+/* Heading, (3.18), then position, (3.19)-(3.22), where nothing is in the way. */
 static void move_freely(body *self, double way, double dt) {
   body_state *s = &self->state;
   contact_turn(self, s->turn_rate * dt);
-  body_shift(s->speed, s->lateral, s->cosine, s->sine, dt, &s->x, &s->y);
+  s->x += (s->speed * s->cosine - s->lateral * s->sine) * dt;
+  s->y += (s->speed * s->sine + s->lateral * s->cosine) * dt;
   s->distance += way;
   s->touching = 0;
 }
 
 /* Moves by `way`; `clear`: what stays_clear says. */
-void body_move_alone(body *self, const scene *around, int clear, double way, double dt) {
+static void move_alone(body *self, const scene *around, int clear, double way, double dt) {
   if (clear) {
     move_freely(self, way, dt);
   } else {
@@ -140,7 +160,7 @@ void body_move_alone(body *self, const scene *around, int clear, double way, dou
 
 static int is_finite(double left, double right) { return fabs(left) + fabs(right) < 1e300; }
 
-void body_turn_wheels(body *self, double dt) {
+static void turn_wheels(body *self, double dt) {
   body_state *s = &self->state;
   if (!s->slipping) { /* rolling without slip, (2.16), (2.17) */
     s->rim_left = body_left_speed(self);
@@ -155,13 +175,13 @@ int body_advance(body *self, const scene *around, double torque_left, double tor
   const double torque[2] = {torque_left, torque_right};
   if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
   if (!is_finite(torque_left, torque_right)) return BODY_BAD_TORQUE;
-  body_rest_movers(around, dt);
-  body_drive(self, around, torque, dt);
-  body_start_movers(around, dt);
+  rest_movers(around, dt);
+  drive(self, around, torque, dt);
+  start_movers(around, dt);
   const double way = body_way(self, dt);
-  body_move_alone(self, around, body_stays_clear(self, around, way, dt), way, dt);
-  body_count_waits(around, dt);
-  body_turn_wheels(self, dt);
+  move_alone(self, around, stays_clear(self, around, way, dt), way, dt);
+  count_waits(around, dt);
+  turn_wheels(self, dt);
   return BODY_OK;
 }
 
@@ -225,12 +245,12 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
   body *sorted[BODY_MAXIMUM];
   body *together[BODY_MAXIMUM];
   size_t group[BODY_MAXIMUM];
-  body_rest_movers(around, dt);
+  rest_movers(around, dt);
   for (size_t i = 0; i < count; i++) {
     sorted[i] = bodies[order[i]];
-    body_drive(sorted[i], around, torques[order[i]], dt);
+    drive(sorted[i], around, torques[order[i]], dt);
   }
-  body_start_movers(around, dt);
+  start_movers(around, dt);
   find_groups(sorted, count, around, dt, group);
   for (size_t i = 0; i < count; i++) {
     if (group[i] != i) continue;
@@ -240,12 +260,12 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
     }
     if (members == 1) {
       const double way = body_way(sorted[i], dt);
-      body_move_alone(sorted[i], around, body_stays_clear(sorted[i], around, way, dt), way, dt);
+      move_alone(sorted[i], around, stays_clear(sorted[i], around, way, dt), way, dt);
     } else {
       contact_move(together, members, around, dt);
     }
   }
-  body_count_waits(around, dt);
-  for (size_t i = 0; i < count; i++) body_turn_wheels(sorted[i], dt);
+  count_waits(around, dt);
+  for (size_t i = 0; i < count; i++) turn_wheels(sorted[i], dt);
   return BODY_OK;
 }

@@ -1,4 +1,4 @@
-/* body_step.h: bodies move for a step of time, alone, together in one world, or a row of worlds side by side. */
+/* body_step.h: bodies move for a step of time, alone or together in one world. */
 #ifndef WORLD_BODY_STEP_H
 #define WORLD_BODY_STEP_H
 
@@ -14,9 +14,5 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
 
 /* The same for one robot. */
 int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
-
-/* The same for ROW robots of one model, each alone in its world; torques are finite, dt as it has to be. */
-void body_advance_row(body *const bodies[], const scene around[], const double torques_left[],
-                      const double torques_right[], double dt);
 
 #endif

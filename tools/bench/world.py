@@ -84,10 +84,6 @@ def rows_of_steps() -> None:
     figure(name, "× slower", at_most=2.5, rounds=PAIRS, of="median")(
         lambda: ask("compiled", edges=48) / ask("compiled", edges=4000)
     )
-    name = "world: batch of eight, which go side by side, against seven, which go alone; a world's step"
-    figure(name, "× faster", rounds=PAIRS, of="median")(
-        lambda: ask("compiled", edges=48, worlds=8) / ask("compiled", edges=48, worlds=7)
-    )
 
 
 def rows_of_rays() -> None:

@@ -59,7 +59,7 @@ class Shapes:
         lib.ray_fan_set(fan, [math.cos(look) for look in looks], [math.sin(look) for look in looks], len(looks))
         distances = ffi.new("double[]", len(looks) + 3)
         question = ffi.new("fan_question *", (self.handle, fan, x, y, 1.0, 0.0, reach, height, distances))
-        lib.arena_fans(question, 1)
+        lib.arena_fan(question)
         return list(distances)[: len(looks)]
 
 

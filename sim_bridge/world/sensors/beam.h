@@ -64,18 +64,19 @@ static inline double beam_ray(const beam *self, const viewpoint *from, beam_orig
   return scene_ray(from->around, at.x, at.y, cosine, sine, reach, self->height, from->id, hit);
 }
 
-/* The question for the distances along all rays, see arena_fans. */
-static inline fan_question beam_question(const beam *self, const viewpoint *from, double reach, double *distances) {
+/* Distances along all rays, as beam_ray; room for a multiple of 4. */
+static inline void beam_rays(const beam *self, const viewpoint *from, double reach, double *distances) {
   const beam_origin at = beam_from(self, from);
-  return (fan_question){.where = from->around->arena,
-                        .rays = &self->fan,
-                        .x = at.x,
-                        .y = at.y,
-                        .cosine = from->cosine,
-                        .sine = from->sine,
-                        .reach = reach,
-                        .height = self->height,
-                        .distances = distances};
+  const fan_question question = {.where = from->around->arena,
+                                 .rays = &self->fan,
+                                 .x = at.x,
+                                 .y = at.y,
+                                 .cosine = from->cosine,
+                                 .sine = from->sine,
+                                 .reach = reach,
+                                 .height = self->height,
+                                 .distances = distances};
+  scene_fan(from->around, &question, from->id);
 }
 
 /* A source whose next draws are those of `step`, at most 1024 per step: a reading is a function of key and step alone. */

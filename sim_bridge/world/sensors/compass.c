@@ -17,12 +17,13 @@ void compass_field(const compass_parameters *p, const viewpoint *from, double cu
 
 double compass_read(const compass_parameters *p, const viewpoint *from, double current, noise_source *noise) {
   double heading = from->heading;
-  if (compass_is_disturbed(p)) {
+  if (p->iron_x != 0.0 || p->iron_y != 0.0 || p->current_x != 0.0 || p->current_y != 0.0) {
     double x, y;
     compass_field(p, from, current, &x, &y);
     heading = number_atan2(-y, x);
   }
-  return compass_of(p, heading, p->sigma > 0.0 ? noise_next_normal(noise) : 0.0);
+  const double draw = p->sigma > 0.0 ? noise_next_normal(noise) : 0.0;
+  return number_wrap(heading + p->bias + p->sigma * draw);
 }
 
 /* ---- of a robot without a board ----------------------------------------------------------------------------------- */

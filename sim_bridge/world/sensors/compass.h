@@ -7,7 +7,6 @@
 #ifndef SENSORS_COMPASS_H
 #define SENSORS_COMPASS_H
 
-#include "geometry/numbers.h"
 #include "sensor.h"
 
 /* python: begin */
@@ -30,14 +29,5 @@ double compass_read(const compass_parameters *self, const viewpoint *from, doubl
 
 extern const sensor_kind *const compass_sensor;
 /* python: end */
-
-static inline int compass_is_disturbed(const compass_parameters *p) {
-  return p->iron_x != 0.0 || p->iron_y != 0.0 || p->current_x != 0.0 || p->current_y != 0.0;
-}
-
-/* The reading by the heading that the field shows and a normal draw, 0 without noise. */
-NUMBERS_INLINE double compass_of(const compass_parameters *self, double heading, double draw) {
-  return number_wrap(heading + self->bias + self->sigma * draw);
-}
 
 #endif

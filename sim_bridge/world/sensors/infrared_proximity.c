@@ -15,26 +15,35 @@ int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_p
   return 0;
 }
 
+/* (3.13): min((c1 / d^2 + c2) cos(kappa), 1), without dividing by a square that may be 0; 0 where nothing was met. `inward`:
+ * cos(kappa). */
+static double reading_of(double c1, double c2, double distance, double inward) {
+  const double squared = distance * distance;
+  const double product = (c1 + c2 * squared) * inward;
+  const double limited = product < squared ? product / squared : 1.0;
+  return distance >= 0.0 ? limited : 0.0;
+}
+
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise) {
-  double distances[BEAM_RAYS];
-  double c1[BEAM_RAYS];
+  const beam *beam = &self->beam;
+  double sum = 0.0;
   if (self->reflectance) { /* each surface reflects in its own way */
-    const beam_origin at = beam_from(&self->beam, from);
-    for (int i = 0; i < self->beam.rays; i++) {
+    const beam_origin at = beam_from(beam, from);
+    for (int i = 0; i < beam->rays; i++) {
       ray_hit hit = {.infrared = 0.0};
-      distances[i] = beam_ray(&self->beam, from, at, i, self->range, &hit);
-      c1[i] = self->c1 * hit.infrared;
+      const double distance = beam_ray(beam, from, at, i, self->range, &hit);
+      sum += reading_of(self->c1 * hit.infrared, self->c2, distance, beam->inward[i]);
     }
   } else {
-    const fan_question question = infrared_proximity_ask(self, from, distances);
-    arena_fans(&question, 1);
-    scene_fan_movers(from->around, &question, from->id);
-    for (int i = 0; i < self->beam.rays; i++) c1[i] = self->c1;
+    double distances[BEAM_RAYS];
+    beam_rays(beam, from, self->range, distances);
+    for (int i = 0; i < beam->rays; i++) sum += reading_of(self->c1, self->c2, distances[i], beam->inward[i]);
   }
-  double sum = 0.0;
-  for (int i = 0; i < self->beam.rays; i++)
-    sum += infrared_proximity_ray(c1[i], self->c2, distances[i], self->beam.inward[i]);
-  return infrared_proximity_of(self, sum, self->sigma > 0.0 ? noise_next_normal(noise) : 0.0);
+  const double draw = self->sigma > 0.0 ? noise_next_normal(noise) : 0.0;
+  const double exact = sum / (double)beam->rays;           /* (3.12) */
+  const double noisy = exact * (1.0 + self->sigma * draw); /* (3.1) */
+  const double least = noisy > 0.0 ? noisy : 0.0;
+  return least < 1.0 ? least : 1.0;
 }
 
 /* ---- of a robot without a board ----------------------------------------------------------------------------------- */

@@ -6,7 +6,6 @@
 #ifndef SENSORS_INFRARED_PROXIMITY_H
 #define SENSORS_INFRARED_PROXIMITY_H
 
-#include "geometry/numbers.h"
 #include "sensor.h"
 
 /* python: begin */
@@ -33,29 +32,5 @@ double infrared_proximity_read(const infrared_proximity *self, const viewpoint *
 
 extern const sensor_kind *const infrared_proximity_sensor;
 /* python: end */
-
-/* The same in parts, for many sensors at once, all without `reflectance`: the question that arena_fans is to answer, what
- * each ray adds, and the reading. */
-static inline fan_question infrared_proximity_ask(const infrared_proximity *self, const viewpoint *from,
-                                                  double *distances) {
-  return beam_question(&self->beam, from, self->range, distances);
-}
-
-/* (3.13): min((c1 / d^2 + c2) cos(kappa), 1), without dividing by a square that may be 0; 0 where nothing was met. `inward`:
- * cos(kappa). */
-NUMBERS_INLINE double infrared_proximity_ray(double c1, double c2, double distance, double inward) {
-  const double squared = distance * distance;
-  const double product = (c1 + c2 * squared) * inward;
-  const double limited = product < squared ? product / squared : 1.0;
-  return distance >= 0.0 ? limited : 0.0;
-}
-
-/* The reading by a normal draw, 0 without noise. */
-NUMBERS_INLINE double infrared_proximity_of(const infrared_proximity *self, double sum, double draw) {
-  const double exact = sum / (double)self->beam.rays;      /* (3.12) */
-  const double noisy = exact * (1.0 + self->sigma * draw); /* (3.1) */
-  const double least = noisy > 0.0 ? noisy : 0.0;          /* each a single operation, no branch */
-  return least < 1.0 ? least : 1.0;
-}
 
 #endif

@@ -5,6 +5,8 @@
 
 #include "geometry/numbers.h"
 
+#define ARSIM_STEP_S 0.01
+
 int odometer_check(const odometer_parameters *p) {
   const double lengths = p->half_track + p->wheel_radius + p->factor_left + p->factor_right;
   if (!isfinite(lengths + p->sigma_step + p->sigma_share + p->edges_per_turn + p->slips_per_s + p->slip_share))
@@ -22,13 +24,22 @@ void odometer_calibrate(odometer_state *s, double x, double y, double heading, d
 }
 
 void odometer_advance(const odometer_parameters *p, odometer_state *s, double left, double right) {
-  odometer_lay_off(p->half_track, odometer_share(p), left, right, &s->x, &s->y, &s->heading, &s->distance);
+  /* Share of the step's turn that is made before its travel is laid off. */
+  const double share = p->rule == ODOMETER_MIDPOINT ? 0.5 : (p->rule == ODOMETER_EULER ? 0.0 : 1.0);
+  const double travel = 0.5 * (left + right);
+  const double turn = (right - left) / (2.0 * p->half_track);
+  double sine, cosine;
+  number_sincos(s->heading + share * turn, &sine, &cosine);
+  s->x += travel * cosine;
+  s->y += travel * sine;
+  s->heading = number_wrap(s->heading + turn);
+  s->distance += fabs(travel);
 }
 
 /* What the odometer believes one wheel has travelled. */
 static double seen(const odometer_parameters *p, double angle, double factor, double dt, double *rest,
                    noise_source *noise) {
-  double travel = odometer_travel(p, angle, factor);
+  double travel = factor * angle * p->wheel_radius;
   if (p->sigma_share > 0.0) travel *= 1.0 + p->sigma_share * noise_next_normal(noise);
   if (p->slips_per_s > 0.0 && noise->on && noise_next_uniform(noise) < p->slips_per_s * dt)
     travel *= 1.0 - p->slip_share;
@@ -39,7 +50,10 @@ static double seen(const odometer_parameters *p, double angle, double factor, do
     *rest = (count - whole) * edge;
     travel = whole * edge;
   }
-  if (p->sigma_step > 0.0) travel += odometer_spread(p, dt) * noise_next_normal(noise);
+  if (p->sigma_step > 0.0) {
+    const double steps = dt == ARSIM_STEP_S ? 1.0 : sqrt(dt / ARSIM_STEP_S);
+    travel += steps * p->sigma_step * noise_next_normal(noise);
+  }
   return travel;
 }
 

@@ -7,12 +7,7 @@
 #ifndef SENSORS_ODOMETER_H
 #define SENSORS_ODOMETER_H
 
-#include <math.h>
-
-#include "geometry/numbers.h"
 #include "sensor.h"
-
-#define ODOMETER_ARSIM_STEP_S 0.01
 
 /* python: begin */
 enum { ODOMETER_MIDPOINT = 0, ODOMETER_EULER = 1, ODOMETER_NEW_HEADING = 2 }; /* at which heading a step is laid off */
@@ -52,38 +47,5 @@ void odometer_step(const odometer_parameters *self, odometer_state *state, doubl
 
 extern const sensor_kind *const odometer_sensor;
 /* python: end */
-
-/* 1 if nothing but the noise of sigma_step comes between the wheels' travel and the estimate. */
-static inline int odometer_is_plain(const odometer_parameters *p) {
-  return !(p->sigma_share > 0.0) && !(p->slips_per_s > 0.0) && !(p->edges_per_turn > 0.0);
-}
-
-/* What the odometer believes a wheel has travelled that turned by `angle`. */
-NUMBERS_INLINE double odometer_travel(const odometer_parameters *p, double angle, double factor) {
-  return factor * angle * p->wheel_radius;
-}
-
-/* Spread of the travel of a wheel in `dt` s. */
-NUMBERS_INLINE double odometer_spread(const odometer_parameters *p, double dt) {
-  return (dt == ODOMETER_ARSIM_STEP_S ? 1.0 : sqrt(dt / ODOMETER_ARSIM_STEP_S)) * p->sigma_step;
-}
-
-/* Share of a step's turn that is made before its travel is laid off. */
-static inline double odometer_share(const odometer_parameters *p) {
-  return p->rule == ODOMETER_MIDPOINT ? 0.5 : (p->rule == ODOMETER_EULER ? 0.0 : 1.0);
-}
-
-/* (2.7)-(2.9) */
-NUMBERS_INLINE void odometer_lay_off(double half_track, double share, double left, double right, double *x, double *y,
-                                     double *heading, double *distance) {
-  const double travel = 0.5 * (left + right);
-  const double turn = (right - left) / (2.0 * half_track);
-  double sine, cosine;
-  number_sincos(*heading + share * turn, &sine, &cosine);
-  *x += travel * cosine;
-  *y += travel * sine;
-  *heading = number_wrap(*heading + turn);
-  *distance += fabs(travel);
-}
 
 #endif

@@ -123,8 +123,8 @@ typedef struct {
   double *distances; /* of each ray, to be written: room for a multiple of 4 */
 } fan_question;
 
-/* The distances of arena_ray, bit for bit. Many questions at once are faster than one after the other. */
-void arena_fans(const fan_question *questions, size_t count);
+/* The distances of arena_ray, bit for bit. */
+void arena_fan(const fan_question *question);
 
 /* Distance from (x, y) to the nearest edge or circle, at most `limit`. */
 double arena_clearance(const arena *self, double x, double y, double limit);

@@ -1,22 +1,14 @@
-/* ray_fan.c: the nearest item along each of several rays from one point, see arena_fans in arena.h.
+/* ray_fan.c: the nearest item along each of several rays from one point, see arena_fan in arena.h.
  *
  * Four rays of one fan go against an edge at once. What depends on the point and the edge alone, the numerator of (3.6),
  * is computed once. Each ray's distance comes from the operations of ray_edge in the same order, so it has the same bits;
- * loops of four turns without branches become vectors. The lists of several groups are looked up before the first is
- * asked: a look-up waits for memory, and the processor begins with the next one meanwhile.
+ * loops of four turns without branches become vectors.
  */
 #include "arena_data.h"
 
 #define GROUP RAY_FAN_GROUP
-#define AT_ONCE 4u   /* entries that are asked before the first look at whether the rest can be nearer */
-#define TOGETHER 16u /* groups of rays whose lists are looked up before the first is asked */
+#define AT_ONCE 4u /* entries that are asked before the first look at whether the rest can be nearer */
 #define FARTHEST 1e9
-
-#ifdef __GNUC__
-#define LOOK_AHEAD(address) __builtin_prefetch(address)
-#else
-#define LOOK_AHEAD(address) ((void)(address))
-#endif
 
 /* Directions of four rays. */
 typedef struct {
@@ -115,14 +107,6 @@ NUMBERS_INLINE int ask_list(const fan_question *q, const group *rays, const ray_
   return thin > 0.0;
 }
 
-/* Four rays of a question, and the list that they ask. */
-typedef struct {
-  const fan_question *from;
-  size_t first; /* ray */
-  group rays;
-  const ray_list_entry *list; /* NULL: none */
-} lookup;
-
 /* The lists for a question, NULL: there are none. */
 static const ray_list_cell *cell_of(const fan_question *q) {
   if (q->where->lists == NULL || q->where->grid.columns == 0 || !(q->reach > 0.0)) return NULL;
@@ -130,35 +114,18 @@ static const ray_list_cell *cell_of(const fan_question *q) {
   return ray_lists_at(q->where->lists, q->x, q->y);
 }
 
-static void ask(const lookup *four) {
-  const fan_question *q = four->from;
+void arena_fan(const fan_question *q) {
   const double limit = q->reach < FARTHEST ? q->reach : FARTHEST;
-  const group *rays = &four->rays;
-  if (four->list != NULL && ask_list(q, rays, four->list, limit, &q->distances[four->first])) return;
-  for (size_t k = 0; k < GROUP && four->first + k < q->rays->rays; k++) {
-    q->distances[four->first + k] =
-        arena_ray(q->where, q->x, q->y, rays->cosine[k], rays->sine[k], q->reach, q->height, NULL);
-  }
-}
-
-void arena_fans(const fan_question *questions, size_t count) {
-  lookup found[TOGETHER];
-  size_t waiting = 0;
-  for (size_t i = 0; i < count; i++) {
-    const fan_question *q = &questions[i];
-    const ray_list_cell *cell = cell_of(q);
-    for (size_t first = 0; first < q->rays->rays; first += GROUP) {
-      lookup *four = &found[waiting++];
-      four->from = q;
-      four->first = first;
-      turn(q, first, &four->rays);
-      const int listed = cell != NULL && q->rays->alike >> first / GROUP & 1u;
-      four->list = listed ? cell->list[ray_list_for(four->rays.cosine[0], four->rays.sine[0])] : NULL;
-      LOOK_AHEAD(four->list);
-      if (waiting < TOGETHER) continue;
-      for (size_t k = 0; k < waiting; k++) ask(&found[k]);
-      waiting = 0;
+  const ray_list_cell *cell = cell_of(q);
+  for (size_t first = 0; first < q->rays->rays; first += GROUP) {
+    group rays;
+    turn(q, first, &rays);
+    if (cell != NULL && q->rays->alike >> first / GROUP & 1u) {
+      const ray_list_entry *list = cell->list[ray_list_for(rays.cosine[0], rays.sine[0])];
+      if (ask_list(q, &rays, list, limit, &q->distances[first])) continue;
     }
+    for (size_t k = 0; k < GROUP && first + k < q->rays->rays; k++)
+      q->distances[first + k] =
+          arena_ray(q->where, q->x, q->y, rays.cosine[k], rays.sine[k], q->reach, q->height, NULL);
   }
-  for (size_t k = 0; k < waiting; k++) ask(&found[k]);
 }

@@ -114,7 +114,8 @@ double scene_ray(const scene *self, double x, double y, double c, double s, doub
   return best;
 }
 
-void scene_fan_movers(const scene *self, const fan_question *q, uint32_t self_id) {
+void scene_fan(const scene *self, const fan_question *q, uint32_t self_id) {
+  arena_fan(q);
   for (size_t k = 0; k < self->movers_count; k++) {
     const mover *m = &self->movers[k];
     if ((self_id != 0 && m->id == self_id) || !(m->height >= q->height)) continue;

@@ -50,8 +50,8 @@ typedef struct {
 double scene_ray(const scene *self, double x, double y, double cosine, double sine, double reach, double height,
                  uint32_t self_id, ray_hit *hit);
 
-/* To distances in the arena, answered by arena_fans: what moves in the scene may be nearer. */
-void scene_fan_movers(const scene *self, const fan_question *question, uint32_t self_id);
+/* arena_fan, with what moves in the scene. */
+void scene_fan(const scene *self, const fan_question *question, uint32_t self_id);
 
 /* Where the arena's moving shapes are at `time` (s): arena_moving_count of them, with ids from `first_id` on. Their
  * velocities are those that take them evenly to where their paths lead within `dt`. Of each are kept `waited`, `waits` and
