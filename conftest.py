@@ -1,6 +1,5 @@
-"""Settings for all tests: how many random cases; the same ones each time unless `make fuzz` asks for new. And what
-each folder's tests take, for the table at the end of `make test` (tools/times_table.py). What follows from the
-protocol is made before the first test is read."""
+"""Settings for all tests: how many random cases; the same ones each time unless `make fuzz` asks for new. What each
+folder's tests took is printed at the end. What follows from the protocol is made before the first test is read."""
 
 from __future__ import annotations
 
@@ -20,7 +19,6 @@ if GENERATOR.is_file() and subprocess.run([sys.executable, GENERATOR], check=Fal
 
 EXAMPLES = os.environ.get("BOEBOT_EXAMPLES")
 SANITIZED = "BOEBOT_SANITIZED" in os.environ
-TIMES = os.environ.get("BOEBOT_TEST_TIMES")  # file to which a line per folder is added
 
 # Sanitizers make each example some five times as slow; what they look for shows in a few. `make fuzz` tries thousands.
 settings.register_profile("same every time", max_examples=8 if SANITIZED else 30, deadline=None, derandomize=True)
@@ -31,19 +29,22 @@ settings.load_profile("fuzz" if EXAMPLES else "same every time")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-_tests: Counter[str] = Counter()
 _seconds: Counter[str] = Counter()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks the simulator's own tests, which `make test` runs under sanitizers."""
+    for item in items:
+        if item.nodeid.startswith("sim_bridge/"):
+            item.add_marker("simulator")
+
+
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Counts a test, and what it, its set-up and its tear-down took."""
-    folder = report.nodeid.partition("/")[0] + (", sanitized" if SANITIZED else "")
-    _tests[folder] += report.when == "call"
-    _seconds[folder] += report.duration  # type: ignore[assignment]
+    """Adds up what a test, its set-up and its tear-down took."""
+    _seconds[report.nodeid.partition("/")[0]] += report.duration  # type: ignore[assignment]
 
 
-def pytest_sessionfinish() -> None:
-    """Adds the folders of this call of pytest to the file, if one is wanted."""
-    if TIMES:
-        with Path(TIMES).open("a", encoding="utf-8") as file:
-            file.writelines(f"{folder}\t{_tests[folder]}\t{_seconds[folder]:.3f}\n" for folder in _seconds)
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """A line for each folder."""
+    for folder, seconds in _seconds.most_common():
+        terminalreporter.write_line(f"time of {folder}: {seconds:.1f} s")

@@ -1,20 +1,14 @@
 #!/bin/sh
 # All tests, after `make` has built what they need: tools/test.sh [ARGUMENT OF PYTEST...]
-# One part per processor runs at a time, those that take longest first; what a part says is in build/test-PART.log. Then,
-# when nothing else computes, the tests that look at the wall clock (pytest's mark wall_clock): each file is a part, four
-# at a time, as they mostly wait. At the end, a table of what each folder took.
+# Three parts side by side, each into build/test-PART.log: Python's tests, a file at a time on each processor; the
+# firmware's units; the simulator under sanitizers. Then, when nothing else computes, the tests that look at the wall
+# clock, four files at a time, as they mostly wait.
 set -eu
 cd "$(dirname "$0")/.."
-parts="sanitized tools hil_tests sim_bridge host docs protocol"
-export BOEBOT_TEST_TIMES="$PWD/build/test-times"
-rm -f "$BOEBOT_TEST_TIMES"
 
 failed=0
-echo "Testing, each into build/test-PART.log: $parts"
+echo "Testing, each into build/test-PART.log: python, units, sanitized"
 # Ctrl-C reaches them all: xargs runs nothing in the background.
-echo "$parts" | tr ' ' '\n' | xargs -P "$(nproc)" -I '{}' tools/test_part.sh '{}' "$@" || failed=1
-echo "Those that look at the wall clock"
-grep -rl mark.wall_clock --include='test_*.py' host hil_tests sim_bridge docs | sed 's|.*/test_\(.*\)\.py|wall_clock-\1|' | sort -r |
-  xargs -P 4 -I '{}' tools/test_part.sh '{}' "$@" || failed=1
-build/venv/bin/python -m tools.times_table "$BOEBOT_TEST_TIMES" build/test-units.log
+printf '%s\n' python units sanitized | xargs -P 3 -I '{}' tools/test_part.sh '{}' "$@" || failed=1
+tools/test_part.sh wall_clock "$@" || failed=1
 exit $failed
