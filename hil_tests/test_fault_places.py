@@ -18,7 +18,7 @@ from boebot import resources
 from boebot.cli import main
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.record.reading import read_run, robots_of
+from boebot.result import read_run, robots_of
 from hil_tests.test_faults import JUMP_TO_ITSELF, planted
 from sim_bridge.tests.boards.symbols import entry_of, find_symbol
 from sim_bridge.timing.measure import run

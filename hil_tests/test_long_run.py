@@ -12,8 +12,7 @@ from typing import NamedTuple
 import pytest
 from PIL import Image
 
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from tools import resident
 
 SECONDS = 24 * 3600

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import boebot as library
-from boebot.record.reading import CutError, read_run
-from boebot.record.result import RunResult, TogetherResult
+from boebot.record.reading import CutError
+from boebot.result import RunResult, TogetherResult, read_run
 from copied_process import Done, command
 
 

@@ -19,8 +19,7 @@ import pytest
 import serial
 
 import copied_process
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 
 pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
 

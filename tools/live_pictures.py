@@ -27,10 +27,10 @@ from typing import TYPE_CHECKING, Any
 
 from PIL import Image
 
-from boebot.record.reading import read_run
+from boebot.record.interventions import STREAM
 from boebot.record.record import Record
-from boebot.record.result import RunResult
-from boebot.running.interventions import STREAM, Repeated
+from boebot.result import RunResult, read_run
+from boebot.running.hands import Repeated
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 

@@ -22,7 +22,7 @@ What to call for what:
     boebot.behaviors               motor behaviors for it: Wander, Avoid, FollowWall, Homing, ...
     boebot.cognition               what it works out: Odometry, near(), contact(), ...
     boebot.link                    a board's messages, parameters and time
-    boebot.record.reading          read_run(folder): the result of a run that was recorded
+    boebot.result                  read_run(folder): the result of a run that was recorded
 
 Units are SI: m, s, rad, V; motor signals go from -1 (full backward) to 1 (full forward).
 """
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from boebot.brain.main_brain import MainRobot
     from boebot.description.robots import load_robot
     from boebot.errors import BoebotError
-    from boebot.record.result import RunResult, TogetherResult
+    from boebot.result import RunResult, TogetherResult
     from boebot.robot import Command, Observation, Robot
     from boebot.running.runner import run
     from boebot.running.tasks import Member
@@ -72,9 +72,9 @@ _HOMES = {
     "Member": "running.tasks",
     "Observation": "robot",
     "Robot": "robot",
-    "RunResult": "record.result",
+    "RunResult": "result",
     "load_robot": "description.robots",
-    "TogetherResult": "record.result",
+    "TogetherResult": "result",
     "run": "running.runner",
     "run_together": "running.together",
 }

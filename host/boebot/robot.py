@@ -17,10 +17,10 @@ import random
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from boebot.description.equipment import Dimensions
+from boebot.description.equipment import Equipment as Equipment
 from boebot.devices import buzzer, turret
 from boebot.devices.attributes import Attributes
-from boebot.devices.equipment import Dimensions
-from boebot.devices.equipment import Equipment as Equipment
 from boebot.devices.latest import NO_MESSAGES, Latest
 from boebot.devices.readings import Readings
 from boebot.errors import BrainError

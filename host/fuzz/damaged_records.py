@@ -18,8 +18,9 @@ from typing import Any
 from unittest import mock
 
 import boebot
-from boebot.record.reading import CutError, attachments_of, read_run, robots_of
+from boebot.record.reading import CutError, attachments_of
 from boebot.record.run_folder import RECORD
+from boebot.result import read_run, robots_of
 
 STEPS = 10  # of a brain in a group: a record of a few seconds has many
 RUNS: dict[str, Callable[[Path], object]] = {

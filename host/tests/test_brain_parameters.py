@@ -21,13 +21,13 @@ from boebot.brains import load_brain
 from boebot.cli.run import _assigned
 from boebot.cognition import BatteryLevel, Contact, LightSense, Odometry, contact, near
 from boebot.errors import BoebotError
-from boebot.record.compare import replayed
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult, TogetherResult
+from boebot.record.interventions import Deed, Parameter
 from boebot.record.run_folder import RunFolder
+from boebot.result import RunResult, TogetherResult, read_run
 from boebot.running.again import again, recorded
 from boebot.running.brain_parameters import parameters
-from boebot.running.interventions import Deed, Hands, Parameter
+from boebot.running.hands import Hands
+from boebot.running.replayed import replayed
 from boebot.running.runner import execute
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together

@@ -17,9 +17,8 @@ import boebot
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.errors import BrainError
 from boebot.record.brain_record import BrainNames, BrainRecord, append_brain, read_brain
-from boebot.record.reading import read_run
 from boebot.record.record import Record
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from boebot.robot import Robot
 from boebot.view import style, utility_panel
 from steps import Stepped

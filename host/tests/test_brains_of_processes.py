@@ -24,7 +24,7 @@ from boebot.brains import bundled, load_brain
 from boebot.cognition import Odometry, contact, near
 from boebot.errors import BoebotError, BrainError
 from boebot.link import messages
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.robot import Robot
 from steps import Stepped
 

@@ -25,7 +25,7 @@ from boebot.can.log import KINDS, Sent, frames_of, read_log, save_log
 from boebot.can.socketcand_server import SocketcandBus
 from boebot.errors import BoebotError
 from boebot.link.messages import Telemetry
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.running.board_driver import BoardDriver
 from command import boebot, heed_signals
 

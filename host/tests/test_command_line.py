@@ -23,8 +23,7 @@ from boebot.cli import board_link, run_table, teleop
 from boebot.cli import link as link_command
 from boebot.link import messages, mismatch
 from boebot.link.link import Link
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from boebot.robot import Robot
 from boebot.running import runner
 from boebot.running.runner import run

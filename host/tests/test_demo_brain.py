@@ -9,7 +9,7 @@ import boebot
 from boebot.brain import Brain
 from boebot.brains import load_brain
 from boebot.record.brain_record import BrainRecord
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ from boebot.arenas.floor_plan import FloorPlan, Moving, Patch, Solid
 from boebot.description.outlines import way_out
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.record import overview
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.running import runner
 from boebot.view import picture, scene, style
 from boebot.view.arena_drawing import draw_arena, frame, ghost_times, legend_entries

@@ -18,9 +18,8 @@ from boebot.brain import Brain, Utility
 from boebot.cognition import near
 from boebot.live.live_view import LiveView
 from boebot.record import record
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
 from boebot.record.run_folder import RunFolder
+from boebot.result import RunResult, read_run
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 from boebot.view.tables import write_summary

@@ -13,7 +13,8 @@ import boebot
 from boebot.experiments import Outcome, all_experiments, animals, contract, economics, evolution, paradigms, stentor
 from boebot.experiments import utility_functions as functions
 from boebot.experiments.same_commands import composed, disagreements
-from boebot.record.compare import command_difference, replayed, telemetry_difference
+from boebot.record.compare import command_difference, telemetry_difference
+from boebot.running.replayed import replayed
 
 CHEAP = ("E59", "E60", "E61", "E62", "E63", "E64", "E66", "dose-response", "isocline", "robot-economics")
 
@@ -38,7 +39,7 @@ def test_criteria_are_met(name: str) -> None:
         ("E62", functions, "WEIGHT", 1.8),
         ("E63", functions, "KICK", 2.8),
         ("E64", functions, "TAU", 0.35),
-        ("E66", contract, "ALLOWED", ("builtins", "boebot.robot", "boebot.devices.equipment")),
+        ("E66", contract, "ALLOWED", ("builtins", "boebot.robot", "boebot.description.equipment")),
         ("isocline", animals, "USE", 0.05),
         ("robot-economics", economics, "BEGIN_V", 7.8),
     ],

@@ -27,9 +27,8 @@ from mcap.reader import make_reader
 import boebot
 from boebot.arenas.floor_plan import floor_plan
 from boebot.record import windows
-from boebot.record.reading import robots_of
-from boebot.record.result import RunResult, TogetherResult
 from boebot.record.series import Pose
+from boebot.result import RunResult, TogetherResult, robots_of
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 from boebot.view import save_for_foxglove

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from boebot.boards import WatchdogReset
-from boebot.running import hangs
+from boebot.record import hangs
 
 
 def reset(number: int, address: int, place: str = "") -> WatchdogReset:

@@ -19,8 +19,8 @@ from boebot.behaviors.homing import corner, leg_length
 from boebot.brain import Brain, MotorBehavior
 from boebot.brain.composition import load
 from boebot.cognition import Odometry, PathIntegration, SunCompass, sun_azimuth, wrapped
+from boebot.description.equipment import Equipment
 from boebot.description.robots import load_robot
-from boebot.devices.equipment import Equipment
 from boebot.devices.readings import Readings
 from boebot.errors import BrainError
 from boebot.robot import Observation, Robot

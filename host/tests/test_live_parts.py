@@ -20,9 +20,9 @@ from boebot.live.controls import SILENT_S, Controls
 from boebot.live.live_view import LiveView
 from boebot.live.outbox import EVENTS, LETTERS, Outbox
 from boebot.live.pace import Pace
+from boebot.record.interventions import Arm, Deed, Hand, Parameter, Place, Release, Stop, Tally
 from boebot.record.record import Record
 from boebot.running.brain_parameters import bounds, meaning, set_parameters, sliders
-from boebot.running.interventions import Arm, Deed, Hand, Parameter, Place, Release, Stop, Tally
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
 

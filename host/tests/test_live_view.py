@@ -22,8 +22,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from boebot.view.page_data import FORMAT
 from boebot.view.replay import content
 from command import boebot, heed_signals

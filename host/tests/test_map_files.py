@@ -29,7 +29,7 @@ from boebot.can.log import read_log
 from boebot.errors import BoebotError, BrainError
 from boebot.navigation import Lattice, LineMap, OccupancyMap, search
 from boebot.navigation.occupancy_map import LONGEST
-from boebot.record.reading import read_run
+from boebot.result import read_run
 from boebot.timing.table import read_table
 from sim_bridge.boards import avr
 from sim_bridge.reading_table import ReadingTable

@@ -84,7 +84,7 @@ def test_e66_nothing_leads_from_a_robot_to_the_world(robot: str) -> None:
     assert truth is not None and len(truth.time), "there was a truth to find"
     assert [one for one in met if one.is_foreign] == []
     kinds = {one.kind for one in met}
-    assert {"boebot.robot.Robot", "boebot.robot.Observation", "boebot.devices.equipment.Equipment"} <= kinds
+    assert {"boebot.robot.Robot", "boebot.robot.Observation", "boebot.description.equipment.Equipment"} <= kinds
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import boebot
+from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription
-from boebot.devices.equipment import Equipment
 from boebot.devices.latest import NO_MESSAGES
 from boebot.devices.readings import Readings
 from boebot.link import messages

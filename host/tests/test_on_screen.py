@@ -17,7 +17,7 @@ from PIL import Image
 
 import boebot
 from boebot.errors import BoebotError
-from boebot.record.result import RunResult, TogetherResult
+from boebot.result import RunResult, TogetherResult
 from boebot.view import on_screen
 from copied_process import python
 

@@ -13,8 +13,8 @@ import pytest
 import boebot
 from boebot.record import windows
 from boebot.record.overview import _Walk
-from boebot.record.result import RunResult
 from boebot.record.series import Pose, touch_indices, truth_at
+from boebot.result import RunResult
 from boebot.view import tables
 
 RUNS = ("shieldbot-basic", "shieldbot", "shieldbot-charging", "arsim")

@@ -15,9 +15,9 @@ from PIL import Image
 import boebot as library
 from boebot import resources
 from boebot.record.blocks import Block, Group
-from boebot.record.reading import attachments_of, read_run
+from boebot.record.reading import attachments_of
 from boebot.record.record_file import RecordReader, RecordWriter
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from boebot.running.again import again, recorded
 from command import boebot
 

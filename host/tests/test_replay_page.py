@@ -13,7 +13,7 @@ import pytest
 
 import boebot
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.view import replay, scene, style, web_page
 
 NODE = shutil.which("node") or shutil.which("nodejs")

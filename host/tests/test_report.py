@@ -20,8 +20,7 @@ from matplotlib.figure import Figure
 import boebot
 from boebot.errors import BoebotError
 from boebot.link import frame, messages
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from boebot.running import board_driver as board
 from boebot.running import runner
 from boebot.view import page_data, picture, replay, scene, tables

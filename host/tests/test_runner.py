@@ -14,8 +14,7 @@ import boebot
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
 from boebot.link import messages
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from boebot.robot import Robot
 from boebot.running import runner
 from boebot.running.tasks import Request

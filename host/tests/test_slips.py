@@ -18,9 +18,8 @@ import boebot
 from boebot import slips
 from boebot.devices.device import kinds
 from boebot.errors import BrainError
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
 from boebot.record.run_folder import RunFolder
+from boebot.result import RunResult, read_run
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 from command import boebot as command

@@ -21,8 +21,8 @@ from boebot.devices.latest import NO_MESSAGES, Latest, without_readings
 from boebot.errors import BrainError
 from boebot.link import messages
 from boebot.link.link import Link
-from boebot.record.result import RunResult
 from boebot.record.telemetry_series import newest_messages
+from boebot.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import runner
 from boebot.running.board_driver import message_ticks

@@ -14,7 +14,7 @@ import pytest
 from boebot.boards import BoardRequest, board_kinds, open_board
 from boebot.brains import LoadedBrain
 from boebot.description.robots import load_robot
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.robot import Observation, Robot
 from boebot.running.board_driver import BoardDriver
 from boebot.running.driver import Task

@@ -13,8 +13,7 @@ import pytest
 
 import copied_process
 from boebot import cli, resources
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 
 LIMIT_S = 20.0
 FILES = {"record.mcap", "summary.json", "run.png", "replay.html"}

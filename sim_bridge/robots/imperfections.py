@@ -13,8 +13,9 @@ import msgspec
 
 from boebot.arguments import shown
 from boebot.description import robots
+from boebot.description.robots import idle
 from boebot.errors import BoardError
-from boebot.imperfections import checked, idle, imperfections, switched_off
+from boebot.imperfections import checked, imperfections, switched_off
 from sim_bridge._core import ffi, lib
 
 _DRAW = 1000  # the draws that make a robot have other device numbers

@@ -8,7 +8,7 @@ from typing import Any
 from unittest import mock
 
 from boebot.brains import load_brain
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request

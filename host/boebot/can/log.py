@@ -28,7 +28,7 @@ from boebot.link import messages, mismatch
 from boebot.link.fields import text
 from boebot.record.reading import CutError
 from boebot.record.record import Record
-from boebot.record.result import RunResult
+from boebot.record.run import Run
 from boebot.record.run_folder import write_whole
 from boebot.robot import Command
 
@@ -52,7 +52,7 @@ class Sent(NamedTuple):
 # ---- a run as a log --------------------------------------------------------------------------------------------------
 
 
-def frames_of(result: RunResult, node: int = 1) -> Iterator[Sent]:
+def frames_of(result: Run, node: int = 1) -> Iterator[Sent]:
     """The CAN frames of a run on a board, oldest first; times from the first byte on.
 
     Telemetry has the time of its tick, also where the host has read that of several ticks at once.
@@ -120,7 +120,7 @@ class _Sending:
         return sent
 
 
-def save_log(result: RunResult, path: Path, node: int = 1) -> Path:
+def save_log(result: Run, path: Path, node: int = 1) -> Path:
     """Writes a run's CAN frames, whole or not at all; the format is by the suffix, one of `KINDS`.
 
     Args:
@@ -160,7 +160,7 @@ def is_log(path: Path) -> bool:
     return path.suffix[1:].lower() in KINDS and not path.is_dir()
 
 
-def read_log(path: Path, robot: str | None = None, node: str | None = None, seed: int = 1) -> RunResult:
+def read_log(path: Path, robot: str | None = None, node: str | None = None, seed: int = 1) -> Run:
     """The run in a log of CAN frames, as far as it shows there: the first session in which somebody drove the robot.
 
     Args:
@@ -368,7 +368,7 @@ class _LogReader:
         if not self.commands or tick > self.commands[-1][0]:
             self.commands.append((tick, Command(kind or "stop", *signals), follows))
 
-    def result(self, path: Path, robot: RobotDescription, seed: int) -> RunResult:
+    def result(self, path: Path, robot: RobotDescription, seed: int) -> Run:
         """The run, up to its first gap. Its time 0 is as of a driver: the brain's period begins with the ticks that
         the period divides, and a first step may be late. The sums are a driver's, too: a brain that compares times
         sees the last bit."""
@@ -401,7 +401,7 @@ class _LogReader:
                 record.append(slow.NAME, times[ticks[place]], payload)
         for tick, command, _ in self.commands[:count]:
             record.append_command(times[tick], *command)
-        return RunResult(
+        return Run(
             brain="unknown",
             robot=robot,
             board=str(path),

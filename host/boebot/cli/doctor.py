@@ -19,9 +19,9 @@ from boebot.boards import BoardRequest, board_kinds, is_live
 from boebot.cli import options, output
 from boebot.cli.board_link import board_link
 from boebot.description.board_parameters import configure
+from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import Checkup
-from boebot.devices.equipment import Equipment
 from boebot.devices.latest import Latest
 from boebot.errors import BoebotError
 from boebot.link import messages, mismatch, reset_cause

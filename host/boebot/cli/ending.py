@@ -15,8 +15,9 @@ from boebot.cli.run_table import Detail, print_run
 from boebot.errors import BoebotError, InterruptedRunError
 from boebot.record.reading import CutError
 from boebot.record.record_file import NoRecordError
-from boebot.record.result import RunResult, TogetherResult
+from boebot.record.run import Run
 from boebot.record.run_folder import RECORD
+from boebot.result import Result
 from boebot.running import interrupts
 from boebot.view import IncompleteError
 
@@ -34,7 +35,7 @@ def of_sensible_rows() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def of_record(result: RunResult | TogetherResult) -> Iterator[None]:
+def of_record(result: Run | Result) -> Iterator[None]:
     """Says what the record of a result lacks; where it is damaged inside, the command ends with exit code 1."""
     error = result.error
     if not isinstance(error, CutError):
@@ -46,14 +47,14 @@ def of_record(result: RunResult | TogetherResult) -> Iterator[None]:
         raise typer.Exit(error.exit_code)
 
 
-def end(result: RunResult | TogetherResult, out: Path | None, wanted: Detail) -> None:
+def end(result: Result, out: Path | None, wanted: Detail) -> None:
     """Prints the run's figures, writes its files to `out`, and raises why it ended before its time.
 
     No error hides another: files are written even if nobody reads the table any more, and an error in writing them
     follows the run's own.
     """
     if wanted is not Detail.NOTHING:
-        for notice in notices(result):
+        for notice in result.notices:
             output.say(notice)
     interrupted = isinstance(result.error, KeyboardInterrupt)
     with interrupts.ignored():
@@ -83,13 +84,6 @@ def end(result: RunResult | TogetherResult, out: Path | None, wanted: Detail) ->
         raise first
     if unsaved is not None:
         raise unsaved
-
-
-def notices(result: RunResult | TogetherResult) -> list[str]:
-    """What the user should know; of several robots with their numbers."""
-    if isinstance(result, RunResult):
-        return list(result.notices)
-    return [f"robot {number}: {notice}" for number, robot in enumerate(result.robots, 1) for notice in robot.notices]
 
 
 def files_in(folder: Path, files: Sequence[Path]) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from boebot.cli import ending, options, output
-from boebot.record.reading import read_run, robots_of
+from boebot.result import read_run, robots_of
 
 
 @ending.of_sensible_rows()

@@ -16,10 +16,11 @@ from boebot.cli import completion, ending, options, output, streams
 from boebot.errors import BoebotError
 from boebot.link.fields import reader
 from boebot.link.messages import Telemetry
-from boebot.record.compare import replayed
-from boebot.record.reading import CutError, read_run, robots_of
-from boebot.record.result import RunResult
+from boebot.record.reading import CutError
+from boebot.record.run import Run
+from boebot.result import read_run, robots_of
 from boebot.robot import Command
+from boebot.running.replayed import replayed
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
 _TICK = reader(Telemetry, "tick")
@@ -75,7 +76,7 @@ def replay(
         _compare(result, [as_on_the_wire(command) for command in commands] if is_log(run) else commands)
 
 
-def _compare(result: RunResult, commands: list[Command]) -> None:
+def _compare(result: Run, commands: list[Command]) -> None:
     """Prints what came of it; where something differs, it ends the command with its exit code."""
     steps = result.record.steps
     for number, (step, command) in enumerate(zip(steps, commands, strict=False)):
@@ -90,7 +91,7 @@ def _compare(result: RunResult, commands: list[Command]) -> None:
     output.line(f"all {len(steps)} commands are the same{part}")
 
 
-def _recorded(run: Path, number: int | None) -> RunResult:
+def _recorded(run: Path, number: int | None) -> Run:
     """The run in a folder, of one robot; what a brain did after something that is lost cannot be replayed."""
     robots = robots_of(read_run(run, up_to_damage=True), number)
     if len(robots) > 1:
@@ -101,7 +102,7 @@ def _recorded(run: Path, number: int | None) -> RunResult:
     return result
 
 
-def _place(result: RunResult, step: int) -> str:
+def _place(result: Run, step: int) -> str:
     """A step of the brain in words, with the board's tick that it answered, if there is a board."""
     index = result.record.steps[step][0]
     tick = f"tick {_TICK(result.record.telemetry[index])[0]}, " if result.layout is None else ""

@@ -12,9 +12,9 @@ from boebot.cli import ending, options, output
 from boebot.cli.run_table import Detail, detail, print_run
 from boebot.errors import BoebotError
 from boebot.record.mending import mend
-from boebot.record.reading import CutError, read_run, robots_of
-from boebot.record.result import RunResult, TogetherResult
+from boebot.record.reading import CutError
 from boebot.record.run_folder import RECORD, RunFolder
+from boebot.result import Result, read_run, robots_of
 from boebot.view import IncompleteError
 
 
@@ -57,11 +57,11 @@ def report(
             if foxglove:
                 from boebot.view import save_for_foxglove
 
-                files.append(save_for_foxglove([*robots_of(result).values()], folder))
+                files.append(save_for_foxglove(result.robots, folder))
             if can is not None:
                 files += _can_logs(result, folder, can)
             if mended and isinstance(result.error, CutError):
-                files.append(mend(folder / RECORD if run.is_dir() else run, result))
+                files.append(mend(folder / RECORD if run.is_dir() else run, result.robots))
         except BoebotError as error:  # the figures are printed all the same
             unsaved = error
             files += error.files if isinstance(error, IncompleteError) else []
@@ -77,7 +77,7 @@ def report(
             raise unsaved
 
 
-def _can_logs(result: RunResult | TogetherResult, folder: Path, kind: str) -> list[Path]:
+def _can_logs(result: Result, folder: Path, kind: str) -> list[Path]:
     """Writes a log for each robot that has a board."""
     robots = robots_of(result)
     if len(robots) == 1:

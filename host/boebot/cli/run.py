@@ -17,7 +17,7 @@ from boebot.cli.ending import end
 from boebot.cli.run_table import detail
 from boebot.errors import BoebotError
 from boebot.record import run_folder
-from boebot.record.result import RunResult, TogetherResult
+from boebot.result import Result
 from boebot.running.runner import execute
 from boebot.running.tasks import Member, Request
 from boebot.running.together import execute_together
@@ -176,7 +176,7 @@ def run(
             bar = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
             progress = None if view else shown.enter_context(output.step_watch(bar))
 
-            def put_away(result: RunResult | TogetherResult) -> None:
+            def put_away(result: Result) -> None:
                 """What this function cannot do itself: a brain goes on after Ctrl-C."""
                 shown.close()
                 try:

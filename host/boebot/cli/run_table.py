@@ -10,7 +10,7 @@ import typer
 from boebot.cli import output
 from boebot.errors import brief
 from boebot.record import figures
-from boebot.record.result import RunResult, TogetherResult
+from boebot.result import Result, RunResult
 
 ZERO = (
     "late_steps",
@@ -50,10 +50,10 @@ def detail(*, json: bool, verbose: bool, quiet: bool) -> Detail:
     return chosen[0] if chosen else Detail.FEW
 
 
-def print_run(result: RunResult | TogetherResult, wanted: Detail, *, is_said: bool = False) -> None:
+def print_run(result: Result, wanted: Detail, *, is_said: bool = False) -> None:
     """The table of a run, if any time has passed in it. JSON is for the caller, who knows its files. `is_said`: the
     sentence of the error that has ended it follows, and is not printed here."""
-    robots = [result] if isinstance(result, RunResult) else result.robots
+    robots = result.robots
     several = len(robots) > 1
     if is_said and not any(robot.run_time for robot in robots):
         return

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
@@ -22,13 +23,19 @@ from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_nu
 from boebot.devices.encoder import WheelEncoder
 from boebot.devices.motor import Motor
 from boebot.errors import RobotError, did_you_mean
-from boebot.imperfections import imperfections, unknown
-from boebot.robot import Robot
+from boebot.imperfections import Imperfection, imperfections, switched_off, unknown
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 
 OUTLINE_CORNERS_MAXIMUM = 32
+
+TAKEN = frozenset((
+    "arm", "beep", "chance", "command", "device", "dimensions", "drive", "drive_speed", "emergency_stop", "has",
+    "latched", "name", "observation", "period", "random", "release_turret", "show", "showing", "sketch", "slow_command",
+    "speed_limit", "stop", "stream", "tick", "time", "turn_turret",
+))  # fmt: skip
+"""What a brain's `Robot` itself has under these names, which no device can have."""
 
 Scheme = Literal["kit", "arsim"]
 SCHEME_BODIES: dict[str, dict[str, float]] = {
@@ -226,7 +233,7 @@ def _check_devices(robot: RobotDescription, table: dict[str, Any], file: str) ->
     """Refuses keys that do not fit each other, and names that a brain could not write."""
     for name, device in robot.device.items():
         at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
-        if not name.isidentifier() or hasattr(Robot, name):
+        if not name.isidentifier() or name[0] == "_" or name in TAKEN:
             expected = "a name that robot.NAME can have in a brain"
             raise RobotError(f"{at}: a device cannot have this name; expected {expected}")
         if device.on and (fault := device.fault()):
@@ -338,3 +345,44 @@ def _check_image(robot: RobotDescription, path: Path) -> None:
 def _pins_text(device: Device) -> str:
     pins = [pin_name(pin) for pin in device.pins().values()]
     return f"pin {pins[0]}" if len(pins) == 1 else f"pins {', '.join(pins)}"
+
+
+def owners(row: Imperfection, robot: RobotDescription) -> list[Any]:
+    """The tables and devices of a robot's description, switched on, that an imperfection belongs to."""
+    tables = {"body": robot.body, "supply": robot.supply}
+    devices = [one for one in robot.device.values() if one.on and one.__struct_config__.tag in row.of]
+    return [*filter(None, (tables.get(name) for name in row.of)), *devices]
+
+
+def magnitude(row: Imperfection, robot: RobotDescription) -> float | None:
+    """What a robot's description gives for an imperfection, or else the table; None: it has nothing of the kind."""
+    if not row.key:
+        return robot.imperfections.get(row.name, row.value)
+    given = next((getattr(owner, row.key) for owner in owners(row, robot)), None)
+    if row.key == "tyre_slip" and given is None:
+        return float(robot.has_board)
+    return row.value if given is None else float(given)
+
+
+def idle(name: str, robot: RobotDescription, *, noise: bool = True) -> str:
+    """Why a magnitude of that name changes nothing of this robot, as a clause; "": it does. `noise`: of the run."""
+    row = imperfections()[name]
+    if not owners(row, robot):
+        return f"robot {robot.name!r} has no {' or '.join(row.of)} that is on"
+    if row.drawn == "unit" and robot.unit == 0:
+        return f"robot {robot.name!r} is nominal, as its unit is 0"
+    if row.drawn and not noise:
+        return "the run is without noise"
+    if row.needs and not magnitude(imperfections()[row.needs], robot):
+        return f"{row.needs} of robot {robot.name!r} is 0"
+    return ""
+
+
+def notices(robot: RobotDescription, without: Sequence[str]) -> list[str]:
+    """A sentence for each of a robot's own magnitudes, and of what is switched off, that changes nothing of it."""
+    asked = {f"imperfections.{name} of its file": [name] for name in robot.imperfections}
+    if robot.body.tyre_grip is not None:
+        asked["body.tyre_grip of its file"] = ["tyre_grip"]
+    asked |= {f"without {name}": list(switched_off([name])) for name in without}
+    found = [(what, [idle(name, robot) for name in names]) for what, names in asked.items()]
+    return [f"{what} changes nothing: {faults[0]}" for what, faults in found if all(faults)]

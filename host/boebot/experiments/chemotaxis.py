@@ -15,8 +15,8 @@ import numpy as np
 from boebot import run
 from boebot.behaviors import RunAndTumble
 from boebot.brain import Brain
+from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
-from boebot.devices.equipment import Equipment
 from boebot.devices.motor import RegulatedMotor
 from boebot.experiments.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.trials import trial_seeds

@@ -57,7 +57,7 @@ ALLOWED = (
     "functools",
     "boebot.robot",
     "boebot.showing",
-    "boebot.devices.equipment",
+    "boebot.description.equipment",
     "boebot.devices.readings",
     "boebot.devices",
     "boebot.link.messages",

@@ -25,7 +25,7 @@ from boebot.experiments.variants import arena_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.record.result import RunResult
+    from boebot.result import RunResult
     from boebot.robot import Robot
 
 PERIOD = 0.02  # s

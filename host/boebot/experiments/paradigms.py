@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from boebot.arenas.floor_plan import FloorPlan
-    from boebot.record.result import RunResult
+    from boebot.result import RunResult
     from boebot.robot import Command, Robot
 
 

@@ -25,12 +25,13 @@ from boebot.cognition import near
 from boebot.experiments import wall
 from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot.experiments.variants import arena_file
-from boebot.record.compare import Difference, command_difference, replayed, telemetry_difference
+from boebot.record.compare import Difference, command_difference, telemetry_difference
+from boebot.running.replayed import replayed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.record.result import RunResult
+    from boebot.result import RunResult
 
 SECONDS = 20.0
 WALLS_SECONDS = 60.0

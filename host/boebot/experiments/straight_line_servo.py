@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from boebot.behaviors import StraightRun
+from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
-from boebot.devices.equipment import Equipment
 from boebot.experiments.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot.experiments.straight_line import Straight, drive, runner
 from boebot.experiments.trials import trial_seeds

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from boebot.brain import Brain
     from boebot.description.robots import RobotDescription
     from boebot.record.brain_record import BrainRecord
-    from boebot.record.result import RunResult
+    from boebot.result import RunResult
 
 PER_SEED = 1000
 

@@ -17,7 +17,7 @@ from boebot.experiments.variants import SMALL_SPEED, arena_file, small_arsim, va
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from boebot.record.result import RunResult
+    from boebot.result import RunResult
 
 LENGTH, WIDTH = 3.0, 2.0  # of the room (m)
 ROOM = f"""

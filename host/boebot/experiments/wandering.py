@@ -14,8 +14,8 @@ from boebot import rates
 from boebot.behaviors import Avoid, Wander
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
+from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
-from boebot.devices.equipment import Equipment
 from boebot.experiments.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot.experiments.paths import draw_paths, floor
 from boebot.experiments.trials import Trial, trial_seeds, try_once

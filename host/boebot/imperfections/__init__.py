@@ -7,20 +7,17 @@ does is the simulator's; here is what a user may say of it, in a run or in a rob
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cache
 from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import msgspec
 
 from boebot.arguments import shown
 from boebot.errors import BoardError, did_you_mean
-
-if TYPE_CHECKING:
-    from boebot.description.robots import RobotDescription
 
 LARGEST = 1e12  # of any magnitude: products of some of them stay finite
 FILE = Path(__file__).with_name("table.toml")
@@ -122,44 +119,3 @@ def switched_off(without: Iterable[str]) -> dict[str, float]:
             )
         values |= {row.name: row.neutral for row in rows}
     return values
-
-
-def owners(row: Imperfection, robot: RobotDescription) -> list[Any]:
-    """The tables and devices of a robot's description, switched on, that an imperfection belongs to."""
-    tables = {"body": robot.body, "supply": robot.supply}
-    devices = [one for one in robot.device.values() if one.on and one.__struct_config__.tag in row.of]
-    return [*filter(None, (tables.get(name) for name in row.of)), *devices]
-
-
-def magnitude(row: Imperfection, robot: RobotDescription) -> float | None:
-    """What a robot's description gives for an imperfection, or else the table; None: it has nothing of the kind."""
-    if not row.key:
-        return robot.imperfections.get(row.name, row.value)
-    given = next((getattr(owner, row.key) for owner in owners(row, robot)), None)
-    if row.key == "tyre_slip" and given is None:
-        return float(robot.has_board)
-    return row.value if given is None else float(given)
-
-
-def idle(name: str, robot: RobotDescription, *, noise: bool = True) -> str:
-    """Why a magnitude of that name changes nothing of this robot, as a clause; "": it does. `noise`: of the run."""
-    row = imperfections()[name]
-    if not owners(row, robot):
-        return f"robot {robot.name!r} has no {' or '.join(row.of)} that is on"
-    if row.drawn == "unit" and robot.unit == 0:
-        return f"robot {robot.name!r} is nominal, as its unit is 0"
-    if row.drawn and not noise:
-        return "the run is without noise"
-    if row.needs and not magnitude(imperfections()[row.needs], robot):
-        return f"{row.needs} of robot {robot.name!r} is 0"
-    return ""
-
-
-def notices(robot: RobotDescription, without: Sequence[str]) -> list[str]:
-    """A sentence for each of a robot's own magnitudes, and of what is switched off, that changes nothing of it."""
-    asked = {f"imperfections.{name} of its file": [name] for name in robot.imperfections}
-    if robot.body.tyre_grip is not None:
-        asked["body.tyre_grip of its file"] = ["tyre_grip"]
-    asked |= {f"without {name}": list(switched_off([name])) for name in without}
-    found = [(what, [idle(name, robot) for name in names]) for what, names in asked.items()]
-    return [f"{what} changes nothing: {faults[0]}" for what, faults in found if all(faults)]

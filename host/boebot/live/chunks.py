@@ -21,15 +21,16 @@ from boebot.devices.whisker import Whisker
 from boebot.link.messages import DevicesTelemetry
 from boebot.record.blocks import Block, Group, joined
 from boebot.record.brain_record import STEPS, SWITCHES, read_brain
+from boebot.record.interventions import STREAM, in_words
 from boebot.record.record import Record
-from boebot.record.result import RunResult
+from boebot.record.run import Run
 from boebot.record.series import Floats, Pose, Series
 from boebot.record.shown import Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions
 from boebot.record.truth import track_of
 from boebot.record.windows import OF_TICKS, cut, record_of
 from boebot.running.driver import gather_rows
-from boebot.running.interventions import STREAM, Hands, in_words
+from boebot.running.hands import Hands
 from boebot.showing import SKETCH
 from boebot.view import page_data, scene
 
@@ -79,7 +80,7 @@ class Chunks:
         content: what the page knows of the robot from the start; None before the first chunk.
     """
 
-    def __init__(self, source: Source, result: RunResult, number: int, *, title: str = "") -> None:
+    def __init__(self, source: Source, result: Run, number: int, *, title: str = "") -> None:
         """`result`: what is known as the run begins. `number`: of the robot, from 1. `title`: "": by the result."""
         self.content: dict[str, Any] | None = None
         self._source, self._result, self._number = source, result, number

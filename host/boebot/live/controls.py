@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.pace import Pace
-from boebot.running.interventions import Arm, Deed, Hand, Parameter, Place, Release, Shape, Stop
+from boebot.record.interventions import Arm, Deed, Hand, Parameter, Place, Release, Shape, Stop
 
 SILENT_S = 0.3  # of the wall clock, after which a robot that is driven by hand stops
 WAITING = 100  # deeds of a robot that wait at most

@@ -23,9 +23,10 @@ from boebot.live.controls import Controls
 from boebot.live.outbox import LETTERS, Message
 from boebot.live.pace import Pace
 from boebot.live.page_server import LOOPBACK
-from boebot.record.result import RunResult
+from boebot.record.interventions import Deed
+from boebot.record.run import Run
 from boebot.running.brain_parameters import bounds, meaning, sliders
-from boebot.running.interventions import Deed, Hands
+from boebot.running.hands import Hands
 from boebot.view import page_data, scene
 
 EACH_UNSEEN_S = 0.5  # where no page is open
@@ -40,7 +41,7 @@ class RestartedError(BoebotError):
 
 
 class LiveView:
-    """Shows runs to pages (an `Onlooker` of boebot.running.interventions, and a `Stage` of boebot.live.audience).
+    """Shows runs to pages (an `Onlooker` of boebot.running.hands, and a `Stage` of boebot.live.audience).
 
     Attributes:
         url: the address of the page.
@@ -98,7 +99,7 @@ class LiveView:
 
     # ---- the run: in its thread ------------------------------------------------------------------------------------
 
-    def begin(self, robots: Sequence[Hands], results: Sequence[RunResult]) -> None:
+    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
         """See `Onlooker`."""
         can = _possible(robots)
         self._pace = Pace(self._speed if "speed" in can else None)

@@ -18,7 +18,7 @@ from boebot.live.chunks import Chunks
 from boebot.live.page_server import LOOPBACK
 from boebot.record.blocks import Group
 from boebot.record.record import Record
-from boebot.record.result import RunResult
+from boebot.record.run import Run
 from boebot.timing.realisable import TICK_S
 from boebot.view import page_data, scene
 
@@ -141,10 +141,10 @@ class ServedView:
         """No pages any more."""
         self._audience.close()
 
-    def _result(self, session: BoardSession) -> RunResult:
+    def _result(self, session: BoardSession) -> Run:
         """What is known of it as of a run."""
         request = self._request
-        return RunResult(
+        return Run(
             brain="another program",
             robot=request.robot,
             board=self._kind,

@@ -13,7 +13,7 @@ from boebot.errors import BoebotError
 from boebot.imperfections import switched_off
 from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
-from boebot.record.result import RunResult, TogetherResult
+from boebot.result import RunResult, TogetherResult
 from boebot.running.tasks import Request
 from boebot.view.display import has_display, kernel_shell
 
@@ -81,7 +81,7 @@ def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result
 def _ended(view: LiveView, result: RunResult | TogetherResult, *, waits: bool) -> bool:
     """Tells all pages that the run has ended. Where another one may be asked for, waits until a page does, or none is
     open any more, and returns True."""
-    robots = [result] if isinstance(result, RunResult) else result.robots
+    robots = result.robots
     tables: list[dict[str, Any]] = [dict(robot.table()) for robot in robots]
     ended = str(tables[0]["ended"]) if result.error is None else str(result.error) or "interrupted"
     again = waits and robots[0].world is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -15,7 +15,9 @@ from boebot.errors import BoebotError
 from boebot.link.messages import Identity
 from boebot.record.brain_record import BrainNames
 from boebot.record.record import Record
-from boebot.record.result import RunResult, why
+from boebot.record.run import Run, why
+
+R = TypeVar("R", bound=Run)
 
 
 class RecordedError(BoebotError):
@@ -23,7 +25,7 @@ class RecordedError(BoebotError):
 
 
 class Facts(msgspec.Struct, frozen=True, kw_only=True):
-    """Of one robot's run; what is not said here is as in `RunResult`.
+    """Of one robot's run; what is not said here is as in `Run`.
 
     Attributes:
         error: in words.
@@ -74,7 +76,7 @@ _CHANGED = ("error", "interrupted", "identity", "layout", "processes", "behavior
 _SAME = [name for name in Facts.__struct_fields__ if name not in _CHANGED]
 
 
-def facts_of(result: RunResult) -> Facts:
+def facts_of(result: Run) -> Facts:
     """Of a result."""
     brain, layout = result.brain_names, result.layout
     same: dict[str, Any] = {name: getattr(result, name) for name in _SAME}
@@ -90,8 +92,8 @@ def facts_of(result: RunResult) -> Facts:
     )
 
 
-def result_of(data: Mapping[str, Any], record: Record, world: Arena | None) -> RunResult:
-    """The result of that JSON, its record and the arena.
+def result_of(kind: type[R], data: Mapping[str, Any], record: Record, world: Arena | None) -> R:
+    """The result of that JSON, its record and the arena, as a run of that class.
 
     Raises:
         ValueError: it is not what `facts_of` makes.
@@ -101,7 +103,7 @@ def result_of(data: Mapping[str, Any], record: Record, world: Arena | None) -> R
     if facts.error is not None:
         error = KeyboardInterrupt() if facts.interrupted else RecordedError(facts.error)
     processes = facts.processes
-    return RunResult(
+    return kind(
         **{name: getattr(facts, name) for name in _SAME},
         record=record,
         world=world,

@@ -6,24 +6,24 @@ something is missing.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from boebot.record.reading import CutError
 from boebot.record.record_file import RecordReader, RecordWriter
 from boebot.record.recording import END, say
-from boebot.record.result import RunResult, TogetherResult
+from boebot.record.run import Run
 from boebot.record.run_folder import MENDED, write_whole
 
 
-def mend(path: Path, result: RunResult | TogetherResult) -> Path:
-    """Writes it beside the record; `result`: what was read of it, with a `CutError`. Returns the new file.
+def mend(path: Path, robots: Sequence[Run]) -> Path:
+    """Writes it beside the record; `robots`: what was read of it, with a `CutError`. Returns the new file.
 
     Raises:
         BoebotError: it cannot be written.
     """
     mended = path.with_name(MENDED)
-    robots = [result] if isinstance(result, RunResult) else result.robots
     errors = [one.error for one in robots if isinstance(one.error, CutError)]
     end = say(
         [replace(one, error=error.other) for one, error in zip(robots, errors, strict=True)],

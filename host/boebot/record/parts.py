@@ -17,7 +17,7 @@ from boebot.record.windows import record_of, windows
 
 if TYPE_CHECKING:
     from boebot.link.events import BoardEvent
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Part:
         record: of these ticks (boebot.record.windows).
         first: index of the first tick that no part before has had: 0 or 1.
         series: its arrays.
-        odometry: at each tick, as of `RunResult`; None: the robot has none.
+        odometry: at each tick, as of `Run`; None: the robot has none.
         true_pose, contact: the true pose at each tick, and whether the body had touched something; None: nobody knows.
         shown: what the brain showed then; all that it showed in the run has a name there.
     """
@@ -42,7 +42,7 @@ class Part:
     shown: Shown
 
 
-def parts(result: RunResult) -> Iterator[Part]:
+def parts(result: Run) -> Iterator[Part]:
     """The parts of a run, oldest first."""
     directions = Directions()
     place = (0.0, 0.0, 0.0)
@@ -68,7 +68,7 @@ def parts(result: RunResult) -> Iterator[Part]:
         )
 
 
-def events(result: RunResult) -> Iterator[tuple[float, BoardEvent]]:
+def events(result: Run) -> Iterator[tuple[float, BoardEvent]]:
     """The board's events with their times of the run (s): by the board's clock, as telemetry near them has both."""
     times, board = np.zeros(1), np.zeros(1)
     for group in result.record.groups():

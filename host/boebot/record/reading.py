@@ -6,7 +6,7 @@ import errno
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -18,8 +18,10 @@ from boebot.record.keepers import Finished, Keeper, Shared
 from boebot.record.record import Record
 from boebot.record.record_file import NoRecordError, RecordError, RecordReader, in_words
 from boebot.record.recording import BEGIN, END
-from boebot.record.result import RunResult, TogetherResult, why
+from boebot.record.run import Run, why
 from boebot.record.run_folder import FORMAT, RECORD
+
+R = TypeVar("R", bound=Run)
 
 
 class CutError(RecordError):
@@ -40,10 +42,8 @@ class CutError(RecordError):
         self.brief = "record damaged" if lost else "record cut"
 
 
-def read_run(path: str | Path, *, up_to_damage: bool = False) -> RunResult | TogetherResult:
-    """The run in a folder, or in the file of its record. Of a record that is cut the run has ended there, with a
-    `CutError` that says so. One that is damaged inside has such an error, too, and all rows that are sound;
-    `up_to_damage`: only those before the first ones that are lost.
+def read_robots(path: str | Path, kind: type[R], *, up_to_damage: bool = False) -> list[R]:
+    """What came of each robot of a run; arguments but `kind`, a class of runs, as of `boebot.result.read_run`.
 
     Raises:
         BoebotError: there is no record, or it is none of a run, or does not say whose it is.
@@ -56,7 +56,7 @@ def read_run(path: str | Path, *, up_to_damage: bool = False) -> RunResult | Tog
     keepers: list[Keeper] = [keeper] if count == 1 else [Shared(keeper, number) for number in range(1, count + 1)]
     try:
         results = [
-            result_of(facts, Record(kept, is_new=False), world)
+            result_of(kind, facts, Record(kept, is_new=False), world)
             for facts, kept in zip(said["robots"], keepers, strict=True)
         ]
     except (ValueError, TypeError) as error:
@@ -73,29 +73,11 @@ def read_run(path: str | Path, *, up_to_damage: bool = False) -> RunResult | Tog
     if cut or lost:
         for result in results:
             _lack(result, lost, cut, ends_there=up_to_damage or END not in reader.found.attachments)
-    if count == 1:
-        return results[0]
-    ended = next((result.error for result in results if result.error is not None), None)
-    return TogetherResult(robots=results, error=ended)
-
-
-def robots_of(result: RunResult | TogetherResult, number: int | None = None) -> dict[int, RunResult]:
-    """A run's robots by their numbers, from 1: all of them, or one.
-
-    Raises:
-        RecordError: there is no robot of that number.
-    """
-    robots = dict(enumerate([result] if isinstance(result, RunResult) else result.robots, 1))
-    if number is None:
-        return robots
-    if number not in robots:
-        expected = "1, or none" if len(robots) == 1 else f"1 to {len(robots)}"
-        raise RecordError(f"there is no robot {number} in the run; expected {expected}")
-    return {number: robots[number]}
+    return results
 
 
 def attachments_of(path: str | Path) -> dict[str, bytes]:
-    """What is attached to a record, by name. Raises as `read_run`."""
+    """What is attached to a record, by name. Raises as `read_robots`."""
     return dict(_opened(path)[1].found.attachments)
 
 
@@ -140,7 +122,7 @@ def _arena(description: Any, file: Path) -> Arena:
         raise NoRecordError(f"{file}: the arena in it cannot be read: {error}") from None
 
 
-def _lack(result: RunResult, lost: Sequence[str], cut: str, *, ends_there: bool) -> None:
+def _lack(result: Run, lost: Sequence[str], cut: str, *, ends_there: bool) -> None:
     """Notes what a result lacks. `ends_there`: what the end of the record would have said is taken from its streams;
     what they do not say is not known."""
     record, other = result.record, result.error

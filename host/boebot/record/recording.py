@@ -20,7 +20,7 @@ from boebot.record.record_file import RecordError
 from boebot.record.run_folder import FORMAT, RECORD, RunFolder
 
 if TYPE_CHECKING:
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
 
 BEGIN, END = "begin.json", "end.json"
 JSON = "application/json"
@@ -41,7 +41,7 @@ class Recording:
     def begin(
         self,
         folder: RunFolder | None,
-        results: Sequence[RunResult],
+        results: Sequence[Run],
         sources: Mapping[str, bytes],
         requested: Mapping[str, Any],
         *,
@@ -67,7 +67,7 @@ class Recording:
         for number, record in enumerate(self.records, 1):
             record.keep_in(keeper if len(self.records) == 1 else Shared(keeper, number))
 
-    def end(self, results: Sequence[RunResult]) -> BoebotError | None:
+    def end(self, results: Sequence[Run]) -> BoebotError | None:
         """Nothing comes any more. Returns why the record is not whole. `results`: what is known at the run's end."""
         failure: BoebotError | None = None
         if self._disk is not None:
@@ -82,7 +82,7 @@ class Recording:
         return failure
 
 
-def say(results: Sequence[RunResult], **more: Any) -> bytes:
+def say(results: Sequence[Run], **more: Any) -> bytes:
     """What a record says of a run, as JSON. `more`: as it begins, the `request`; of a record that is mended, what is
     `lost` of the one before and where that is `cut`."""
     from boebot.record.facts import facts_of

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.description.equipment import places
 from boebot.devices.device import Column, Place, Readout, Run
 from boebot.devices.drawing import Sweeps
-from boebot.devices.equipment import places
 from boebot.link.messages import Status
 
 if TYPE_CHECKING:

@@ -17,11 +17,12 @@ from boebot.brain import Brain
 from boebot.brain.composition import composed
 from boebot.errors import BoebotError, as_utf8
 from boebot.record.compare import EXPECTED, RowDifference, record_difference
-from boebot.record.reading import CutError, attachments_of, read_run
+from boebot.record.reading import CutError, attachments_of
 from boebot.record.recording import BEGIN
-from boebot.record.result import RunResult, TogetherResult, why
+from boebot.record.run import why
+from boebot.result import RunResult, read_run
 from boebot.running.driver import Progress
-from boebot.running.interventions import Repeated
+from boebot.running.hands import Repeated
 from boebot.running.runner import execute
 from boebot.running.sources import arena_file, brain_files, write_copies
 from boebot.running.tasks import Member, Request
@@ -108,7 +109,7 @@ def recorded(path: Path) -> Recorded:
             described.
     """
     attached = attachments_of(path)
-    results = _robots(read_run(path))
+    results = read_run(path).robots
     error = results[0].error
     if isinstance(error, CutError) and error.lost:
         raise CutError(f"{path} cannot be repeated: {error}; expected a record that is not damaged inside", error.lost)
@@ -146,15 +147,11 @@ def again(run: Recorded, progress: Progress | None = None, *, trust: bool = Fals
         request = _request(run, files, Path(folder))
         repeated = Repeated([result.record for result in run.results])
         run_all = execute if len(run.results) == 1 else execute_together
-        new = _robots(run_all(request, progress, onlooker=repeated))
+        new = run_all(request, progress, onlooker=repeated).robots
     for result in new:
         if isinstance(result.error, KeyboardInterrupt):
             raise result.error
     return _compared(run, new, {copy: original for original, copy in files.items() if copy != original})
-
-
-def _robots(result: RunResult | TogetherResult) -> Sequence[RunResult]:
-    return [result] if isinstance(result, RunResult) else result.robots
 
 
 def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:

@@ -31,9 +31,9 @@ from boebot.link.frame import FRAME_OVERHEAD
 from boebot.link.link import Link
 from boebot.link.telemetry import StampedTelemetry as Received
 from boebot.link.transport import OnBus
-from boebot.record.result import RunResult
+from boebot.record import hangs
+from boebot.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
-from boebot.running import hangs
 from boebot.running.driver import PROGRESS_S, LinkQuality, Task, check_period, result_so_far, step_limit, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepLimit
 

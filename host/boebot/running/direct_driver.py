@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from boebot.boards import VehicleSession
 from boebot.errors import BoardError
 from boebot.record.record import Unrecorded
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.running.direct_robot import DirectRobot
 from boebot.running.driver import PROGRESS_S, Task, result_so_far, step_limit, whole_ticks
 

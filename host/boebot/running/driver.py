@@ -20,7 +20,7 @@ from boebot.link.transport import BusFigures
 from boebot.record.brain_record import BrainNames, append_brain
 from boebot.record.keepers import Temporary
 from boebot.record.record import Record
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.running.stepping import AT_LEISURE, StepLimit
 

@@ -19,18 +19,18 @@ from typing import Any, TypeVar, cast
 
 from boebot import slips
 from boebot.boards import BoardSession, VehicleSession, is_live, open_board, open_vehicle
-from boebot.description.robots import RobotDescription
+from boebot.description.robots import RobotDescription, notices
 from boebot.errors import BoebotError
-from boebot.imperfections import notices
+from boebot.record import hangs
 from boebot.record.recording import Recording
-from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
-from boebot.running import hangs, interrupts
+from boebot.result import RunResult, TogetherResult
+from boebot.running import interrupts
 from boebot.running.board_driver import BoardDriver
 from boebot.running.brain_parameters import in_force
 from boebot.running.direct_driver import DirectDriver
 from boebot.running.driver import Driver, Progress, Task, end_rows, keep_rows
-from boebot.running.interventions import Hands, Onlooker
+from boebot.running.hands import Hands, Onlooker
 from boebot.running.sources import sources
 from boebot.running.stepping import StepTimes, StepWatch, step_once
 from boebot.running.tasks import Request, check_progress, expect

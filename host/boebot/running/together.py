@@ -21,12 +21,12 @@ from boebot.brain.pausable_thread import PAUSED, PausableThread
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
 from boebot.record.recording import Recording
-from boebot.record.result import RunResult, TogetherResult
 from boebot.record.run_folder import RunFolder
+from boebot.result import RunResult, TogetherResult
 from boebot.running import interrupts
 from boebot.running.brain_parameters import in_force
 from boebot.running.driver import PROGRESS_S, Driver, Progress, Task, end_rows, keep_rows
-from boebot.running.interventions import Hands, Onlooker
+from boebot.running.hands import Hands, Onlooker
 from boebot.running.runner import UNENDED, driver_of, keep, result_of, viewed
 from boebot.running.sources import sources
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once

@@ -30,7 +30,7 @@ from boebot.record.run_folder import unwritable, write_whole
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from boebot.record.result import RunResult, TogetherResult
+    from boebot.record.run import Run
 
     Write = Callable[[Path], object]
 
@@ -57,7 +57,7 @@ def make_folder(folder: Path) -> None:
         raise unwritable(folder, error) from None
 
 
-def save(result: RunResult, folder: Path, *, csv: bool = False) -> list[Path]:
+def save(result: Run, folder: Path, *, csv: bool = False) -> list[Path]:
     """Writes the files of a run into `folder`, which is made if need be; returns their paths. `csv`: also its tables
     and bytes.
 
@@ -94,7 +94,7 @@ def save(result: RunResult, folder: Path, *, csv: bool = False) -> list[Path]:
     return paths
 
 
-def save_together(result: TogetherResult, folder: Path, *, csv: bool = False) -> list[Path]:
+def save_together(robots: Sequence[Run], error: BaseException | None, folder: Path, *, csv: bool = False) -> list[Path]:
     """Writes picture and page of all robots into `folder`, and the files of each into its own folder; returns
     their paths.
 
@@ -103,16 +103,17 @@ def save_together(result: TogetherResult, folder: Path, *, csv: bool = False) ->
     make_folder(folder)
     paths: list[Path] = []
     failed: list[str] = []
-    for number, robot in enumerate(result.robots, 1):
+    for number, robot in enumerate(robots, 1):
         try:
             paths += save(robot, folder / f"robot-{number}", csv=csv)
-        except IncompleteError as error:
-            paths += error.files
-            failed.append(str(error))
-    shown = [robot for robot in result.robots if robot.ticks]
+        except IncompleteError as incomplete:
+            paths += incomplete.files
+            failed.append(str(incomplete))
+    shown = [robot for robot in robots if robot.ticks]
     if shown:
         drawn, missing = _draw(
-            folder, {"run.png": partial(_write_common_picture, result), "replay.html": partial(_write_page, shown)}
+            folder,
+            {"run.png": partial(_write_common_picture, robots, error), "replay.html": partial(_write_page, shown)},
         )
         paths, failed = drawn + paths, missing + failed
     if failed:
@@ -120,7 +121,7 @@ def save_together(result: TogetherResult, folder: Path, *, csv: bool = False) ->
     return paths
 
 
-def save_for_foxglove(results: Sequence[RunResult], folder: Path) -> Path:
+def save_for_foxglove(results: Sequence[Run], folder: Path) -> Path:
     """Writes foxglove.mcap, with the robots of one run, into `folder`, which is there; returns its path.
 
     Raises:
@@ -151,19 +152,19 @@ def _draw(folder: Path, files: dict[str, Write]) -> tuple[list[Path], list[str]]
     return paths, failed
 
 
-def _write_picture(result: RunResult, path: Path) -> None:
+def _write_picture(result: Run, path: Path) -> None:
     from boebot.view import picture
 
     picture.write(result, path)
 
 
-def _write_page(results: Sequence[RunResult], path: Path) -> None:
+def _write_page(results: Sequence[Run], path: Path) -> None:
     from boebot.view import replay
 
     replay.write(results, path)
 
 
-def _write_common_picture(result: TogetherResult, path: Path) -> None:
+def _write_common_picture(robots: Sequence[Run], error: BaseException | None, path: Path) -> None:
     from boebot.view import together_picture
 
-    together_picture.write(result, path)
+    together_picture.write(robots, error, path)

@@ -14,7 +14,7 @@ from boebot.errors import BoebotError, brief, did_you_mean, printable
 from boebot.view import figure_file, style, tables
 
 if TYPE_CHECKING:
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
     from boebot.record.series import Floats
 
 TIME = "time_s"
@@ -22,7 +22,7 @@ PANEL_IN = 1.7  # height of a panel
 PANELS_AT_MOST = 20
 
 
-def write(robots: Mapping[int, RunResult], names: Sequence[str], path: Path) -> Path:
+def write(robots: Mapping[int, Run], names: Sequence[str], path: Path) -> Path:
     """Draws those columns, by their names in run.csv, of the robots by their numbers.
 
     Raises:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,10 +13,10 @@ from boebot.view import tables
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from boebot.record.result import RunResult, TogetherResult
+    from boebot.record.run import Run
 
 
-def of_run(result: RunResult) -> DataFrame:
+def of_run(result: Run) -> DataFrame:
     """One row per control tick; the index is the time.
 
     Raises:
@@ -33,13 +34,13 @@ def of_run(result: RunResult) -> DataFrame:
         return pandas.read_csv(path, index_col="time_s", keep_default_na=False, na_values=[""])
 
 
-def of_together(result: TogetherResult) -> DataFrame:
+def of_together(robots: Sequence[Run]) -> DataFrame:
     """The rows of each robot below those of the one before; the index is the robot's number, from 1, and the time.
 
     Raises:
         BoebotError: pandas is not installed.
     """
-    frames = {number: of_run(robot) for number, robot in enumerate(result.robots, 1)}
+    frames = {number: of_run(robot) for number, robot in enumerate(robots, 1)}
     import pandas
 
     return pandas.concat(frames, names=["robot"])

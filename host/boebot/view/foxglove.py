@@ -51,7 +51,7 @@ from boebot.view import foxglove_numbers, foxglove_scene, style
 
 if TYPE_CHECKING:
     from boebot.devices.device import Column
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
     from boebot.record.series import Pose
 
 WORLD = "world"
@@ -70,7 +70,7 @@ class Entry(NamedTuple):
     data: bytes
 
 
-def write(results: Sequence[RunResult], path: Path) -> None:
+def write(results: Sequence[Run], path: Path) -> None:
     """Writes the robots of one run."""
     prefixes = [""] if len(results) == 1 else [f"robot-{number}/" for number in range(1, len(results) + 1)]
     colours = [style.colour(number) for number in range(1, len(results) + 1)]
@@ -152,7 +152,7 @@ def _transform(time_s: float, frame: str, x: float, y: float, heading: float) ->
 # ---- what stands there -----------------------------------------------------------------------------------------------
 
 
-def _scene(results: Sequence[RunResult], prefixes: Sequence[str], colours: Sequence[str]) -> Iterator[Entry]:
+def _scene(results: Sequence[Run], prefixes: Sequence[str], colours: Sequence[str]) -> Iterator[Entry]:
     """Arena, movers, robots and whole paths: once, at the beginning."""
     entities = []
     if results[0].has_truth:
@@ -188,7 +188,7 @@ def _mover(number: int) -> str:
     return f"mover-{number + 1}"
 
 
-def _movers(result: RunResult) -> Iterator[Entry]:
+def _movers(result: Run) -> Iterator[Entry]:
     """Where moving shapes are, over time."""
     if not result.has_truth or result.world is None or not result.world.description.moving:
         return
@@ -208,7 +208,7 @@ def _movers(result: RunResult) -> Iterator[Entry]:
 # ---- what happens at each tick ---------------------------------------------------------------------------------------
 
 
-def _ticks(result: RunResult, prefix: str) -> Iterator[Entry]:
+def _ticks(result: Run, prefix: str) -> Iterator[Entry]:
     """Poses, sweeps, numbers and commands of a robot."""
     kinds: dict[str, Any] = {}
     start: tuple[float, float, float] | None = None
@@ -243,7 +243,7 @@ def _poses(part: Part, estimate: Pose | None, prefix: str) -> Iterator[Entry]:
         yield _entry(time_s, "/tf", FrameTransforms(transforms=transforms))
 
 
-def _sweeps(result: RunResult, part: Part, prefix: str) -> Iterator[Entry]:
+def _sweeps(result: Run, part: Part, prefix: str) -> Iterator[Entry]:
     """Of each laser range finder, when it was read anew."""
     for name, laser in result.robot.device.items():
         if not isinstance(laser, Laser) or not part.series.device_columns(name):
@@ -266,7 +266,7 @@ def _sweeps(result: RunResult, part: Part, prefix: str) -> Iterator[Entry]:
             yield _entry(part.series.time[index], f"/{prefix}{name}", sweep)
 
 
-def _columns(result: RunResult, part: Part) -> dict[str, Sequence[Column]]:
+def _columns(result: Run, part: Part) -> dict[str, Sequence[Column]]:
     """Of each device that has no topic of another kind, and of the board."""
     devices = {
         name: list(part.series.device_columns(name).values())
@@ -301,7 +301,7 @@ def _commands(part: Part, prefix: str, kinds: dict[str, Any]) -> Iterator[Entry]
 # ---- what the brain shows ----------------------------------------------------------------------------------------
 
 
-def _shown(result: RunResult, prefix: str) -> Iterator[Entry]:
+def _shown(result: Run, prefix: str) -> Iterator[Entry]:
     """Its numbers, a field for each; and a line where a text changes."""
     names = shown_names(result.record)
     numbers = [name for name, is_text in names.items() if not is_text]
@@ -320,7 +320,7 @@ def _shown(result: RunResult, prefix: str) -> Iterator[Entry]:
         before = row
 
 
-def _sketches(result: RunResult, prefix: str) -> Iterator[Entry]:
+def _sketches(result: Run, prefix: str) -> Iterator[Entry]:
     """Each sketch of each layer, in the frame that it is in."""
     layers: list[str] = []
     start = result.overview.true_pose
@@ -342,7 +342,7 @@ def _sketches(result: RunResult, prefix: str) -> Iterator[Entry]:
 # ---- what is said ----------------------------------------------------------------------------------------------------
 
 
-def _log(result: RunResult, prefix: str) -> Iterator[Entry]:
+def _log(result: Run, prefix: str) -> Iterator[Entry]:
     """Events and switches when they happened; at the end notices, and why it ended early."""
     yield from heapq.merge(_events(result, prefix), _switches(result, prefix), key=lambda entry: entry.time_ns)
     said = [(Log.WARNING, notice) for notice in result.notices]
@@ -356,12 +356,12 @@ def _line(time_s: float, level: Any, name: str, sentence: str) -> Entry:
     return _entry(time_s, "/log", Log(timestamp=_stamp(time_s), level=level, message=sentence, name=name))
 
 
-def _events(result: RunResult, prefix: str) -> Iterator[Entry]:
+def _events(result: Run, prefix: str) -> Iterator[Entry]:
     for time_s, event in events(result):
         yield _line(time_s, Log.INFO, f"{prefix}board", event.what())
 
 
-def _switches(result: RunResult, prefix: str) -> Iterator[Entry]:
+def _switches(result: Run, prefix: str) -> Iterator[Entry]:
     for switch in each_switch(result.record):
         sentence = f"{switch.off or 'nothing'} -> {switch.on or 'nothing'}"
         yield _line(switch.time, Log.INFO, f"{prefix}brain", f"{sentence}: {switch.reason}")

@@ -15,13 +15,13 @@ from boebot.view import picture, replay, together_picture
 from boebot.view.display import has_display, kernel_shell
 
 if TYPE_CHECKING:
-    from boebot.record.result import RunResult, TogetherResult
+    from boebot.record.run import Run
     from boebot.view.sheet import Sheet
 
 FRAME_HEIGHT = 680  # pixels: the page fills what it is given
 
 
-def drawn(result: RunResult) -> Sheet:
+def drawn(result: Run) -> Sheet:
     """The picture of a run.
 
     Raises:
@@ -31,17 +31,17 @@ def drawn(result: RunResult) -> Sheet:
     return picture.draw(result)
 
 
-def drawn_together(result: TogetherResult) -> Sheet:
+def drawn_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
     """The picture of a run of several robots.
 
     Raises:
         BoebotError: as `drawn`.
     """
-    _check(result.robots)
-    return together_picture.draw(result)
+    _check(robots)
+    return together_picture.draw(robots, error)
 
 
-def play(results: Sequence[RunResult]) -> Path | None:
+def play(results: Sequence[Run]) -> Path | None:
     """Shows the page of the robots of a run: in a notebook below the cell. Elsewhere it is written to a temporary file,
     and opened in the browser where there is a display; returns its path.
 
@@ -74,6 +74,6 @@ def html_frame(page: str) -> str:
     return f'{opening} style="border: 0" srcdoc="{html.escape(page)}"></iframe>'
 
 
-def _check(results: Sequence[RunResult]) -> None:
+def _check(results: Sequence[Run]) -> None:
     if not any(result.ticks for result in results):
         raise BoebotError("the run has no control tick that could be drawn; expected one that was recorded")

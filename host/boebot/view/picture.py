@@ -28,19 +28,19 @@ if TYPE_CHECKING:
 
     from boebot.description.robots import Body
     from boebot.record.brain_record import BrainRecord
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
     from boebot.record.series import Floats, Pose
 
 SEGMENTS_MAXIMUM = 6000  # of a path as it is drawn
 SPOT_M = 0.03  # a shorter stretch would hardly be seen
 
 
-def write(result: RunResult, path: Path) -> Path:
+def write(result: Run, path: Path) -> Path:
     """Draws the run into a PNG file."""
     return draw(result).save(path)
 
 
-def draw(result: RunResult) -> Sheet:
+def draw(result: Run) -> Sheet:
     """Draws the run."""
     view = scene.view(result)
     low, high = scene.bounds(view)
@@ -121,12 +121,12 @@ def draw_marks(axes: Axes, view: scene.View) -> None:
         )
 
 
-def _title(result: RunResult, view: scene.View) -> str:
+def _title(result: Run, view: scene.View) -> str:
     where = f" in {view.plan.name}" if view.known else ""
     return f"{result.brain} on {result.robot.name} ({result.board}){where}"
 
 
-def _caption(result: RunResult) -> list[str]:
+def _caption(result: Run) -> list[str]:
     parts = [f"{result.run_time:.1f} s", *result.way_in_words()]
     if (error := result.odometry_error) is not None:
         parts.append(f"odometry off by {error:.2f} m at the end")
@@ -138,7 +138,7 @@ def _caption(result: RunResult) -> list[str]:
     return [*parts, *brief(result.error)]
 
 
-def _legend(result: RunResult, view: scene.View) -> list[Artist]:
+def _legend(result: Run, view: scene.View) -> list[Artist]:
     composed = bool(result.overview.brain)
     colours = "coloured by behavior" if composed else "dark to light in time"
     said = f"true path, {colours}" if view.known else f"path by odometry, {colours}"

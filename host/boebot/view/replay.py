@@ -8,29 +8,29 @@ from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boebot.running.interventions import STREAM, in_words
+from boebot.record.interventions import STREAM, in_words
 from boebot.view import page_data, scene, web_page
 from boebot.view.utility_panel import shown_cognitive
 
 if TYPE_CHECKING:
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
 
 STEPS_AT_MOST = 6_000  # of a brain of processes
 SWEPT_AT_MOST = 1_000_000  # numbers of two bytes, of all sweeps of all robots: 2.7 MB of the page
 
 
-def write(results: Sequence[RunResult], path: Path) -> Path:
+def write(results: Sequence[Run], path: Path) -> Path:
     """Writes the page of the robots of one run."""
     path.write_text(page_text(results), encoding="utf-8")
     return path
 
 
-def page_text(results: Sequence[RunResult]) -> str:
+def page_text(results: Sequence[Run]) -> str:
     """The page of the robots of one run."""
     return web_page.replay(content(results))
 
 
-def content(results: Sequence[RunResult]) -> dict[str, Any]:
+def content(results: Sequence[Run]) -> dict[str, Any]:
     """All that the page gets of the robots of one run."""
     views = [scene.view(result) for result in results]
     low, high = scene.bounds(*views)
@@ -49,7 +49,7 @@ def content(results: Sequence[RunResult]) -> dict[str, Any]:
     }
 
 
-def run_data(result: RunResult, view: scene.View, number: int = 1, room: int | None = None) -> dict[str, Any]:
+def run_data(result: Run, view: scene.View, number: int = 1, room: int | None = None) -> dict[str, Any]:
     """What the page shows of one robot, with its whole run. `number`: of the robot, from 1; `room`: of its sweeps."""
     brain = result.overview.brain
     cognitive = () if brain is None else shown_cognitive(brain)
@@ -73,12 +73,12 @@ def run_data(result: RunResult, view: scene.View, number: int = 1, room: int | N
     return about | {"rows": rows}
 
 
-def _deeds(result: RunResult) -> list[page_data.Event]:
+def _deeds(result: Run) -> list[page_data.Event]:
     """What people did to the robot meanwhile."""
     return [(time_s, "intervention", in_words(data)) for time_s, data in result.record.rows(STREAM)]
 
 
-def stretch(result: RunResult, view: scene.View) -> page_data.Stretch:
+def stretch(result: Run, view: scene.View) -> page_data.Stretch:
     """The whole run."""
     few = result.overview
     return page_data.Stretch(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from boebot.description.robots import RobotDescription
     from boebot.devices.drawing import Shape, Sweeps
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
     from boebot.record.series import Floats, Series
     from boebot.record.shown import Layer
     from boebot.showing import Sketch
@@ -88,7 +88,7 @@ class View:
         return float(self.path.x[index]), float(self.path.y[index]), float(self.path.heading[index])
 
 
-def view(result: RunResult) -> View:
+def view(result: Run) -> View:
     """The run as the pictures show it."""
     few = result.overview
     series = few.series

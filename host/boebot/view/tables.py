@@ -20,10 +20,10 @@ from boebot.record.run_folder import FORMAT
 if TYPE_CHECKING:
     from boebot.record.brain_record import BrainNames, BrainRecord
     from boebot.record.record import Record
-    from boebot.record.result import RunResult
+    from boebot.record.run import Run
 
 
-def columns(result: RunResult) -> dict[str, list[str]]:
+def columns(result: Run) -> dict[str, list[str]]:
     """The columns of run.csv: heading (unit in its name) -> cells; a cell is empty where nothing is known."""
     contact = None
     if result.true_pose is not None and result.truth is not None:
@@ -63,7 +63,7 @@ def _columns(part: Part) -> dict[str, list[str]]:
     return table
 
 
-def write_run(result: RunResult, path: Path) -> None:
+def write_run(result: Run, path: Path) -> None:
     """run.csv, part by part."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -76,7 +76,7 @@ def write_run(result: RunResult, path: Path) -> None:
             writer.writerows(islice(zip(*table.values(), strict=True), part.first, None))
 
 
-def write_bytes(result: RunResult, stream: str, path: Path) -> None:
+def write_bytes(result: Run, stream: str, path: Path) -> None:
     """to_board.bin and to_host.bin: every byte of that stream."""
     with path.open("wb") as file:
         file.writelines(data for _, data in result.record.each_row(stream))
@@ -112,7 +112,7 @@ def write_switches(record: Record, path: Path) -> None:
         writer.writerows((f"{one.time:.4f}", one.off, one.on, one.reason) for one in each_switch(record))
 
 
-def write_summary(result: RunResult, path: Path) -> None:
+def write_summary(result: Run, path: Path) -> None:
     """summary.json"""
     summary: dict[str, Any] = {"format": FORMAT} | result.table() | {"counters": result.counters}
     summary["watchdog_resets"] = [
@@ -122,7 +122,7 @@ def write_summary(result: RunResult, path: Path) -> None:
     path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 
 
-def write_wire(result: RunResult, path: Path) -> None:
+def write_wire(result: Run, path: Path) -> None:
     """wire.csv: when which bytes of to_board.bin and to_host.bin were sent or read (transport's clock)."""
     rows = heapq.merge(*(_crossings(result, name) for name in ("to_board", "to_host")), key=lambda row: row[0])
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -131,7 +131,7 @@ def write_wire(result: RunResult, path: Path) -> None:
         writer.writerows((f"{stamp:.6f}", name, first, count) for stamp, name, first, count in rows)
 
 
-def _crossings(result: RunResult, stream: str) -> Iterator[tuple[float, str, int, int]]:
+def _crossings(result: Run, stream: str) -> Iterator[tuple[float, str, int, int]]:
     """Stamp, stream, first byte and bytes of each of its rows."""
     first = 0
     for stamp, data in result.record.each_row(stream):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from matplotlib.lines import Line2D
@@ -20,22 +21,22 @@ if TYPE_CHECKING:
 
     from matplotlib.artist import Artist
 
-    from boebot.record.result import RunResult, TogetherResult
+    from boebot.record.run import Run
 
-Shown = tuple[int, "RunResult", scene.View]
+Shown = tuple[int, "Run", scene.View]
 
 
-def write(result: TogetherResult, path: Path) -> Path:
+def write(robots: Sequence[Run], error: BaseException | None, path: Path) -> Path:
     """Draws all robots of a run into a PNG file."""
-    return draw(result).save(path)
+    return draw(robots, error).save(path)
 
 
-def draw(result: TogetherResult) -> Sheet:
-    """Draws all robots of a run."""
-    shown: list[Shown] = [(n, robot, scene.view(robot)) for n, robot in enumerate(result.robots, 1) if robot.ticks]
+def draw(robots: Sequence[Run], error: BaseException | None) -> Sheet:
+    """Draws all robots of a run; `error`: why it ended before its time, or None."""
+    shown: list[Shown] = [(n, robot, scene.view(robot)) for n, robot in enumerate(robots, 1) if robot.ticks]
     plan = shown[0][2].plan
     low, high = scene.bounds(*(view for _, _, view in shown))
-    sheet = Sheet(low, high, _title(result), _caption(result), _legend(shown))
+    sheet = Sheet(low, high, _title(robots), _caption(robots, error), _legend(shown))
     axes = sheet.axes
     draw_arena(axes, plan)
     for number, robot, view in shown:
@@ -53,17 +54,17 @@ def draw(result: TogetherResult) -> Sheet:
     return sheet
 
 
-def _title(result: TogetherResult) -> str:
-    first = result.robots[0]
-    return f"{len(result.robots)} robots on {first.board} in {first.table()['arena']}"
+def _title(robots: Sequence[Run]) -> str:
+    first = robots[0]
+    return f"{len(robots)} robots on {first.board} in {first.table()['arena']}"
 
 
-def _caption(result: TogetherResult) -> list[str]:
+def _caption(robots: Sequence[Run], error: BaseException | None) -> list[str]:
     return [
-        f"{max(robot.run_time for robot in result.robots):.1f} s",
-        f"true distance {sum(robot.true_distance or 0.0 for robot in result.robots):.2f} m in all",
-        counted(sum(robot.true_contacts or 0 for robot in result.robots), "true contact", "true contacts"),
-        *brief(result.error),
+        f"{max(robot.run_time for robot in robots):.1f} s",
+        f"true distance {sum(robot.true_distance or 0.0 for robot in robots):.2f} m in all",
+        counted(sum(robot.true_contacts or 0 for robot in robots), "true contact", "true contacts"),
+        *brief(error),
     ]
 
 

@@ -14,7 +14,7 @@ from browser.looks import WIDTHS, colours_of, controls, faint_texts, floor_at, o
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-    from boebot.record.result import RunResult, TogetherResult
+    from boebot.result import RunResult, TogetherResult
     from browser.looks import OpenPage
 
 pytest.importorskip("playwright", reason="drives a browser with playwright, which is not installed")

@@ -27,8 +27,8 @@ from boebot.boards import (
 )
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
-from boebot.record.result import RunResult
 from boebot.record.truth import shifts, track_of
+from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.running import runner, together
 from sim_bridge.boards.board import CLOCK_HZ

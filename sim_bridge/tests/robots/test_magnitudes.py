@@ -16,14 +16,13 @@ from boebot import Member
 from boebot.boards import BoardRequest, open_board
 from boebot.cli.options import magnitudes
 from boebot.cli.run_table import Detail, print_run
-from boebot.description.robots import RobotDescription, load_robot, robot_names
+from boebot.description.robots import RobotDescription, load_robot, magnitude, owners, robot_names
 from boebot.devices.accelerometer import Accelerometer
 from boebot.devices.light import Phototransistor
 from boebot.devices.line import ReflectanceSensor
 from boebot.errors import BoebotError, RobotError
-from boebot.imperfections import Imperfection, checked, imperfections, magnitude, owners
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.imperfections import Imperfection, checked, imperfections
+from boebot.result import RunResult, read_run
 from boebot.running.again import again, recorded
 from sim_bridge._core import lib
 from sim_bridge.devices.battery import battery_parameters

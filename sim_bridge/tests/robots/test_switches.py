@@ -32,7 +32,7 @@ from boebot.devices.servo import ContinuousServo
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError
 from boebot.imperfections import imperfections, switched_off, switches
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.robot import Robot
 from sim_bridge._core import lib
 from sim_bridge.devices import analog_infrared as analog_infrared_model

@@ -25,8 +25,7 @@ import boebot
 from boebot import cli
 from boebot.boards import BoardRequest, BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.errors import BoebotError, BrainError
-from boebot.record.reading import read_run
-from boebot.record.result import RunResult
+from boebot.result import RunResult, read_run
 from boebot.robot import Robot
 from boebot.running import runner
 from boebot.running.runner import execute

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import pytest
 
-from boebot.record.reading import CutError, read_run
-from boebot.record.result import RunResult
+from boebot.record.reading import CutError
+from boebot.result import RunResult, read_run
 from command import heed_signals
 
 pytestmark = [

@@ -19,7 +19,7 @@ from boebot.arenas import load_arena
 from boebot.brains import load_brain
 from boebot.cli.new import FROM_TOP
 from boebot.errors import BrainError
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 from sim_bridge.batch import Batch

@@ -20,7 +20,7 @@ from boebot import Member
 from boebot.arenas import Arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.robot import Robot
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library

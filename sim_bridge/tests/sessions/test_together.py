@@ -24,7 +24,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
 from boebot.link import frame
 from boebot.link.messages import Hello, Stopped
-from boebot.record.result import RunResult
+from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.running import together
 from boebot.running.tasks import Request

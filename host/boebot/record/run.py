@@ -1,4 +1,4 @@
-"""What came of a run: figures, arrays, and files."""
+"""What came of the run of one robot: figures and arrays. Its face, with pictures and files, is in boebot.result."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
@@ -21,9 +20,10 @@ from boebot.devices.whisker import Whisker
 from boebot.errors import brief
 from boebot.link.fields import text
 from boebot.link.messages import DevicesTelemetry, Identity
-from boebot.record import figures
+from boebot.record import hangs
 from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
 from boebot.record.figures import counted
+from boebot.record.interventions import touched
 from boebot.record.overview import Overview, overview
 from boebot.record.readings_series import ReadingsSeries
 from boebot.record.record import Record, Unrecorded
@@ -31,16 +31,10 @@ from boebot.record.series import Pose, Series, truth_at
 from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.telemetry_series import Directions, TelemetrySeries
 from boebot.record.truth import plan_of, truth_of
-from boebot.running import hangs
-from boebot.running.interventions import touched
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
 
 
 @dataclass(kw_only=True, repr=False)
-class RunResult:
+class Run:
     """What came of a run. Lengths in metres, times in seconds.
 
     Attributes:
@@ -112,16 +106,7 @@ class RunResult:
 
     def __repr__(self) -> str:
         """One line; the figures are in `table()`, everything else in the attributes."""
-        return f"<RunResult: {self.summary()}>"
-
-    def _repr_html_(self) -> str:
-        """The figures as a table and the picture below it, for notebooks."""
-        table = figures.html_table(self.table() | self.wall_clock())
-        if not self.ticks:
-            return table
-        from boebot.view import on_screen
-
-        return table + on_screen.html_image(on_screen.drawn(self))
+        return f"<{type(self).__name__}: {self.summary()}>"
 
     def summary(self) -> str:
         """The run in one line: who, where, how long, how far, how it ended."""
@@ -391,113 +376,6 @@ class RunResult:
         """How often a person interfered with the run through a live view: drove by hand, lifted the robot, changed a
         parameter. None: not recorded."""
         return touched(self.record) if self.is_recorded else None
-
-    # ---- to look at ----------------------------------------------------------------------------------------
-
-    def plot(self) -> Figure:
-        """The run from above, as in run.png: a figure of matplotlib, to be shown or saved (`.savefig("mine.pdf")`).
-
-        Raises:
-            BoebotError: no control tick of the run was recorded.
-        """
-        from boebot.view import on_screen
-
-        return on_screen.drawn(self).figure
-
-    def replay(self) -> Path | None:
-        """The run, to play and scrub. In a notebook it is shown below the cell. Elsewhere it is opened in the browser,
-        where there is a display; returns the page's path, a temporary file.
-
-        Raises:
-            BoebotError: no control tick of the run was recorded.
-        """
-        from boebot.view import on_screen
-
-        return on_screen.play([self])
-
-    def to_pandas(self) -> DataFrame:
-        """The columns of run.csv, by the same names (units are in them), one row per control tick; the index is
-        `time_s`, the run's time in s. Empty cells are NaN.
-
-        Raises:
-            BoebotError: pandas, an extra of the kit, is not installed.
-        """
-        from boebot.view import data_frame
-
-        return data_frame.of_run(self)
-
-    # ---- files ---------------------------------------------------------------------------------------------
-
-    def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
-        """Writes summary.json, run.png and replay.html; returns their paths. `csv`: also run.csv, to_board.bin,
-        to_host.bin and wire.csv, and of a brain of processes brain.csv and switches.csv."""
-        from boebot.view import save
-
-        return save(self, Path(folder), csv=csv)
-
-
-@dataclass(kw_only=True, repr=False)
-class TogetherResult:
-    """What came of a run of several robots in one world.
-
-    Attributes:
-        robots: a result per robot, in the order of the members.
-        error: why the run ended before its time, or None; it says which robot was to blame.
-    """
-
-    robots: list[RunResult]
-    error: BaseException | None
-
-    def __repr__(self) -> str:
-        """A line for each robot."""
-        robots = "".join(f"\n  {number}: {robot.summary()}" for number, robot in enumerate(self.robots, 1))
-        return f"<TogetherResult of {len(self.robots)}:{robots}>"
-
-    def _repr_html_(self) -> str:
-        """A table for each robot and the picture of them all, for notebooks."""
-        tables = "".join(
-            f"<h4>robot {n}</h4>{figures.html_table(robot.table() | robot.wall_clock())}"
-            for n, robot in enumerate(self.robots, 1)
-        )
-        if not any(robot.ticks for robot in self.robots):
-            return tables
-        from boebot.view import on_screen
-
-        return tables + on_screen.html_image(on_screen.drawn_together(self))
-
-    def table(self) -> dict[str, Any]:
-        """The figures by name: of each robot, and how the run ended."""
-        ended = "complete" if self.error is None else why(self.error)
-        return {"robots": [result.table() for result in self.robots], "ended": ended}
-
-    def wall_clock(self) -> dict[str, Any]:
-        """Of each robot. See `RunResult.wall_clock`."""
-        return {"robots": [result.wall_clock() for result in self.robots]}
-
-    def plot(self) -> Figure:
-        """All robots from above, as in run.png. See `RunResult.plot`."""
-        from boebot.view import on_screen
-
-        return on_screen.drawn_together(self).figure
-
-    def replay(self) -> Path | None:
-        """The run of all robots, to play and scrub. See `RunResult.replay`."""
-        from boebot.view import on_screen
-
-        return on_screen.play(self.robots)
-
-    def to_pandas(self) -> DataFrame:
-        """The rows of all robots; the index is `robot`, its number from 1, and `time_s`. See `RunResult.to_pandas`."""
-        from boebot.view import data_frame
-
-        return data_frame.of_together(self)
-
-    def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
-        """Writes run.png and replay.html with all robots, and the files of each into robot-1, robot-2 and so on;
-        returns their paths."""
-        from boebot.view import save_together
-
-        return save_together(self, Path(folder), csv=csv)
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

@@ -1,0 +1,122 @@
+"""What a person does to a run between two steps of its brain, as its record has it: drives by hand, lifts the robot,
+changes a parameter (boebot.running.hands carries it out)."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+from boebot.record.record import Record
+
+STREAM = "intervention"  # of the record
+SLIDE_S = 1.0  # of the run; a slider that is dragged gives new values all the time
+
+
+class Intervention(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower):
+    """One of those below, of one robot."""
+
+
+class Hand(Intervention, frozen=True):
+    """The robot is driven by these motor signals (-1 to 1), whatever its brain says, until `Release`."""
+
+    left: float
+    right: float
+
+
+class Release(Intervention, frozen=True):
+    """Its brain drives it again."""
+
+
+class Stop(Intervention, frozen=True):
+    """Its motors are latched off."""
+
+
+class Arm(Intervention, frozen=True):
+    """They are no longer."""
+
+
+class Place(Intervention, frozen=True):
+    """A simulated robot is lifted and put elsewhere: x (m), y (m), heading (rad)."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class Shape(Intervention, frozen=True):
+    """So is a moving shape of the arena, the `index`-th from 0."""
+
+    index: int
+    x: float
+    y: float
+    heading: float
+
+
+class Parameter(Intervention, frozen=True):
+    """A parameter of a process of its brain gets another value; `name`: as "avoid.turn"."""
+
+    name: str
+    value: float
+
+
+Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter
+_DECODER: msgspec.json.Decoder[Deed] = msgspec.json.Decoder(Deed)
+
+
+def interventions(record: Record) -> list[tuple[float, Deed]]:
+    """Those of a robot's run, with their times (s)."""
+    return [(time_s, _DECODER.decode(data)) for time_s, data in record.rows(STREAM)]
+
+
+def in_words(data: bytes) -> str:
+    """An intervention as it stands in a record."""
+    match _DECODER.decode(data):
+        case Hand(left, right):
+            return f"driven by hand: {left:+.2f}, {right:+.2f}"
+        case Release():
+            return "the brain drives again"
+        case Stop():
+            return "motors latched off by hand"
+        case Arm():
+            return "motors armed by hand"
+        case Place(x, y, heading):
+            return f"put at {x:.2f}, {y:.2f} m, {math.degrees(heading):.0f}°"
+        case Shape(index, x, y):
+            return f"moving shape {index + 1} put at {x:.2f}, {y:.2f} m"
+        case Parameter(name, value):
+            return f"{name} = {value:g}"
+
+
+def touched(record: Record) -> int:
+    """How often a person has interfered with a robot's run, as `Tally` counts."""
+    tally = Tally()
+    for time_s, one in interventions(record):
+        tally.add(time_s, one)
+    return tally.count
+
+
+class Tally:
+    """Counts interventions: driving by hand once, until the brain drives again; a parameter that is moved on within
+    `SLIDE_S` of the run, and nothing else in between, once.
+
+    Attributes:
+        count: so far.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._by_hand = False
+        self._slid: tuple[str, float] = "", 0.0  # the parameter that was moved last, and when
+
+    def add(self, time_s: float, one: Deed) -> None:
+        """It has been carried out before the step at that time of the run."""
+        name, last_s = self._slid
+        self._slid = (one.name, time_s) if isinstance(one, Parameter) else ("", 0.0)
+        if isinstance(one, Hand):
+            self.count += not self._by_hand
+            self._by_hand = True
+        elif isinstance(one, Release):
+            self._by_hand = False
+        else:
+            self.count += not (isinstance(one, Parameter) and one.name == name and time_s - last_s < SLIDE_S)
