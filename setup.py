@@ -2,7 +2,6 @@
 else it makes what follows from the protocol and the robots' files (protocol/generate.py).
 
 * `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py), MIT.
-* `boebot.link.ports._reader`: the thread that reads a port (host/boebot/link/ports/build_reader.py), MIT.
 * `boebot.running._last_resort`: ends a process that Python cannot end (host/boebot/running/build_last_resort.py), MIT.
 * `boebot.arenas._arena`: arenas and rays (host/boebot/arenas/build_arena.py), MIT.
 * `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
@@ -50,12 +49,10 @@ WHEEL_DATA = {
 }
 
 MSVC = sys.platform == "win32"
-HAS_POLL = sys.platform not in ("win32", "darwin")  # for devices
 CFFI_MODULES = [
     f"{script}:ffi"
     for script, wanted in (
         ("host/boebot/link/build_codec.py", True),
-        ("host/boebot/link/ports/build_reader.py", HAS_POLL),
         ("host/boebot/running/build_last_resort.py", not MSVC),
         ("host/boebot/arenas/build_arena.py", True),
         ("sim_bridge/build_core.py", True),

@@ -160,6 +160,30 @@ def test_host_that_slept_ends_its_run_when_it_wakes(native_pty: str, tmp_path: P
     )
 
 
+@pytest.mark.parametrize("where", [("--pty",), ("--tcp", "0")], ids=["pty", "tcp"])
+def test_no_byte_is_lost_beside_a_brain_that_computes(where: tuple[str, ...], tmp_path: Path) -> None:
+    """Its steps take 100 ms at a telemetry of 10 ms, and another of its threads never rests: what comes meanwhile waits
+    in the operating system's buffer of 4 KB, which telemetry and the other messages fill in half a second."""
+    (tmp_path / "brain.py").write_text(
+        "import threading, time\n"
+        "def think():\n    while True:\n        sum(range(1000))\n"
+        "threading.Thread(target=think, daemon=True).start()\n"
+        "def step(robot):\n    robot.drive(0.2, 0.2)\n    until = time.monotonic() + 0.1\n"
+        "    while time.monotonic() < until:\n        pass\n"
+    )
+    with served("native", *where) as (url, _):
+        done = boebot(
+            *("run", str(tmp_path / "brain.py"), "--on", url, "--seconds", "3"),
+            *("--step-timeout", "60", "--json", "--out", str(tmp_path / "run")),
+        )
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["late_steps"] > 20
+    assert summary["lost_frames"] == summary["bad_frames"] == 0
+    host = read_run(tmp_path / "run").link["host"]  # type: ignore[union-attr]
+    assert host["overrun"] == host["dropped"] == host["lost"] == 0 and host["good"] > 300
+
+
 def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp_path: Path) -> None:
     with served("native", "--pty") as (url, server):
         client = subprocess.Popen(

@@ -17,7 +17,7 @@ from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from boebot.link.ports.serial_port import open_serial
+from boebot.link.ports import open_serial
 from hil_tests.bootloader import with_bootloader
 from hil_tests.calibration import board
 from hil_tests.calibration.talk import START, Talk

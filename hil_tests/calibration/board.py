@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from boebot.errors import BoardError
-from boebot.link.ports.serial_port import open_serial
+from boebot.link.ports import open_serial
 from hil_tests.calibration.program import flash_hex
 from hil_tests.calibration.talk import START, Talk
 

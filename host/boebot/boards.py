@@ -18,10 +18,6 @@ from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.errors import BoardError, did_you_mean
 from boebot.guests import PORTS, Guest, guests
-from boebot.link.ports.holders import holder_of as holder_of  # for those who serve boards
-from boebot.link.ports.rfc2217 import Rfc2217Transport
-from boebot.link.ports.serial_port import open_serial
-from boebot.link.ports.tcp import SocketTransport
 from boebot.link.transport import Transport
 from boebot.record.blocks import Group
 
@@ -418,7 +414,7 @@ def open_port(url: str, baud: int) -> Transport:
         SCHEME:...                whatever a guest's scheme means
 
     Serial ports, shared ones too, take settings after a question mark, joined by `&`: `baud=RATE` (bit/s, else
-    `baud`) and `reset=no` (do not reset the board by DTR; boebot.link.ports.serial_port says how far that goes).
+    `baud`) and `reset=no` (do not reset the board by DTR; boebot.link.ports says how far that goes).
 
     Raises:
         BoardError: the URL is malformed, or the port is missing, busy, forbidden or refused.
@@ -426,11 +422,13 @@ def open_port(url: str, baud: int) -> Transport:
     if point := guests(PORTS).get(url.partition(":")[0]):
         opened: Transport = point.load()(url)
         return opened
+    from boebot.link import ports  # not in a simulated run
+
     address, _, query = url.partition("?")
     if address.startswith("socket://"):
         if query:
             raise BoardError(f"{url!r} has a setting {query!r}; a socket address takes none")
-        return SocketTransport(*_host_and_port(url, address, "socket"))
+        return ports.SocketPort(*_host_and_port(url, address, "socket"))
     settings = _settings(url, query)
     baud_given = "baud" in settings
     if baud_given:
@@ -438,11 +436,11 @@ def open_port(url: str, baud: int) -> Transport:
     reset = settings.get("reset", "yes") == "yes"
     if address.startswith("rfc2217://"):
         host, number = _host_and_port(url, address, "rfc2217")
-        return Rfc2217Transport(host, number, baud, baud_given=baud_given, reset=reset)
+        return ports.open_rfc2217(host, number, baud, baud_given=baud_given, reset=reset)
     port = address.removeprefix("serial:")
     if not port:
         raise BoardError(f"{url!r} names no port; expected serial:PORT, as in serial:/dev/ttyUSB0")
-    return open_serial(port, baud, baud_given=baud_given, reset=reset)
+    return ports.open_serial(port, baud, baud_given=baud_given, reset=reset)
 
 
 _SETTINGS = {"baud": (r"\d{1,9}", "baud=RATE"), "reset": ("yes|no", "reset=yes or reset=no")}

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from boebot import boards
 from boebot.boards import BoardRequest, board_kinds, is_live, open_board, open_port
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
+from boebot.link import ports
 from lines import line
 
 REQUEST = BoardRequest(robot=load_robot("shieldbot"))
@@ -55,12 +55,12 @@ class Opened:
         ("serial:/dev/a?baud=250000", "open_serial", ("/dev/a", 250_000), {"baud_given": True, "reset": True}),
         ("serial:COM7?reset=no&baud=9600", "open_serial", ("COM7", 9600), {"baud_given": True, "reset": False}),
         ("/dev/a?reset=yes", "open_serial", ("/dev/a", 9600), {"baud_given": False, "reset": True}),
-        ("socket://[::1]:5000", "SocketTransport", ("::1", 5000), {}),
-        ("socket://robot.local:5000/", "SocketTransport", ("robot.local", 5000), {}),
-        ("rfc2217://h:2217", "Rfc2217Transport", ("h", 2217, 9600), {"baud_given": False, "reset": True}),
+        ("socket://[::1]:5000", "SocketPort", ("::1", 5000), {}),
+        ("socket://robot.local:5000/", "SocketPort", ("robot.local", 5000), {}),
+        ("rfc2217://h:2217", "open_rfc2217", ("h", 2217, 9600), {"baud_given": False, "reset": True}),
         (
             "rfc2217://[fe80::1]:1?reset=no&baud=115200",
-            "Rfc2217Transport",
+            "open_rfc2217",
             ("fe80::1", 1, 115_200),
             {"baud_given": True, "reset": False},
         ),
@@ -70,12 +70,12 @@ def test_url_names_a_port_and_its_settings(
     url: str, kind: str, asked: tuple[Any, ...], settings: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: dict[str, Opened] = {}
-    for name in ("open_serial", "SocketTransport", "Rfc2217Transport"):
+    for name in ("open_serial", "SocketPort", "open_rfc2217"):
 
         def note(*asked: Any, _name: str = name, **settings: Any) -> Opened:
             return opened.setdefault(_name, Opened(asked, settings))
 
-        monkeypatch.setattr(boards, name, note)
+        monkeypatch.setattr(ports, name, note)
     open_port(url, 9600)
     assert opened == {kind: Opened(asked, settings)}
 

@@ -15,7 +15,7 @@ import pytest
 import boebot
 from boebot.errors import BoardError
 from boebot.link.link import Link
-from boebot.link.ports.serial_port import SerialTransport
+from boebot.link.ports import open_serial
 from boebot.robot import Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
@@ -72,7 +72,7 @@ def test_late_brain_skips_steps_and_says_so() -> None:
 
 def test_silent_port_is_given_up_in_time() -> None:
     with line() as board:
-        transport = SerialTransport(board.path)
+        transport = open_serial(board.path, 500_000)
         begun = time.monotonic()
         with pytest.raises(BoardError, match=r"nothing answers at .* within 2 s: is the robot on and flashed"):
             Link(transport).open()
@@ -108,7 +108,7 @@ class RatedPty(Pty):
 @pytest.mark.parametrize("rate", [9_600, 115_200, 250_000, 1_000_000])
 def test_rate_is_found_on_the_port_itself(rate: int) -> None:
     served = RatedPty(Peer(), rate)
-    transport = SerialTransport(served.path)
+    transport = open_serial(served.path, 500_000)
     link = Link(transport)
     link.open()
     assert transport.baud == rate and served.at_its_rate()
@@ -119,7 +119,7 @@ def test_rate_is_found_on_the_port_itself(rate: int) -> None:
 def test_run_over_tcp() -> None:
     """A pty's bytes carried over a socket, as `boebot serve --tcp` or a network adapter would."""
     with pty(Peer()) as served, socket.create_server(("127.0.0.1", 0)) as server:
-        inner = SerialTransport(served.path)
+        inner = open_serial(served.path, 500_000)
 
         def carry() -> None:
             connection, _ = server.accept()

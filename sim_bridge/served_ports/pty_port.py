@@ -7,8 +7,9 @@ import os
 import select
 import sys
 
-from boebot.boards import Visit, holder_of
+from boebot.boards import Visit
 from boebot.errors import BoardError
+from boebot.link.ports import holder_of
 from sim_bridge.served_ports.port import BACKLOG
 
 CHUNK = 4096

@@ -25,7 +25,7 @@ from tools.bench.figures import FIGURES, Figure
 RESULT = Path("build/bench.json")
 MODULES = (
     "codec",
-    "busy",
+    "round_trip",
     "clock",
     "speed",
     "record",

@@ -205,7 +205,7 @@ def test_simulator_knows_no_protocol() -> None:
     for source in (ROOT / "sim_bridge").rglob("*.py"):
         if not {"tests", "timing"} & set(source.parts):
             spoken = {name for name in imported(source) if name.startswith("boebot.link.")}
-            assert not {name for name in spoken if "transport" not in name and ".ports." not in name}, source
+            assert not {name for name in spoken if "transport" not in name and ".ports" not in name}, source
 
 
 def test_observation_leads_to_nothing_of_the_simulator() -> None:

@@ -23,7 +23,7 @@ from urllib.parse import unquote
 from boebot.can.extra import import_extra
 from boebot.can.frames import CanFrame
 from boebot.errors import BoardError, did_you_mean
-from boebot.link.ports.tcp import TIMEOUT_S, why_not
+from boebot.link.ports import CONNECT_S, why_not_connected
 
 _ERR_ACK = 0x20  # error frame of SocketCAN: nobody acknowledged (linux/can/error.h)
 _ERR_BUS_OFF = 0x40
@@ -238,10 +238,10 @@ def _check_listener(name: BusName, settings: dict[str, Any]) -> None:
         raise BoardError(f"{name.text!r} names no port; expected socketcand:CHANNEL?host=HOST&port=PORT")
     host = str(settings["host"])
     try:
-        with socket.create_connection((host, port), TIMEOUT_S) as connection:
+        with socket.create_connection((host, port), CONNECT_S) as connection:
             connection.recv(_READ_BYTES)  # the greeting
     except (OSError, OverflowError) as error:
-        why = why_not(error, host) if isinstance(error, OSError) else "there is no such port"
+        why = why_not_connected(error, host) if isinstance(error, OSError) else "there is no such port"
         raise BoardError(f"the CAN bus {name.text} cannot be joined: {why}") from None
 
 

@@ -27,8 +27,7 @@ from boebot.errors import BoebotError
 from boebot.link import messages, mismatch, reset_cause
 from boebot.link.fields import text
 from boebot.link.link import Link
-from boebot.link.ports.holders import holder_of
-from boebot.link.ports.serial_port import remedy
+from boebot.link.ports import holder_of, remedy
 
 EXIT_WRONG = 1
 SETTLE_S = 0.5  # until all sensors have been read

@@ -1,4 +1,5 @@
-"""Ports and who may have them: locks, DTR, bit rates, sockets, RFC 2217; and one sentence for each way to fail."""
+"""Ports: who may have them, what they do with bytes, DTR, bit rates, sockets, RFC 2217; one sentence for each way to
+fail."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import contextlib
 import fcntl
 import grp
 import os
+import signal
 import socket
 import struct
 import subprocess
@@ -23,11 +25,9 @@ from serial import rfc2217
 
 from boebot.boards import open_port
 from boebot.errors import BoardError
-from boebot.link.ports import lock_file, serial_port
-from boebot.link.ports.lock_file import LockFile, PortBusyError, lock_name
-from boebot.link.ports.rfc2217 import Rfc2217Transport
-from boebot.link.ports.serial_port import SerialTransport
-from boebot.link.transport import BaudSelectable, CountsOverruns, Stamping
+from boebot.link import line as link_line
+from boebot.link import ports
+from boebot.link.transport import BaudSelectable, CountsOverruns
 from lines import Line, line, rfc2217_server
 
 pytestmark = [
@@ -36,21 +36,12 @@ pytestmark = [
 ]
 
 RATES = [9600, 19200, 38400, 57600, 115200, 250000, 500000, 1000000]
-DEAD = 2**22 + 1  # beyond the highest process number of Linux
 
 
 @pytest.fixture
 def board() -> Iterator[Line]:
     with line() as made:
         yield made
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of all locks in this test."""
-    monkeypatch.setattr(lock_file, "USUAL_FOLDERS", ())
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
-    return tmp_path
 
 
 @contextlib.contextmanager
@@ -63,128 +54,7 @@ def refused(sentence: str, within_s: float = 10.0) -> Iterator[None]:
     assert "\n" not in str(caught.value) and ". " not in str(caught.value), "one sentence"
 
 
-# ---- lock files -----------------------------------------------------------------------------------------------------
-
-
-def test_lock_is_named_as_other_programs_name_it(tmp_path: Path) -> None:
-    assert lock_name("/dev/ttyACM0") == "LCK..ttyACM0"
-    assert lock_name("/dev/pts/3") == "LCK..pts_3"
-    link = tmp_path / "robot"
-    link.symlink_to("/dev/ttyUSB7")
-    assert lock_name(str(link)) == "LCK..ttyUSB7"
-
-
-def test_lock_holds_the_process_number_as_ten_characters_and_a_newline(folder: Path) -> None:
-    lock = LockFile("/dev/ttyACM0")
-    assert (folder / "LCK..ttyACM0").read_bytes() == b"%10d\n" % os.getpid()
-    assert [path.name for path in folder.iterdir()] == ["LCK..ttyACM0"], "nothing else is left"
-    with pytest.raises(PortBusyError) as busy:
-        LockFile("/dev/ttyACM0")
-    assert busy.value.owner == os.getpid()
-    lock.release()
-    lock.release()
-    assert not list(folder.iterdir())
-
-
-@pytest.mark.parametrize("content", [b"%10d\n" % DEAD, struct.pack("<I", DEAD), b"nonsense", b"", b"-1\n"])
-def test_lock_of_a_dead_process_is_taken_over(folder: Path, content: bytes) -> None:
-    (folder / "LCK..ttyACM0").write_bytes(content)
-    lock = LockFile("/dev/ttyACM0")
-    assert (folder / "LCK..ttyACM0").read_bytes() == b"%10d\n" % os.getpid()
-    lock.release()
-    assert not list(folder.iterdir())
-
-
-def test_lock_that_an_earlier_process_of_this_number_left_is_taken_over(folder: Path) -> None:
-    """As in a container, where numbers begin at 1."""
-    (folder / "LCK..ttyACM0").write_bytes(b"%10d\n" % os.getpid())
-    lock = LockFile("/dev/ttyACM0")
-    with pytest.raises(PortBusyError) as busy:
-        LockFile("/dev/ttyACM0")
-    assert busy.value.owner == os.getpid()
-    lock.release()
-    assert not list(folder.iterdir())
-    LockFile("/dev/ttyACM0").release()
-
-
-def test_one_of_two_threads_gets_the_lock_and_nothing_is_left(folder: Path) -> None:
-    both = threading.Barrier(2)
-    for _ in range(200):
-        got: list[LockFile] = []
-        failed: list[type[BaseException]] = []
-
-        def take(got: list[LockFile] = got, failed: list[type[BaseException]] = failed) -> None:
-            both.wait()
-            try:
-                got.append(LockFile("/dev/ttyACM0"))
-            except BaseException as error:
-                failed.append(type(error))
-
-        threads = [threading.Thread(target=take) for _ in range(2)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert len(got) == 1 and failed == [PortBusyError]
-        assert [path.name for path in folder.iterdir()] == ["LCK..ttyACM0"]
-        got[0].release()
-        assert not list(folder.iterdir())
-
-
-def test_lock_of_a_living_process_in_old_binary_form_counts(folder: Path) -> None:
-    (folder / "LCK..ttyACM0").write_bytes(struct.pack("<I", os.getppid()))
-    with pytest.raises(PortBusyError) as busy:
-        LockFile("/dev/ttyACM0")
-    assert busy.value.owner == os.getppid()
-
-
-def test_lock_lies_where_it_may_and_counts_wherever_it_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    missing, usual, temporary = (tmp_path / name for name in ("missing", "usual", "temporary"))
-    usual.mkdir()
-    temporary.mkdir()
-    monkeypatch.setattr(lock_file, "USUAL_FOLDERS", (missing, usual))
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(temporary))
-    lock = LockFile("/dev/ttyACM0")
-    assert (usual / "LCK..ttyACM0").exists() and not list(temporary.iterdir())
-    lock.release()
-    monkeypatch.setattr(lock_file, "USUAL_FOLDERS", (missing,))
-    lock = LockFile("/dev/ttyACM0")
-    assert (temporary / "LCK..ttyACM0").exists()
-    monkeypatch.setattr(lock_file, "USUAL_FOLDERS", (missing, usual))
-    with pytest.raises(PortBusyError):
-        LockFile("/dev/ttyACM0")
-    lock.release()
-
-
-def test_only_one_of_many_gets_a_stale_lock(folder: Path) -> None:
-    script = (
-        "import sys, tempfile\n"
-        "from boebot.link.ports import lock_file\n"
-        "lock_file.USUAL_FOLDERS = ()\n"
-        f"tempfile.tempdir = {str(folder)!r}\n"
-        "sys.stdin.readline()\n"
-        "try:\n"
-        "    lock_file.LockFile('/dev/ttyACM0'); print('got it', flush=True)\n"
-        "except lock_file.PortBusyError:\n"
-        "    print('busy', flush=True)\n"
-        "sys.stdin.readline()\n"
-    )
-    for _ in range(3):
-        (folder / "LCK..ttyACM0").write_bytes(b"%10d\n" % DEAD)
-        crowd = [
-            subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-            for _ in range(4)
-        ]
-        for step in ("go", "end"):
-            for child in crowd:
-                assert child.stdin is not None
-                child.stdin.write("\n")
-                child.stdin.flush()
-            if step == "go":
-                said = [child.stdout.readline().strip() for child in crowd if child.stdout is not None]
-        assert sorted(said) == ["busy", "busy", "busy", "got it"]
-        for child in crowd:
-            child.communicate(timeout=10)
+# ---- whose a port is ------------------------------------------------------------------------------------------------
 
 
 def hold(path: str, then: str) -> subprocess.Popen[str]:
@@ -215,18 +85,16 @@ def test_port_is_this_programs_alone_and_the_refusal_names_the_process(board: Li
 
 @pytest.mark.parametrize("ending", ["", "raise SystemExit(3)", "os.kill(os.getpid(), 9)"])
 def test_port_is_free_again_however_its_program_ended(board: Line, ending: str) -> None:
-    name = lock_name(board.path)
-    child = hold(board.path, ending)
-    locks = [folder / name for folder in lock_file.USUAL_FOLDERS if (folder / name).exists()]
-    child.communicate("\n")
-    if "kill" not in ending:
-        assert not any(path.exists() for path in locks), "removed at exit"
+    hold(board.path, ending).communicate("\n")
     open_port(board.path, 500_000).close()
 
 
-def test_program_without_a_lock_file_that_has_locked_the_port_keeps_it(board: Line) -> None:
+def test_program_that_cannot_be_named_keeps_the_port_that_it_has_locked(
+    board: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
     other = os.open(board.path, os.O_RDWR | os.O_NOCTTY)
     fcntl.flock(other, fcntl.LOCK_EX)
+    monkeypatch.setattr(ports, "holder_of", lambda _: None)
     with refused("is busy: another program has it open"):
         open_port(board.path, 500_000)
     os.close(other)
@@ -242,13 +110,144 @@ def test_real_port_refuses_others_and_a_pty_keeps_no_mark(board: Line, monkeypat
         fcntl.ioctl(board.slave, exclusive_mark, answer)
         return bool(struct.unpack("i", answer)[0])
 
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     assert not marked()
     transport.close()
     monkeypatch.setattr("os.ttyname", lambda _: "/dev/ttyACM0")
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     assert marked()
     transport.close()
+
+
+# ---- bytes and stamps -----------------------------------------------------------------------------------------------
+
+
+def read_all(transport: ports.SerialPort, count: int) -> bytes:
+    got = b""
+    while len(got) < count:
+        more = transport.read(5.0)
+        assert more, "nothing came for five seconds"
+        got += more
+    return got
+
+
+def test_bytes_go_both_ways(board: Line) -> None:
+    transport = ports.open_serial(board.path, 500_000)
+    assert transport.realtime and transport.name == board.path
+    transport.write(b"\0there\n\xff")
+    assert board.receive(8) == b"\0there\n\xff"
+    assert transport.read(0.0) == b"" == transport.read(0.01)
+    for content in (b"\0one\r\n", bytes(range(256))):
+        board.send(content)
+        assert read_all(transport, len(content)) == content
+    transport.close()
+
+
+def test_wait_ends_with_the_first_bytes_or_when_it_is_over(board: Line) -> None:
+    """And a stamp is of the reading, as a link sees it: after the arrival of all that it holds."""
+    transport = ports.open_serial(board.path, 500_000)
+    received = link_line.Line(transport)
+    begun = time.monotonic()
+    threading.Timer(0.05, board.send, [b"now"]).start()
+    [(stamp, data)] = received.read(5.0)
+    assert data == b"now" and begun + 0.05 < stamp < begun + 1.0 and stamp <= time.monotonic()
+    begun = time.monotonic()
+    assert received.read(0.1) == [] and 0.1 <= time.monotonic() - begun < 0.5
+    transport.close()
+
+
+def test_nothing_is_lost_while_nobody_reads(board: Line) -> None:
+    """More than all buffers hold: the sender has to wait, and everything comes in order."""
+    transport = ports.open_serial(board.path, 500_000)
+    content = os.urandom(100_000)
+    sender = threading.Thread(target=board.send, args=[content])
+    sender.start()
+    time.sleep(0.1)
+    assert sender.is_alive(), "the buffers were too large for this test"
+    assert read_all(transport, len(content)) == content
+    sender.join()
+    transport.close()
+
+
+def test_end_is_an_error_after_the_bytes_before_it() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        transport = ports.SocketPort("127.0.0.1", server.getsockname()[1])
+        connection, _ = server.accept()
+        connection.sendall(b"last words")
+        connection.close()
+        assert transport.read(1.0) == b"last words"
+        with refused("has gone: closed by the other side"):
+            transport.read(1.0)
+        transport.close()
+
+
+@pytest.mark.parametrize("use", ["read", "write"])
+def test_unplugging_is_noticed_at_once_by_reader_and_writer(board: Line, use: str) -> None:
+    transport = ports.open_serial(board.path, 500_000)
+    threading.Timer(0.1, board.unplug).start()
+    with refused("has gone: unplugged, or closed by the other side", within_s=2.9):
+        while True:
+            if use == "read":
+                transport.read(5.0)
+            else:
+                transport.write(b"hello")
+                time.sleep(0.01)
+    transport.close()
+
+
+def test_other_side_that_does_not_read_is_an_error_in_time(board: Line) -> None:
+    transport = ports.open_serial(board.path, 500_000)
+    with refused("takes no bytes: its other side does not read"):
+        transport.write(bytes(1_000_000))
+    transport.close()
+
+
+def test_closed_port_refuses_and_may_be_closed_again(board: Line) -> None:
+    transport = ports.open_serial(board.path, 500_000)
+    transport.close()
+    transport.close()
+    with refused("has gone"):
+        transport.read(1.0)
+    with refused("has gone"):
+        transport.write(b"x")
+
+
+def test_ctrl_c_ends_a_long_wait(board: Line) -> None:
+    child = hold(board.path, "print('reads', flush=True)\nport.read(30.0)")
+    assert child.stdin is not None and child.stdout is not None
+    child.stdin.write("\n")
+    child.stdin.flush()
+    assert child.stdout.readline() == "reads\n"
+    child.send_signal(signal.SIGINT)
+    child.communicate(timeout=10)
+    assert child.returncode
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_forked_child_leaves_its_parents_port_alone(board: Line) -> None:
+    transport = ports.open_serial(board.path, 500_000)
+    child = os.fork()
+    if child == 0:
+        signal.alarm(5)  # one that hangs is killed
+        transport.close()
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    board.send(b"two")
+    assert transport.read(5.0) == b"two"
+    with refused("is busy: this program itself"):
+        ports.open_serial(board.path, 500_000)
+    transport.close()
+
+
+def test_no_descriptor_is_left_behind(board: Line) -> None:
+    def count() -> int:
+        return len(os.listdir("/dev/fd"))  # noqa: PTH208
+
+    ports.open_serial(board.path, 500_000).close()
+    before = count()
+    for _ in range(5):
+        ports.open_serial(board.path, 500_000).close()
+    assert count() == before
 
 
 # ---- DTR ------------------------------------------------------------------------------------------------------------
@@ -261,7 +260,7 @@ def hangs_up(board: Line) -> bool:
 
 def test_without_reset_dtr_outlasts_the_closing_and_with_it_not(board: Line) -> None:
     for reset in (False, True, False):
-        SerialTransport(board.path, 250_000, reset=reset).close()
+        ports.open_serial(board.path, 250_000, reset=reset).close()
         assert hangs_up(board) is reset
     open_port(f"serial:{board.path}?reset=yes", 500_000).close()
     assert hangs_up(board)
@@ -273,11 +272,11 @@ def test_reset_switches_dtr_off_and_on_in_case_it_was_left_on(board: Line, monke
     switched: list[bool] = []
     update = lambda port: switched.append(bool(port._dtr_state))  # noqa: E731
     monkeypatch.setattr(serial.Serial, "_update_dtr_state", update)
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     transport.close()
     assert switched[-2:] == [False, True] and transport.resets_board
     switched.clear()
-    transport = SerialTransport(board.path, reset=False)
+    transport = ports.open_serial(board.path, 500_000, reset=False)
     transport.close()
     assert not transport.resets_board, "a pty has no DTR"
     assert False not in switched, "Linux switches DTR on at opening; off and on again would be a reset"
@@ -289,10 +288,9 @@ def test_ctrl_c_while_a_port_is_opened_leaves_it_free(board: Line, monkeypatch: 
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(serial_port, when, interrupted)
+        patched.setattr(ports, when, interrupted)
         with pytest.raises(KeyboardInterrupt):
             open_port(board.path, 500_000)
-    assert not any((place / lock_name(board.path)).exists() for place in lock_file.USUAL_FOLDERS)
     open_port(board.path, 500_000).close()
 
 
@@ -311,10 +309,10 @@ def line_rate(board: Line) -> int:
 @pytest.mark.parametrize("reset", [False, True])
 def test_every_rate_is_set_at_opening_and_later(board: Line, reset: bool) -> None:
     for rate in RATES:
-        transport = SerialTransport(board.path, rate, baud_given=True, reset=reset)
+        transport = ports.open_serial(board.path, rate, baud_given=True, reset=reset)
         assert transport.baud == line_rate(board) == rate and transport.baud_given
         transport.close()
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     assert not transport.baud_given
     for rate in (*RATES, *reversed(RATES), 123_456):
         transport.set_baud(rate)
@@ -325,7 +323,7 @@ def test_every_rate_is_set_at_opening_and_later(board: Line, reset: bool) -> Non
 
 
 def test_what_came_at_another_rate_is_forgotten(board: Line) -> None:
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     board.send(b"garbled")
     time.sleep(0.1)
     transport.set_baud(115_200)
@@ -339,7 +337,7 @@ def test_rates_that_do_not_go_are_named(board: Line, monkeypatch: pytest.MonkeyP
     for rate in (9_599, 1_000_001):
         with refused(f"{board.path} cannot be opened at {rate} baud; expected 9600 to 1000000"):
             open_port(f"serial:{board.path}?baud={rate}", 500_000)
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     with refused("at 300 baud"):
         transport.set_baud(300)
 
@@ -352,14 +350,14 @@ def test_rates_that_do_not_go_are_named(board: Line, monkeypatch: pytest.MonkeyP
     assert transport.baud == 500_000, "the rate is as before"
     transport.close()
     with refused(f"{board.path} does not run at 250000 baud"):
-        SerialTransport(board.path, 250_000)
+        ports.open_serial(board.path, 250_000)
     monkeypatch.undo()
-    SerialTransport(board.path, 250_000).close()
+    ports.open_serial(board.path, 250_000).close()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
 def test_bytes_that_a_driver_lost_are_counted_from_the_opening(board: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     assert isinstance(transport, CountsOverruns) and transport.overruns == 0, "a pty does not count"
     transport.close()
     counts = {"overrun": 3, "buf_overrun": 4}
@@ -372,7 +370,7 @@ def test_bytes_that_a_driver_lost_are_counted_from_the_opening(board: Line, monk
         return 0
 
     monkeypatch.setattr(fcntl, "ioctl", ioctl)
-    transport = SerialTransport(board.path)
+    transport = ports.open_serial(board.path, 500_000)
     assert transport.overruns == 0
     counts["overrun"] += 20
     counts["buf_overrun"] += 1
@@ -467,7 +465,7 @@ def test_socket_carries_bytes_both_ways(host: str, family: socket.AddressFamily)
         connection.sendall(b"back")
         assert transport.read(1.0) == b"back"
         assert transport.read(0.01) == b""
-        assert isinstance(transport, Stamping) and not isinstance(transport, BaudSelectable)
+        assert not isinstance(transport, BaudSelectable)
         transport.close()
         assert connection.recv(100) == b""
         connection.close()
@@ -489,8 +487,7 @@ def test_connection_that_fails_is_an_error_in_time(scheme: str) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="fills Linux's queue of connections")
-@pytest.mark.parametrize("scheme", ["socket", "rfc2217"])
-def test_host_that_does_not_answer_is_given_up_in_time(scheme: str) -> None:
+def test_host_that_does_not_answer_is_given_up_in_time() -> None:
     with socket.socket() as server, contextlib.ExitStack() as waiting:
         server.bind(("127.0.0.1", 0))
         server.listen(0)
@@ -499,8 +496,8 @@ def test_host_that_does_not_answer_is_given_up_in_time(scheme: str) -> None:
             client = waiting.enter_context(socket.socket())
             client.setblocking(False)
             client.connect_ex(address)
-        with refused(r"cannot be opened: no answer within 1\.8 s"):
-            open_port(f"{scheme}://127.0.0.1:{address[1]}", 500_000)
+        with refused(r"cannot be opened: no answer in time"):
+            open_port(f"socket://127.0.0.1:{address[1]}", 500_000)
 
 
 def test_socket_whose_other_side_does_not_read_is_an_error() -> None:
@@ -519,7 +516,7 @@ def test_socket_whose_other_side_does_not_read_is_an_error() -> None:
 def test_shared_port_carries_all_bytes_and_its_rate() -> None:
     with rfc2217_server() as (server, board):
         transport = open_port(f"rfc2217://127.0.0.1:{server.port}?baud=115200", 500_000)
-        assert isinstance(transport, Rfc2217Transport) and isinstance(transport, BaudSelectable)
+        assert isinstance(transport, BaudSelectable)
         assert transport.baud == server.serial.baudrate == 115_200 and transport.baud_given
         everything = bytes(range(256)) * 4
         transport.write(everything)
@@ -545,7 +542,7 @@ def test_shared_port_is_reset_or_not() -> None:
     for reset, expected in ((True, [True, False, True]), (False, [False])):
         with rfc2217_server() as (server, _):
             del server.serial.dtr_was[:]
-            transport = Rfc2217Transport("127.0.0.1", server.port, reset=reset)
+            transport = ports.open_rfc2217("127.0.0.1", server.port, 500_000, reset=reset)
             transport.close()
             assert transport.resets_board is reset
             assert server.serial.dtr_was[: len(expected)] == expected
@@ -563,7 +560,7 @@ def test_server_that_refuses_to_switch_dtr_shares_its_port_all_the_same(monkeypa
 
     monkeypatch.setattr(rfc2217.PortManager, "_telnet_process_subnegotiation", refusing)
     with rfc2217_server() as (server, board):
-        transport = Rfc2217Transport("127.0.0.1", server.port)
+        transport = ports.open_rfc2217("127.0.0.1", server.port, 500_000)
         assert not transport.resets_board
         board.send(b"!")
         assert transport.read(2.0) == b"!"
