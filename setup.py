@@ -41,6 +41,8 @@ HAS_SIMAVR = any(Path("build/simavr").glob("**/sim_avr.c"))
 PIN_HEADERS = FIRMWARE.glob("generated/pins_*.h")
 PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in PIN_HEADERS)
 
+GUESTS = ("avr_timing", "boebot_timing")  # packages beside the library, which join it by entry points
+
 # What a wheel carries beside its modules: folder in the package <- (folder in the checkout, patterns).
 WHEEL_DATA = {
     "boebot/data/robots": ("protocol/robots", ("*.toml",)),
@@ -177,10 +179,10 @@ setup(
     license_expression="MIT AND GPL-3.0-or-later" if HAS_SIMAVR else "MIT",
     license_files=["LICENSE", *(["LICENSES/GPL-3.0-or-later.txt"] if HAS_SIMAVR else [])],
     cmdclass={"build_ext": BuildExt, "build_py": BuildPy},
-    package_dir={"avr_timing": "host/avr_timing", "boebot": "host/boebot", "sim_bridge": "sim_bridge"},
+    package_dir={name: f"host/{name}" for name in ("boebot", *GUESTS)} | {"sim_bridge": "sim_bridge"},
     packages=[
         *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data*", "boebot.arenas.geometry"]),
-        *find_namespace_packages("host", include=["avr_timing", "avr_timing.*"], exclude=["avr_timing.tests"]),
+        *find_namespace_packages("host", include=[*GUESTS, *(f"{name}.*" for name in GUESTS)], exclude=["*.tests"]),
         *find_namespace_packages(
             ".",
             include=["sim_bridge", "sim_bridge.*"],

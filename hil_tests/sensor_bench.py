@@ -14,10 +14,10 @@ import numpy as np
 
 from boebot.link import messages
 from boebot.link.messages import Devices
+from boebot_timing.emulated.line import Line
+from boebot_timing.emulated.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, Bench, Ping
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import BoardAccess, Level
-from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, Bench, Ping
 
 PROBE_CYCLES = 1_600_000  # 0.1 s: a session lives as long as it hears of us
 

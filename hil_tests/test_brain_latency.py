@@ -12,9 +12,9 @@ from boebot.description.robots import load_robot
 from boebot.robot import Robot
 from boebot.running.board_driver import BoardDriver
 from boebot.running.driver import Task
+from boebot_timing.emulated.latency_limits import WHISKER
+from boebot_timing.emulated.loads import TICK_CYCLES
 from hil_tests.rig import CYCLES_PER_S, TICK_S
-from sim_bridge.timing.latency_limits import WHISKER
-from sim_bridge.timing.loads import TICK_CYCLES
 
 pytestmark = pytest.mark.emulated
 

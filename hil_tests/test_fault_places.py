@@ -19,9 +19,9 @@ from boebot.cli import main
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.result import read_run, robots_of
+from boebot_timing.emulated.measure import run
 from hil_tests.test_faults import JUMP_TO_ITSELF, planted
 from sim_bridge.tests.boards.symbols import entry_of, find_symbol
-from sim_bridge.timing.measure import run
 from tools import avr_program
 
 pytestmark = pytest.mark.emulated

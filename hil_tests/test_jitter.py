@@ -1,5 +1,5 @@
 """Servo pulses, echoes and latencies of the untouched image at its pins and on its line, against what is promised and
-what the schedule gives (sim_bridge/timing/latency_limits.py); and what an overload leaves behind: nothing."""
+what the schedule gives (boebot_timing.emulated.latency_limits); and what an overload leaves behind: nothing."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ import pytest
 
 from boebot import resources
 from boebot.link import messages
-from boebot.timing.distributions import Distribution
-from sim_bridge.boards.board import Edge, Level
-from sim_bridge.timing.jitter import distributions, lost, servo_pulses
-from sim_bridge.timing.jitter_run import Run, drive, prepare
-from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import (
+from boebot_timing.distributions import Distribution
+from boebot_timing.emulated.jitter import distributions, lost, servo_pulses
+from boebot_timing.emulated.jitter_run import Run, drive, prepare
+from boebot_timing.emulated.line import Line
+from boebot_timing.emulated.loads import (
     FIGURES,
     LOADS,
     OVERLOAD,
@@ -28,7 +27,8 @@ from sim_bridge.timing.loads import (
     Ping,
     wheels,
 )
-from sim_bridge.timing.traffic import TIME_TO_LIVE_MS, EachTick
+from boebot_timing.emulated.traffic import TIME_TO_LIVE_MS, EachTick
+from sim_bridge.boards.board import Edge, Level
 
 pytestmark = pytest.mark.emulated
 

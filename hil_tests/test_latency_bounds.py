@@ -10,9 +10,9 @@ from avr_timing.interrupts.byte_reads import DATA, RECEIVE
 from avr_timing.program import Program
 from boebot import resources
 from boebot.description import robots
-from boebot.timing.loads import ENCODERS, LOADS, TICK
-from boebot.timing.table import read_table
-from sim_bridge.timing.measure import run
+from boebot_timing.emulated.measure import run
+from boebot_timing.loads import ENCODERS, LOADS, TICK
+from boebot_timing.table import read_table
 
 pytestmark = pytest.mark.emulated
 

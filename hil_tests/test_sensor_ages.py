@@ -16,11 +16,11 @@ import pytest
 
 from boebot import resources
 from boebot.link.messages import Devices, DevicesTelemetry, PingStatus, Telemetry
-from boebot.timing.table import read_table
+from boebot_timing.emulated.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, wheels
+from boebot_timing.table import read_table
 from hil_tests.device_bench import SLICE, TwoWireDevice
 from hil_tests.sensor_bench import Ages, Held, LightSensor, RangeFinder, Receiver, Surroundings
 from sim_bridge.boards.board import Level
-from sim_bridge.timing.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, wheels
 
 pytestmark = pytest.mark.emulated
 

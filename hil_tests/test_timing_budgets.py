@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from boebot.cli import timing
-from boebot.timing.budget import Report
+from boebot_timing.budget import Report
+from boebot_timing.command import EXIT_BROKEN
 from command import boebot as command
 from tools import avr_program, timing_page
 from tools.timing_promises import PROMISES
@@ -67,7 +67,7 @@ def test_planted_slow_task_breaks_the_gate(tmp_path: Path, capsys: pytest.Captur
     image = avr_program.build(tmp_path / "planted.elf", folder=sources)
     before = next(row for row in timing_page.reports("shieldbot")["figures"].rows if row.name == "turret")
     code, out, _ = command(capsys, "timing", "--elf", str(image), "--no-measure", "--json")
-    assert code == timing.EXIT_BROKEN
+    assert code == EXIT_BROKEN
     found = json.loads(out)["image"]
     after = next(row for row in found["tasks"] if row["name"] == "turret")
     assert 0 <= after["bound_cycles"] - before.bound - PLANTED <= FARTHER

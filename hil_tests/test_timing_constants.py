@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from avr_timing.flow.constants import State, step
-from avr_timing.image.elf import read_image
-from avr_timing.image.instructions import decode
+from avr_timing.flow.instructions import decode
+from boebot.image.elf import read_image
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from avr_timing.image.elf import read_image
 from boebot import resources
-from boebot.cli.timing_board import check_image
 from boebot.errors import TimingError
+from boebot.image.elf import read_image
 from boebot.link.messages import Identity
+from boebot_timing.board import check_image
 from hil_tests.test_served import boebot, served
 
 IMAGE = resources.folder("images") / "shieldbot.elf"

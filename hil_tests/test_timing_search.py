@@ -8,10 +8,10 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from boebot.timing.measured import Worst
+from boebot_timing.emulated.measure import CLOCK_HZ, robot_of, span_at
+from boebot_timing.emulated.scenarios import SILENCE
+from boebot_timing.measured import Worst
 from sim_bridge.boards.emulated import avr_image
-from sim_bridge.timing.measure import CLOCK_HZ, robot_of, span_at
-from sim_bridge.timing.scenarios import SILENCE
 from tools.timing_search import RUN_S, Found, beside_bounds, searched
 from tools.timing_table import read_table
 

@@ -21,9 +21,9 @@ from rich.progress import track
 from rich.table import Table
 
 from boebot.errors import BoebotError
-from boebot.timing.budget import prove_all
-from boebot.timing.loads import LOADS
-from sim_bridge.timing.measure import measure_image
+from boebot_timing.budget import prove_all
+from boebot_timing.emulated.measure import measure_image
+from boebot_timing.loads import LOADS
 from tools import avr_program
 from tools.timing_promises import PROMISES
 

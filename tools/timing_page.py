@@ -18,11 +18,11 @@ from avr_timing.closed_pipe import exit_as
 from boebot import resources
 from boebot.description.robots import load_robot
 from boebot.running.tasks import DEFAULT_PERIOD
-from boebot.timing import diagram, realisable
-from boebot.timing.budget import FOR_EVER, RAM_BYTES, Report, Row, prove_all
-from boebot.timing.loads import LOADS
-from boebot.timing.measured import Measurement
-from sim_bridge.timing.measure import CLOCK_HZ, measure_image
+from boebot_timing import diagram, realisable
+from boebot_timing.budget import FOR_EVER, RAM_BYTES, Report, Row, prove_all
+from boebot_timing.emulated.measure import CLOCK_HZ, measure_image
+from boebot_timing.loads import LOADS
+from boebot_timing.measured import Measurement
 from tools.avr_program import IMAGES
 from tools.timing_promises import PROMISES, Promise
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from boebot.timing.budget import Report
-from boebot.timing.measured import Measurement
+from boebot_timing.budget import Report
+from boebot_timing.measured import Measurement
 
 TICK = 160_000  # cycles
 

@@ -20,10 +20,10 @@ from rich.table import Table
 
 from boebot import resources
 from boebot.errors import BoebotError
-from boebot.timing import budget, loads
-from boebot.timing.measured import Measurement, Worst, merged
-from sim_bridge.timing.measure import CLOCK_HZ, SCENARIOS, robot_of, search
-from sim_bridge.timing.scenarios import SILENCE
+from boebot_timing import budget, loads
+from boebot_timing.emulated.measure import CLOCK_HZ, SCENARIOS, robot_of, search
+from boebot_timing.emulated.scenarios import SILENCE
+from boebot_timing.measured import Measurement, Worst, merged
 from tools.avr_program import IMAGES
 
 RESULT = Path("build/soak/timing-search.json")

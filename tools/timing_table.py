@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 
 from avr_timing.closed_pipe import exit_as
-from boebot.timing.table import InterruptRow, SensorRow, Table, TaskRow
+from boebot_timing.table import InterruptRow, SensorRow, Table, TaskRow
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE = ROOT / "firmware" / "src" / "tasks.def"

@@ -11,11 +11,11 @@ from itertools import pairwise
 from pathlib import Path
 
 from boebot.link import messages
+from boebot_timing.emulated.jitter import lost, servo_pulses
+from boebot_timing.emulated.jitter_run import drive
+from boebot_timing.emulated.loads import FIGURES, Bench
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.symbols import find_symbol
-from sim_bridge.timing.jitter import lost, servo_pulses
-from sim_bridge.timing.jitter_run import drive
-from sim_bridge.timing.loads import FIGURES, Bench
 
 SECONDS = 2.0
 BUZZER, LAMP = 4, 14  # pins

@@ -14,9 +14,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
 from boebot.description.robots import load_robot
-from boebot.timing import diagram
-from boebot.timing.budget import Report
-from sim_bridge.timing.measure import measure
+from boebot_timing import diagram
+from boebot_timing.budget import Report
+from boebot_timing.emulated.measure import measure
 from tools import timing_page
 from tools.avr_program import IMAGES
 from tools.timing_page import Reports

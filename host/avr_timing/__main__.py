@@ -11,10 +11,10 @@ from avr_timing.bounds.stack import Stack
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.bounds.worst_path import worst_path
 from avr_timing.closed_pipe import exit_as
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.graph import program_of
-from avr_timing.image.elf import Image, read_image
 from avr_timing.program import Program
+from boebot.errors import AnalysisError
+from boebot.image.elf import Image, read_image
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from avr_timing.errors import AnalysisError
+from boebot.errors import AnalysisError
+from boebot.image.elf import LoopBound
 
 REFUSED = "?"  # in place of an instruction at which a function could not be followed any further
 
@@ -67,19 +68,6 @@ class Function:
     entry: int
     blocks: dict[int, Block]
     clobbers: frozenset[int] | None = None  # registers that a call may change; None: all that a callee need not keep
-
-
-@dataclass(frozen=True, slots=True)
-class LoopBound:
-    """What the source says of a loop: `address` lies in its body.
-
-    At most `passes` of the body for each time that the loop is entered; and, for loops that wait for a time, at most
-    `cycles` in all, to which one more pass may come. None: not said.
-    """
-
-    address: int
-    passes: int | None
-    cycles: int | None
 
 
 @dataclass(frozen=True, slots=True)

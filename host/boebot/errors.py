@@ -79,5 +79,13 @@ class ProtocolError(BoebotError):
     """The board speaks, but not this kit's protocol."""
 
 
+class NotRealisableError(BoebotError):
+    """A robot, a brain's period and a line that cannot go together in time."""
+
+
+class AnalysisError(BoebotError):
+    """An image cannot be read or followed, or something in it has no bound."""
+
+
 class TimingError(BoebotError):
     """An image's timing is not known: no bound, no graph, no table, or one that contradicts itself."""

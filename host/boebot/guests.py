@@ -9,6 +9,7 @@
     boebot.formats    a format of `boebot report`    Callable[[Mapping[int, RunResult], Path], list[Path]]: it writes
                                                      robots, by their numbers, into a folder
     boebot.records    a foreign record, by suffix    boebot.guests.ReadRecord
+    boebot.checks     what cannot be in time         boebot.running.tasks.Check
 
 Nothing of a guest is imported before it is asked for. The entry points are looked up once per process; names of the
 core come before those of guests.
@@ -25,10 +26,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 if TYPE_CHECKING:
-    from boebot.record.result import RunResult
+    from boebot.result import RunResult
 
-PORTS, COMMANDS, LISTS, FORMATS, RECORDS = (
-    f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records")
+PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS = (
+    f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records", "checks")
 )
 
 

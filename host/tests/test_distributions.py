@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from boebot.errors import BoebotError
-from boebot.timing.distributions import Distribution, JitterReport, Losses, rows
-from boebot.timing.histograms import draw
+from boebot_timing.distributions import Distribution, JitterReport, Losses, rows
+from boebot_timing.histograms import draw
 
 
 def distribution(

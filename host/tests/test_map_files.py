@@ -23,14 +23,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from avr_timing.errors import AnalysisError
-from avr_timing.image.elf import read_image
 from boebot.can.log import read_log
-from boebot.errors import BoebotError, BrainError
+from boebot.errors import AnalysisError, BoebotError, BrainError
+from boebot.image.elf import read_image
 from boebot.navigation import Lattice, LineMap, OccupancyMap, search
 from boebot.navigation.occupancy_map import LONGEST
 from boebot.result import read_run
-from boebot.timing.table import read_table
+from boebot_timing.table import read_table
 from sim_bridge.boards import avr
 from sim_bridge.reading_table import ReadingTable
 

@@ -14,13 +14,13 @@ import pytest
 
 from avr_timing.interrupts.byte_reads import RECEIVE
 from avr_timing.interrupts.response import responses
-from boebot.cli import timing, timing_tables
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError, TimingError
-from boebot.timing import budget, diagram, loads, realisable
-from boebot.timing.firmware import load_firmware
-from boebot.timing.measured import Measurement, Moment, Spans, Worst, merged
-from boebot.timing.table import InterruptRow
+from boebot_timing import budget, diagram, loads, realisable, shown
+from boebot_timing.command import EXIT_BROKEN, EXIT_INPUT
+from boebot_timing.firmware import load_firmware
+from boebot_timing.measured import Measurement, Moment, Spans, Worst, merged
+from boebot_timing.table import InterruptRow
 from command import boebot as command
 from timing_program import build
 
@@ -176,7 +176,7 @@ def test_ring_that_is_needed_is_shown_beside_the_one_there_is(
     report: budget.Report, capsys: pytest.CaptureFixture[str]
 ) -> None:
     full = replace(report, ring=129)
-    timing_tables.show_report(full)
+    shown.show_report(full)
     assert full.faults == ["129 bytes may wait for a poll of the link; the ring holds 127"]
     rows = {line.split("  ")[0].strip(): line.split() for line in capsys.readouterr().out.splitlines()}
     assert rows["receive ring needed"][3:] == ["129", "of", "127", "bytes"]
@@ -239,7 +239,7 @@ def test_command_prints_the_table_and_its_code_says_whether_budgets_are_met(
     (tmp_path / "broken").mkdir()
     broken = build(tmp_path / "broken", first_budget=90)
     code, out, _ = command(capsys, "timing", "--elf", str(broken), "--no-measure")
-    assert code == timing.EXIT_BROKEN and "14 above its budget of 90" in " ".join(out.split())
+    assert code == EXIT_BROKEN and "14 above its budget of 90" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(
@@ -261,13 +261,13 @@ def test_bad_input_is_one_sentence_and_code_2(
     arguments: tuple[str, ...], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code, _, err = command(capsys, "timing", *arguments, "--no-measure")
-    assert code == timing.EXIT_INPUT and sentence in err and err.count("\n") == 1
+    assert code == EXIT_INPUT and sentence in err and err.count("\n") == 1
 
 
 def test_robot_without_a_board_is_judged_by_its_sensors(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = command(capsys, "timing", "--robot", "arsim", "--period", "10ms", "--step", "12ms", "--json")
     answer = json.loads(out)
-    assert code == timing.EXIT_BROKEN and answer["image"] is None
+    assert code == EXIT_BROKEN and answer["image"] is None
     assert "brain, 12 ms, ends 12 ms after the step began" in answer["realisable"]["faults"][0]
 
 
@@ -277,7 +277,7 @@ def test_line_too_slow_for_the_period_that_is_asked_for_is_code_1(
     arguments = ("timing", "--elf", str(image), "--no-measure", "--baud", "9600", "--period")
     code, out, _ = command(capsys, *arguments, "50ms")
     said = " ".join(out.split())
-    assert code == timing.EXIT_BROKEN and "all budgets are met" in said
+    assert code == EXIT_BROKEN and "all budgets are met" in said
     assert "brain period of 50 ms is not realisable: telemetry, " in said
     assert "expected a period of 100 ms or a line of 19200 bit/s" in said
     code, out, _ = command(capsys, *arguments, "0.1", "--json")

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 import timing_program
 from avr_timing.interrupts.response import Piece, Schedule, Source, load
 from boebot import resources
-from boebot.timing import budget, loads
-from boebot.timing.changes import most_waiting
-from boebot.timing.costs import Costs
-from boebot.timing.loads import LOADS
-from boebot.timing.table import Constants, InterruptRow
+from boebot_timing import budget, loads
+from boebot_timing.changes import most_waiting
+from boebot_timing.costs import Costs
+from boebot_timing.loads import LOADS
+from boebot_timing.table import Constants, InterruptRow
 
 ROUND, LOOP, FRAME, CHANGE = 100, 20, 2000, 10
 COSTS = Costs(

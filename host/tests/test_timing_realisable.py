@@ -11,11 +11,11 @@ import pytest
 import boebot
 from boebot import Member
 from boebot.description.robots import RobotDescription, load_robot, robot_names
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, NotRealisableError
 from boebot.running import runner
-from boebot.timing import realisable
-from boebot.timing.realisable import BoardTimes, NotRealisableError, judge, telemetry_ticks
-from boebot.timing.table import SensorRow, Table, TaskRow
+from boebot_timing import realisable
+from boebot_timing.realisable import BoardTimes, judge, telemetry_ticks
+from boebot_timing.table import SensorRow, Table, TaskRow
 from command import boebot as command
 from peer import InProcess, Peer
 

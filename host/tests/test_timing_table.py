@@ -11,7 +11,7 @@ from elftools.elf.elffile import ELFFile
 import avr_image
 from boebot import resources
 from boebot.errors import TimingError
-from boebot.timing.table import InterruptRow, SensorRow, Table, TaskRow, read_table, table_of
+from boebot_timing.table import InterruptRow, SensorRow, Table, TaskRow, read_table, table_of
 from timing_program import build
 from tools.avr_program import IMAGES
 

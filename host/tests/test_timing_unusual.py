@@ -14,12 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import timing_program
-from avr_timing.errors import AnalysisError
-from boebot.errors import TimingError
-from boebot.timing import budget
-from boebot.timing.loads import LOADS
-from boebot.timing.measured import Measurement, Spans, Worst
-from boebot.timing.table import read_table
+from boebot.errors import AnalysisError, TimingError
+from boebot_timing import budget
+from boebot_timing.loads import LOADS
+from boebot_timing.measured import Measurement, Spans, Worst
+from boebot_timing.table import read_table
 
 REFUSED = (AnalysisError, TimingError)
 FIGURES = LOADS["figures"]

@@ -11,10 +11,10 @@ import pytest
 import timing_program
 from avr_timing.bounds.worst_path import PathRow
 from boebot import resources
-from boebot.cli import timing
-from boebot.timing import budget, loads
-from boebot.timing.firmware import load_firmware
-from boebot.timing.worst_path import ACCEPTANCE, WorstPath, worst_path
+from boebot_timing import budget, loads
+from boebot_timing.command import EXIT_INPUT
+from boebot_timing.firmware import load_firmware
+from boebot_timing.worst_path import ACCEPTANCE, WorstPath, worst_path
 from command import boebot as command
 
 # Five passes of 2 nops, dec and brne (2, at last 1), a function of 10 nops; on separate lines.
@@ -107,4 +107,4 @@ def test_unknown_name_is_one_sentence(
 ) -> None:
     elf = () if "arsim" in arguments else ("--elf", str(image))
     code, _, err = command(capsys, "timing", *elf, *arguments)
-    assert code == timing.EXIT_INPUT and sentence in err and err.count("\n") == 1
+    assert code == EXIT_INPUT and sentence in err and err.count("\n") == 1

@@ -15,9 +15,9 @@ def places(elf: Path | None, addresses: Iterable[int]) -> dict[int, str]:
     """Function and source line of each address; empty where there is no file that can be read."""
     if elf is None:
         return {}
-    from avr_timing.errors import AnalysisError
-    from avr_timing.image.elf import read_image
-    from avr_timing.image.places import place
+    from boebot.errors import AnalysisError
+    from boebot.image.elf import read_image
+    from boebot.image.places import place
 
     try:
         image = read_image(elf)

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import pytest
 
+from boebot_timing.emulated.loads import Bench, Bursts, Contact, Source
 from sim_bridge.boards.board import Level
-from sim_bridge.timing.loads import Bench, Bursts, Contact, Source
 
 
 @dataclass

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from boebot.errors import BoebotError
-from sim_bridge.timing.line import BYTE_CYCLES
-from sim_bridge.timing.loads import OVERLOAD, TICK_CYCLES, Bench, wheels
+from boebot_timing.emulated.line import BYTE_CYCLES
+from boebot_timing.emulated.loads import OVERLOAD, TICK_CYCLES, Bench, wheels
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "arduino-servo"

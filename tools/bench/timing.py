@@ -7,11 +7,11 @@ import time
 
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
-from boebot.timing import budget, loads
+from boebot_timing import budget, loads
+from boebot_timing.emulated.loads import Bench
+from boebot_timing.emulated.measure import CLOCK_HZ, Run, run
+from boebot_timing.emulated.scenarios import load, numbers_of, prepare
 from sim_bridge.boards.emulated import avr_image
-from sim_bridge.timing.loads import Bench
-from sim_bridge.timing.measure import CLOCK_HZ, Run, run
-from sim_bridge.timing.scenarios import load, numbers_of, prepare
 from tools import timing_page
 from tools.avr_program import IMAGES
 from tools.bench.figures import Peer, figure

@@ -69,7 +69,7 @@ ROOMS = {
     "firmware": Room(20, "firmware/src/", "hil_tests/test_*.py", units=True),
     "timing": Room(
         8,
-        "host/avr_timing/|host/boebot/timing/|sim_bridge/timing/",
+        "host/avr_timing/|host/boebot_timing/",
         "host/avr_timing/tests/test_*.py */test_timing*.py */tests/test_timing*.py hil_tests/test_jitter.py",
     ),
     "sim_bridge": Room(26, "sim_bridge/(?!fuzz)", "sim_bridge/tests/**/test_*.py"),

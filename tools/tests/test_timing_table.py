@@ -8,7 +8,7 @@ import pytest
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
-from boebot.timing.table import Table
+from boebot_timing.table import Table
 from tools import timing_table
 from tools.avr_program import IMAGES
 

@@ -16,11 +16,11 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from avr_timing.bounds import loop_counts
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Known
 from avr_timing.flow.loops import IrreducibleError, Loop, loops_of
 from avr_timing.flow.paths import Mark
 from avr_timing.program import Block, Function, Program
+from boebot.errors import AnalysisError
 
 _Marks = dict[int, list[Mark]]
 _Found = list[tuple[Loop[int], Loop[int] | None]]

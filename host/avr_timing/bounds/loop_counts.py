@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from avr_timing.flow.constants import Known, State, once_round
 from avr_timing.flow.loops import Loop
-from avr_timing.image.registers import KEEPS_FLAGS, before, is_call, written
+from avr_timing.flow.registers import KEEPS_FLAGS, before, is_call, written
 from avr_timing.program import Block, Function, Instruction, Program
 
 MOST = 1 << 16  # passes that are tried; longer loops have other counters

@@ -12,10 +12,10 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Context, Known, Part, State, known, root, step
-from avr_timing.image.registers import ZERO, is_call, pushes_only
+from avr_timing.flow.registers import ZERO, is_call, pushes_only
 from avr_timing.program import Block, Instruction, Program
+from boebot.errors import AnalysisError
 
 ADDRESS = 2  # bytes that a call or an interrupt puts on the stack
 SPL, SPH = 0x3D, 0x3E  # I/O addresses

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 from avr_timing.bounds.loop_bounds import check_sleep, marks_of
 from avr_timing.bounds.stack import Stack
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Context, Known, known, root
 from avr_timing.flow.paths import Graph, Mark, Walk, Way, longest
 from avr_timing.program import Block, Function, Program
+from boebot.errors import AnalysisError
 
 # Library routines with a loop that runs by an argument, of 16 bits: its lower register (avr-gcc's calling convention).
 COUNTS = {"memcpy": 20, "memcpy_P": 20, "memset": 20}

@@ -1,1 +1,1 @@
-"""How control flows: functions as graphs, their jumps, loops, known values and longest walks."""
+"""Instructions and how control flows: functions as graphs, their jumps, loops, known values and longest walks."""

@@ -14,8 +14,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from avr_timing.image.instructions import BRANCHES, SKIPS
-from avr_timing.image.registers import ZERO, is_call, pushes_only, written
+from avr_timing.flow.instructions import BRANCHES, SKIPS
+from avr_timing.flow.registers import ZERO, is_call, pushes_only, written
 from avr_timing.program import Block, Edge, Function, Instruction
 
 ARGUMENTS = range(8, 26)  # registers in which values are handed to a callee

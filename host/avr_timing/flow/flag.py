@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from avr_timing.image.registers import pushes_only, written
+from avr_timing.flow.registers import pushes_only, written
 from avr_timing.program import Instruction
 
 SREG = 0x3F  # I/O address

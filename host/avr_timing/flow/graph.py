@@ -24,13 +24,13 @@ from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from avr_timing.errors import AnalysisError
+from avr_timing.flow.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
 from avr_timing.flow.jumps import NotProvenError, Step, targets_of
 from avr_timing.flow.loops import reverse_postorder
-from avr_timing.image.elf import Image, Symbol, read_image
-from avr_timing.image.instructions import BRANCHES, CALLS, JUMPS, RETURNS, SKIPS, decode
-from avr_timing.image.registers import CALL_CLOBBERED, REGISTERS, is_call, written
+from avr_timing.flow.registers import CALL_CLOBBERED, REGISTERS, is_call, written
 from avr_timing.program import REFUSED, Block, Edge, Function, Instruction, Program
+from boebot.errors import AnalysisError
+from boebot.image.elf import Image, Symbol, read_image
 
 VECTORS = 26  # the reset's and 25 interrupts'
 VECTOR_SIZE = 4  # bytes

@@ -17,8 +17,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from avr_timing.image.instructions import BRANCHES, SKIPS
-from avr_timing.image.registers import REGISTERS, ZERO
+from avr_timing.flow.instructions import BRANCHES, SKIPS
+from avr_timing.flow.registers import REGISTERS, ZERO
 from avr_timing.program import Instruction
 
 Values = NDArray[np.int64]  # of one term, one for each choice of the unknown bytes

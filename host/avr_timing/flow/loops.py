@@ -11,8 +11,8 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from avr_timing.errors import AnalysisError
 from avr_timing.program import Function
+from boebot.errors import AnalysisError
 
 N = TypeVar("N", bound=Hashable)
 

@@ -16,8 +16,8 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Generic
 
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.loops import IrreducibleError, Loop, N, natural_loops, reverse_postorder
+from boebot.errors import AnalysisError
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.flow.paths import Graph, Mark, Way, longest
-from avr_timing.image.registers import ZERO, written
+from avr_timing.flow.registers import ZERO, written
 from avr_timing.interrupts.interrupts_off import ENTRY
 from avr_timing.program import Block, Instruction
 

@@ -16,11 +16,11 @@ from dataclasses import dataclass, field
 
 from avr_timing.bounds.stack import VECTORS
 from avr_timing.bounds.wcet import WorstCase
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.flag import SREG, Flag, State, after
 from avr_timing.flow.loops import IrreducibleError, loops_of
 from avr_timing.flow.paths import Graph, Way, longest
 from avr_timing.program import REFUSED, Block, Function, Instruction, Program
+from boebot.errors import AnalysisError
 
 ENTRY = 4  # cycles from acceptance to the vector's jump
 STATES_MAXIMUM = 100_000  # of a function: (block, instruction, state); the kit's have 1,284 at most

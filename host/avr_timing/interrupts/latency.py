@@ -28,12 +28,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from avr_timing.errors import AnalysisError
 from avr_timing.interrupts.byte_reads import RECEIVE, ByteReads
 from avr_timing.interrupts.byte_waits import Line, Other, longest_wait
 from avr_timing.interrupts.interrupts_off import InterruptsOff
 from avr_timing.interrupts.response import Source
 from avr_timing.interrupts.steps import Steps
+from boebot.errors import AnalysisError
 
 HORIZON = 1 << 20  # cycles, 65 ms: who waits longer waits for ever
 

@@ -6,9 +6,9 @@ import re
 import subprocess
 from pathlib import Path
 
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.graph import load_program
 from avr_timing.program import Function, Program
+from boebot.errors import AnalysisError
 
 # `main` and the vectors come from avr-libc's start-up code.
 ASSEMBLER = """

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from avr_image import build
 from avr_timing.bounds.stack import Stack
 from avr_timing.bounds.wcet import WorstCase
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.graph import load_program
-from avr_timing.image.chip import NOTE, assumed_chip
-from avr_timing.image.elf import read_image
 from avr_timing.interrupts.interrupts_off import InterruptsOff
+from boebot.errors import AnalysisError
+from boebot.image.chip import NOTE, assumed_chip
+from boebot.image.elf import read_image
 
 SOURCE = """
 volatile int number;

@@ -12,10 +12,9 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 from avr_image import build, disassembly
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.graph import load_program
-from avr_timing.image.elf import Image, read_image
-from avr_timing.program import LoopBound
+from boebot.errors import AnalysisError
+from boebot.image.elf import Image, LoopBound, read_image
 
 IMAGE = Path(__file__).resolve().parents[3] / "build" / "images" / "shieldbot.elf"
 PROGRAM = """

@@ -10,8 +10,8 @@ import pytest
 
 from avr_image import assembled, disassembly, function, operands, refusal
 from avr_timing.flow.graph import load_program, program_of
-from avr_timing.image.elf import read_image
 from avr_timing.program import Edge, Instruction
+from boebot.image.elf import read_image
 
 IMAGES = Path(__file__).resolve().parents[3] / "build" / "images"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from avr_image import assembled, disassembly, function, operands
-from avr_timing.image.instructions import BRANCHES, SKIPS, decode
+from avr_timing.flow.instructions import BRANCHES, SKIPS, decode
 
 IMAGES = Path(__file__).resolve().parents[3] / "build" / "images"
 # objdump knows the instructions of all cores; the ATmega328P does not have these.

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from avr_image import assembled, compiled
-from avr_timing.errors import AnalysisError
 from avr_timing.interrupts.interrupts_off import ENTRY, WAKE, InterruptsOff
+from boebot.errors import AnalysisError
 
 VECTORS = "\n.global __vector_1\n.global __vector_2\n.global __vector_3\n"
 JUMP = 3  # of a vector, where the linker does not relax

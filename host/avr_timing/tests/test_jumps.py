@@ -9,7 +9,7 @@ import pytest
 
 from avr_image import assembled, build, compiled, disassembly, function, refusal
 from avr_timing.flow.graph import load_program
-from avr_timing.image.elf import read_image
+from boebot.image.elf import read_image
 
 SWITCH = """
 #include <stdint.h>

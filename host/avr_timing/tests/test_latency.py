@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from avr_image import assembled
 from avr_timing.bounds.wcet import WorstCase
-from avr_timing.errors import AnalysisError
 from avr_timing.interrupts import interrupts_off
 from avr_timing.interrupts.interrupts_off import ENTRY, WAKE, InterruptsOff
 from avr_timing.interrupts.latency import HORIZON, Latencies
 from avr_timing.interrupts.response import Source
 from avr_timing.interrupts.steps import KEPT, Steps
 from avr_timing.program import Instruction, Program
+from boebot.errors import AnalysisError
 
 VECTORS = "\n.global __vector_1\n.global __vector_2\n.global __vector_3\n"
 JUMP = 3  # of a vector, where the linker does not relax

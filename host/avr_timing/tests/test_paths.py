@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import Bounds, LinearConstraint, milp
 
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.paths import Graph, Mark, Walk, Way, longest
+from boebot.errors import AnalysisError
 from random_shapes import END, Shape, random_shape
 
 

@@ -9,7 +9,7 @@ import pytest
 from avr_image import assembled, compiled
 from avr_timing.bounds.stack import Stack
 from avr_timing.bounds.wcet import WorstCase
-from avr_timing.errors import AnalysisError
+from boebot.errors import AnalysisError
 
 FRAME = "in r28, SPL\n in r29, SPH\n {take}\n in r0, SREG\n cli\n out SPH, r29\n out SREG, r0\n out SPL, r28\n"
 TAKE = FRAME.format(take="sbiw r28, 20")

@@ -8,8 +8,8 @@ import pytest
 
 from avr_image import assembled, build, compiled
 from avr_timing.bounds.wcet import Visit, WorstCase
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.graph import load_program
+from boebot.errors import AnalysisError
 
 # What firmware/src/bounds.h writes, in short.
 LOOP = """

@@ -48,9 +48,6 @@ COMMANDS = {
     ),
     "link": Command("Watch the link: counters of both ends, round trips, the board's clock.", "boebot.cli.link:link"),
     "parameters": Command("List, read, set, save and reset the board's parameters.", "boebot.cli.parameters:app"),
-    "timing": Command(
-        "What the firmware may take, what it took, and whether that fits its budgets.", "boebot.cli.timing:timing"
-    ),
 }
 """Those of the core; guests add theirs (boebot.guests)."""
 

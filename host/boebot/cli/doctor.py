@@ -146,7 +146,7 @@ def _firmware(link: Link, robot: RobotDescription) -> Iterator[Check]:
     yield Check("firmware", f"{version}, {text(identity.compiler)}, for {text(hello.robot)}")
     image = resources.folder("images") / f"{robot.pin_map}.elf"
     if identity.image_size and image.is_file():
-        from avr_timing.image.elf import read_image  # it takes a while
+        from boebot.image.elf import read_image  # it takes a while
 
         code = read_image(image).code
         runs, ours = (identity.image_size, identity.image_hash), (len(code), zlib.crc32(code))

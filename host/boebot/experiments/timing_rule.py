@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from boebot.description.robots import RobotDescription, load_robot
+from boebot.errors import NotRealisableError
 from boebot.experiments.experiment import Outcome, Progress, about, exactly, experiment
 from boebot.running.runner import run
-from boebot.timing.realisable import NotRealisableError, Verdict, judge
+from boebot_timing.realisable import Verdict, judge
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

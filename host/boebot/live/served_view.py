@@ -19,7 +19,7 @@ from boebot.live.page_server import LOOPBACK
 from boebot.record.blocks import Group
 from boebot.record.record import Record
 from boebot.record.run import Run
-from boebot.timing.realisable import TICK_S
+from boebot.running.driver import TICK_S
 from boebot.view import page_data, scene
 
 _SILENT_S = 0.2  # after so long a time without telemetry nobody listens to the board

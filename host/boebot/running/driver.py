@@ -27,6 +27,7 @@ from boebot.running.stepping import AT_LEISURE, StepLimit
 Progress = Callable[[float], None]
 """Called now and then with the seconds of the run that have passed."""
 
+TICK_S = 0.01  # of the firmware's control tick
 PERIOD_MAXIMUM_S = 10.0  # of any brain
 PROGRESS_S = 0.1  # wall time between two reports of progress
 

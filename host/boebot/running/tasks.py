@@ -4,27 +4,40 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from boebot import brains
 from boebot.boards import DIRECT, BoardRequest, default_board, is_live
 from boebot.brain.composition import described
 from boebot.brains import LoadedBrain
 from boebot.description.robots import RobotDescription, load_robot
-from boebot.errors import BoebotError, BrainError
+from boebot.errors import BoebotError, BrainError, NotRealisableError
+from boebot.guests import CHECKS, guests
 from boebot.imperfections import checked
 from boebot.robot import Equipment
 from boebot.running.board_driver import check_time_to_live
 from boebot.running.brain_parameters import in_force, parameters
 from boebot.running.driver import Task
-from boebot.timing import realisable
 
 DEFAULT_PERIOD = 0.05  # s
 _OF_ONE = {"pose", "period", "without", "parameters", "imperfections"}
+
+
+class Finding(NamedTuple):
+    """What does not go together in time."""
+
+    why: str
+    """A sentence without its end."""
+    see: str
+    """What shows more of it."""
+
+
+Check = Callable[[RobotDescription, float], Finding | None]
+"""Whether a robot can keep a brain's period (s); None: it can."""
 
 
 class _NamesFiles:
@@ -188,9 +201,9 @@ def _task(member: Member, request: Request, number: int) -> Task:
     expect("parameters", member.parameters, 'values by name, as in {"avoid.turn": 0.4}', Mapping, type(None))
     given = member.parameters or {}
     loaded, description, period_s = prepare(member.brain, member.robot, member.period)
-    verdict = realisable.judge(description, period_s, board=realisable.of_image(description))
-    if not request.force_timing:
-        realisable.check(verdict)
+    finding = check_timing(description, period_s)
+    if finding is not None and not request.force_timing:
+        raise NotRealisableError(f"{finding.why} ({finding.see}; --force-timing runs it all the same)")
     with in_force(loaded, given):
         now = parameters(loaded)
         made_of = None if loaded.brain is None else described(loaded.brain)
@@ -215,8 +228,14 @@ def _task(member: Member, request: Request, number: int) -> Task:
         parameters={name: now[name] for name in given},
         made_of=made_of,
         brain_seed=int(request.seed) + number - 1 if member.seed is None else int(member.seed),
-        unrealisable=None if verdict.is_realisable else verdict.sentence,
+        unrealisable=None if finding is None else finding.why,
     )
+
+
+def check_timing(robot: RobotDescription, period_s: float) -> Finding | None:
+    """The first finding of the installed checks."""
+    checks: list[Check] = [guest.load() for guest in guests(CHECKS).values()]
+    return next(filter(None, (check(robot, period_s) for check in checks)), None)
 
 
 def prepare(

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from avr_timing.errors import AnalysisError
-from avr_timing.image.chip import assumed_chip
 from boebot import resources
-from boebot.errors import BoardError
+from boebot.errors import AnalysisError, BoardError
 from boebot.files import regular
+from boebot.image.chip import assumed_chip
 from sim_bridge.boards.board import BoardAccess
 
 ERROR_SIZE = 200

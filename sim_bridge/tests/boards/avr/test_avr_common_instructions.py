@@ -9,13 +9,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from avr_timing.image.instructions import decode
+from avr_timing.flow.instructions import decode
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
+from boebot_timing.emulated import measure
 from sim_bridge.boards import avr
 from sim_bridge.boards.emulated import avr_image
 from sim_bridge.tests.boards.avr.avr_program import Machine
-from sim_bridge.timing import measure
 
 WORDS = 12_000
 RAM = range(0x100, 0x900)

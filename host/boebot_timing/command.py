@@ -5,23 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from boebot import resources
-from boebot.cli import completion, options, output, quantity, streams, timing_board
+from boebot.cli import completion, options, output, quantity, streams
 from boebot.errors import BoebotError, TimingError
-from boebot.guests import guests
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
-    from boebot.timing.budget import Report
-    from boebot.timing.realisable import Verdict
+    from boebot_timing.budget import Report
+    from boebot_timing.realisable import Verdict
 
 EXIT_BROKEN, EXIT_INPUT = 1, 2
-GROUP = "boebot.timing"
 _CYCLES_PER_S = 16_000_000
 _SHORTEST_S, _LONGEST_S = 0.1, 3600.0  # of a scenario
 _HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
@@ -103,11 +102,10 @@ def timing(
     json: options.Json = False,
 ) -> None:
     """See `_HELP`."""
-    from avr_timing.errors import AnalysisError
     from boebot import view
     from boebot.description.robots import load_robot
     from boebot.running.tasks import DEFAULT_PERIOD
-    from boebot.timing import budget, loads, realisable
+    from boebot_timing import board, budget, loads, realisable
 
     try:
         if where is not None:
@@ -124,21 +122,21 @@ def timing(
         image = _image(elf, description)
         found = None
         if image is not None:
-            board = {} if port is None else timing_board.maxima(port, description, image, seconds, elf)
-            measured = _measured("emulated", image, seconds, seed) if measure else None
+            maxima = {} if port is None else board.maxima(port, description, image, seconds, elf)
+            measured = _measured(False, image, seconds, seed) if measure else None
             label = f"bounds of {image.name}"
             with output.share_bars([label]) as watch:
                 watch({label: 0.0})
-                found = budget.prove(image, asked, measured, board, progress=lambda share: watch({label: share}))
+                found = budget.prove(image, asked, measured, maxima, progress=lambda share: watch({label: share}))
         brain_s, own_period = _brain(brain, step, description, seed)
         period_s = period if period is not None else own_period or DEFAULT_PERIOD
         times = None if found is None else _board_times(found)
         verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
-        distributions = _measured("jitter", image, seconds, seed) if jitter and image is not None else None
+        distributions = _measured(True, image, seconds, seed) if jitter and image is not None else None
         answer = Answer(found, verdict, distributions)
         if out is not None:
             answer.files = _write(answer, out)
-    except (BoebotError, AnalysisError) as error:
+    except BoebotError as error:
         output.say(str(error))
         raise typer.Exit(EXIT_INPUT) from None
     if json:
@@ -178,23 +176,23 @@ class Answer:
 
     def show(self) -> None:
         """For people."""
-        from boebot.cli import timing_tables
+        from boebot_timing import shown
 
         if self.report is not None:
-            timing_tables.show_report(self.report)
-        timing_tables.show_verdict(self.verdict)
+            shown.show_report(self.report)
+        shown.show_verdict(self.verdict)
         if self.jitter is not None:
-            timing_tables.show_jitter(self.jitter)
+            shown.show_jitter(self.jitter)
         if self.files:
             output.line(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
 
 
 def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
     """The worst path of a task or an interrupt. Raises BoebotError or AnalysisError where there is none."""
-    from boebot.cli import timing_tables
     from boebot.description.robots import load_robot
-    from boebot.timing.firmware import load_firmware
-    from boebot.timing.worst_path import worst_path
+    from boebot_timing import shown
+    from boebot_timing.firmware import load_firmware
+    from boebot_timing.worst_path import worst_path
 
     image = _image(elf, load_robot(robot))
     if image is None:
@@ -206,7 +204,7 @@ def _show_where(elf: Path | None, robot: str, name: str, json: bool) -> None:
     if json:
         output.print_json({"elf": str(image)} | path.as_dict())
     else:
-        timing_tables.show_path(path)
+        shown.show_path(path)
 
 
 def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
@@ -223,16 +221,13 @@ def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
     return image
 
 
-def _measured(name: str, image: Path, seconds: float, seed: int) -> Any:
-    """What the entry point of that name measures of the image; None: it is not installed."""
-    point = guests(GROUP).get(name)
-    if point is None:
-        output.say(f"nothing is measured: no emulator is installed that can ({GROUP}: {name})")
-        return None
+def _measured(pins: bool, image: Path, seconds: float, seed: int) -> Any:
+    """What the emulator shows of the image: spans of its code, or what is late at its pins."""
     try:
-        work = point.load()
+        from boebot_timing.emulated import jitter, measure
     except ImportError as error:
         raise TimingError(f"the image cannot be measured here: {error}") from None
+    work: Any = jitter.measure_jitter if pins else measure.measure_image
     with output.share_bars([f"measuring {image.name}"]) as watch:
         return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
 
@@ -257,7 +252,7 @@ def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, see
 
 def _board_times(report: Report) -> Any:
     """Of a board whose image was judged: bounds in place of budgets."""
-    from boebot.timing.realisable import BoardTimes
+    from boebot_timing.realisable import BoardTimes
 
     if report.responses is None:
         return BoardTimes.of(report.table)
@@ -268,16 +263,16 @@ def _board_times(report: Report) -> Any:
 def _write(answer: Answer, out: Path) -> list[Path]:
     import json
 
-    from boebot.view.experiment_files import write
+    from boebot.record.run_folder import write_whole
 
     found: dict[str, bytes] = {}
     if answer.report is not None:
-        from boebot.timing import diagram
+        from boebot_timing import diagram
 
         found |= diagram.files(answer.report, answer.verdict)
     if answer.jitter is not None:
-        from boebot.timing import histograms
+        from boebot_timing import histograms
 
         found |= histograms.files(answer.jitter.distributions)
     found["timing.json"] = (json.dumps(answer.as_dict(), indent=1) + "\n").encode()
-    return list(write(out, found))
+    return [write_whole(out / name, partial(Path.write_bytes, data=data)) for name, data in found.items()]

@@ -23,10 +23,10 @@ from boebot.errors import BoebotError, TimingError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
 from boebot.running.board_driver import TIME_TO_LIVE_LIMIT_MS, check_time_to_live
-from boebot.running.driver import check_period, whole_ticks
-from boebot.timing.table import SensorRow, Table, read_table
+from boebot.running.driver import TICK_S, check_period, whole_ticks
+from boebot.running.tasks import Finding
+from boebot_timing.table import SensorRow, Table, read_table
 
-TICK_S = 0.01
 TELEMETRY_BYTES = messages.Telemetry.LENGTH + FRAME_OVERHEAD
 COMMAND_BYTES = messages.SetpointSignal.LENGTH + FRAME_OVERHEAD
 BITS_PER_BYTE = 10  # 8N1
@@ -34,10 +34,6 @@ SERVO_FRAME_S = 0.02
 BAUD_RATES = (9600, 19200, 38400, 57600, 115200, 230400, 250000, 500000, 1000000)
 _LONGEST_PERIOD_S = TIME_TO_LIVE_LIMIT_MS / 2500  # of a brain on a board: 2.5 of them have to fit
 _TELEMETRY_TICKS = (1, 2, 5, 10, 20, 50, 100)  # that a slow line leads to (PROTOCOL.md, "Delivery")
-
-
-class NotRealisableError(BoebotError):
-    """A robot, a brain's period and a line that cannot go together in time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,12 +178,10 @@ def judge(
     return _of_board(robot, period_s, board or BoardTimes(), brain_s, baud, telemetry_bytes, command_bytes)
 
 
-def check(verdict: Verdict) -> None:
-    """Raises NotRealisableError where it is not realisable."""
-    if not verdict.is_realisable:
-        raise NotRealisableError(
-            f"{verdict.sentence} (`boebot timing --robot` shows its times; --force-timing runs it all the same)"
-        )
+def check(robot: RobotDescription, period_s: float) -> Finding | None:
+    """Whether a run with that period of the brain can keep it (entry point of the group `boebot.checks`)."""
+    verdict = judge(robot, period_s, board=of_image(robot))
+    return None if verdict.is_realisable else Finding(verdict.sentence, "`boebot timing --robot` shows its times")
 
 
 def telemetry_ticks(baud: int, telemetry_bytes: int = TELEMETRY_BYTES) -> int:

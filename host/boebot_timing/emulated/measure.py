@@ -18,16 +18,16 @@ from boebot.description import robots
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoardError
 from boebot.link import messages
-from boebot.timing.measured import Measurement, Worst, merged
+from boebot_timing.emulated.line import Line
+from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Ping, PulseTrain
+from boebot_timing.emulated.losses import losses as losses_of
+from boebot_timing.emulated.scenarios import RANGES, SILENCE, STATES, load, numbers_of, prepare, seed_of
+from boebot_timing.emulated.watched import Circumstances, Watched, measurement, watched
+from boebot_timing.emulated.world_access import WorldAccess
+from boebot_timing.measured import Measurement, Worst, merged
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import FUNCTION_IDS
 from sim_bridge.boards.code_places import watchdog_resets
-from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import TICK_CYCLES, Bench, Ping, PulseTrain
-from sim_bridge.timing.losses import losses as losses_of
-from sim_bridge.timing.scenarios import RANGES, SILENCE, STATES, load, numbers_of, prepare, seed_of
-from sim_bridge.timing.watched import Circumstances, Watched, measurement, watched
-from sim_bridge.timing.world_access import WorldAccess
 
 SCENARIOS = ("figures", "overload", "faults", "everything")
 HANG = "hang"  # the load of the figures for HANGS_AFTER, then a task never returns; what comes then is the watchdog's
@@ -256,7 +256,7 @@ def _next_seed(draw: random.Random, best: dict[str, tuple[int, int]]) -> int:
 
 def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | None = None) -> Measurement:
     """All scenarios of the robot that an image was built for, `seconds` of the board's time each, and, where it has a
-    watchdog that warns by an interrupt, a hang (entry point `emulated` of the group boebot.timing).
+    watchdog that warns by an interrupt, a hang.
 
     Args:
         progress: called with the share that is done, 0 to 1.

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
+from boebot_timing.emulated.line import Line
+from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels, with_noise
+from boebot_timing.emulated.traffic import EachTick, FullLine
 from sim_bridge.boards.board import Level
-from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels, with_noise
-from sim_bridge.timing.traffic import EachTick, FullLine
 
 Progress = Callable[[float], None]
 

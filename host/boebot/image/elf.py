@@ -17,11 +17,10 @@ from elftools.construct import ConstructError
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
-from avr_timing.errors import AnalysisError
-from avr_timing.image.chip import assumed_chip
-from avr_timing.image.section import section_of
-from avr_timing.image.source_lines import source_lines
-from avr_timing.program import LoopBound
+from boebot.errors import AnalysisError
+from boebot.image.chip import assumed_chip
+from boebot.image.section import section_of
+from boebot.image.source_lines import source_lines
 
 LOOPS = ".boebot.loops"  # section of the loop bounds, as boebot's bounds.h writes it in any firmware
 FLASH_SIZE = 0x8000  # bytes
@@ -47,6 +46,19 @@ class Symbol:
     size: int
     kind: str
     strength: int  # 0 global, 1 weak, 2 local
+
+
+@dataclass(frozen=True, slots=True)
+class LoopBound:
+    """What the source says of a loop: `address` lies in its body.
+
+    At most `passes` of the body for each time that the loop is entered; and, for loops that wait for a time, at most
+    `cycles` in all, to which one more pass may come. None: not said.
+    """
+
+    address: int
+    passes: int | None
+    cycles: int | None
 
 
 @dataclass(frozen=True, slots=True)

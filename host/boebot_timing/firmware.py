@@ -8,11 +8,11 @@ from pathlib import Path
 
 from avr_timing.bounds.stack import VECTORS
 from avr_timing.flow.graph import program_of
-from avr_timing.image.elf import Image, read_image
 from avr_timing.program import Program
 from boebot.errors import TimingError
-from boebot.timing.loads import SLOT, TICK
-from boebot.timing.table import Constants, Table, read_table
+from boebot.image.elf import Image, read_image
+from boebot_timing.loads import SLOT, TICK
+from boebot_timing.table import Constants, Table, read_table
 
 
 @dataclass(frozen=True, slots=True)

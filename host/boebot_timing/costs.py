@@ -23,7 +23,6 @@ from dataclasses import dataclass, field, replace
 
 from avr_timing.bounds.loop_bounds import sleeps
 from avr_timing.bounds.wcet import WorstCase
-from avr_timing.errors import AnalysisError
 from avr_timing.flow.constants import Known
 from avr_timing.flow.loops import Loop, loops_of
 from avr_timing.flow.paths import Graph, Way, longest
@@ -32,10 +31,10 @@ from avr_timing.interrupts.interrupts_off import ENTRY, InterruptsOff
 from avr_timing.interrupts.latency import Latencies
 from avr_timing.interrupts.response import Piece, Schedule, Source
 from avr_timing.program import Program
-from boebot.errors import TimingError
-from boebot.timing.firmware import Firmware
-from boebot.timing.loads import APART, ENCODERS, NEVER_NEAR, SEND, SENT_WHILE_BUSY, Load
-from boebot.timing.table import TaskRow
+from boebot.errors import AnalysisError, TimingError
+from boebot_timing.firmware import Firmware
+from boebot_timing.loads import APART, ENCODERS, NEVER_NEAR, SEND, SENT_WHILE_BUSY, Load
+from boebot_timing.table import TaskRow
 
 SCHEDULER, LOOP = "schedule_poll", "firmware_poll"
 AROUND_TASK = ("task_begins", "task_has_ended")  # called once for each task that runs

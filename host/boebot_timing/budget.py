@@ -21,17 +21,16 @@ from pathlib import Path
 from typing import Any
 
 from avr_timing.bounds.stack import Stack
-from avr_timing.errors import AnalysisError
 from avr_timing.interrupts.byte_reads import RECEIVE
 from avr_timing.interrupts.interrupts_off import WAKE
 from avr_timing.interrupts.response import Responses, Schedule, Source, load, longest_gap, misses, response, responses
-from boebot.errors import TimingError
-from boebot.timing.changes import of_image as changes_of
-from boebot.timing.costs import Costs, costs
-from boebot.timing.firmware import Firmware, check, load_firmware
-from boebot.timing.loads import SLOT, Load
-from boebot.timing.measured import Measurement, Spans, as_json
-from boebot.timing.table import Table
+from boebot.errors import AnalysisError, TimingError
+from boebot_timing.changes import of_image as changes_of
+from boebot_timing.costs import Costs, costs
+from boebot_timing.firmware import Firmware, check, load_firmware
+from boebot_timing.loads import SLOT, Load
+from boebot_timing.measured import Measurement, Spans, as_json
+from boebot_timing.table import Table
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
 RAM_BYTES = RAM_END - RAM_START

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from boebot.link import messages
-from boebot.timing.distributions import Losses
-from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import TICK_CYCLES, PulseTrain
+from boebot_timing.distributions import Losses
+from boebot_timing.emulated.line import Line
+from boebot_timing.emulated.loads import TICK_CYCLES, PulseTrain
 
 COUNTERS_TICKS = 80  # from one message with the board's counters to the next one at most
 SIDES = ("left", "right")

@@ -10,7 +10,7 @@ from avr_timing.bounds.worst_path import PathRow
 from avr_timing.bounds.worst_path import worst_path as path_of
 from avr_timing.interrupts.interrupts_off import ENTRY
 from boebot.errors import TimingError
-from boebot.timing.firmware import Firmware
+from boebot_timing.firmware import Firmware
 
 ACCEPTANCE = "acceptance of the interrupt"
 

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from boebot.link import messages
-from boebot.timing.distributions import Distribution, JitterReport, Losses
-from sim_bridge.timing import latency_limits as limits
-from sim_bridge.timing.jitter_run import CENTRE, GAIN, MIRROR, Progress, Run, drive
-from sim_bridge.timing.latency_limits import Limits
-from sim_bridge.timing.line import Heard
-from sim_bridge.timing.loads import LOADS, SERVO_FRAME_CYCLES, Bench, Load
-from sim_bridge.timing.losses import losses
+from boebot_timing.distributions import Distribution, JitterReport, Losses
+from boebot_timing.emulated import latency_limits as limits
+from boebot_timing.emulated.jitter_run import CENTRE, GAIN, MIRROR, Progress, Run, drive
+from boebot_timing.emulated.latency_limits import Limits
+from boebot_timing.emulated.line import Heard
+from boebot_timing.emulated.loads import LOADS, SERVO_FRAME_CYCLES, Bench, Load
+from boebot_timing.emulated.losses import losses
 
 CYCLES_PER_US = 16
 SAME_WIDTH = 16  # cycles by which a pulse may differ from the set-point's

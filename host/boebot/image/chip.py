@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 import struct
 
-from avr_timing.errors import AnalysisError
-from avr_timing.image.section import HEADER, MAGIC, section_of
+from boebot.errors import AnalysisError
+from boebot.image.section import HEADER, MAGIC, section_of
 
 CHIP = "ATmega328P"
 SAME_PROGRAM = (CHIP, "ATmega328")  # one data sheet; they differ in the signature and the brown-out detector's switch

@@ -7,9 +7,9 @@ import struct
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from avr_timing.image.section import section_of
 from boebot.errors import TimingError
 from boebot.files import regular
+from boebot.image.section import section_of
 
 SECTION = ".boebot.timing"
 MOST = 0xFFFFFFFF  # of any number in a row

@@ -15,11 +15,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.arguments import duration
-from boebot.timing.budget import Report
-from boebot.timing.costs import SLOT_BEGINS
-from boebot.timing.measured import Moment
-from boebot.timing.realisable import TICK_S, Event, Verdict
+from boebot.running.driver import TICK_S
 from boebot.view import style
+from boebot_timing.budget import Report
+from boebot_timing.costs import SLOT_BEGINS
+from boebot_timing.measured import Moment
+from boebot_timing.realisable import Event, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from boebot.timing.distributions import Distribution
+    from boebot_timing.distributions import Distribution
 
 NAME = "jitter"
 COLUMNS = 3

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from avr_timing.image.elf import read_image
-from boebot.timing.measured import Measurement, Moment, Spans, Worst
-from boebot.timing.table import read_table
+from boebot.image.elf import read_image
+from boebot_timing.emulated.loads import TICK_CYCLES
+from boebot_timing.measured import Measurement, Moment, Spans, Worst
+from boebot_timing.table import read_table
 from sim_bridge.boards.avr import FUNCTION_IDS, Watch
-from sim_bridge.timing.loads import TICK_CYCLES
 
 SLOT_VECTOR = 12  # TIMER1_COMPB: begins each slot (hal_avr.h)
 SLOTS_PER_TICK = 4

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim_bridge.timing.line import BYTE_CYCLES
-from sim_bridge.timing.loads import SERVO_FRAME_CYCLES, SLOT_CYCLES, TICK_CYCLES
+from boebot_timing.emulated.line import BYTE_CYCLES
+from boebot_timing.emulated.loads import SERVO_FRAME_CYCLES, SLOT_CYCLES, TICK_CYCLES
 
 
 class Limits(NamedTuple):

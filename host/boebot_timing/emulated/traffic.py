@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from boebot.link import messages
-from sim_bridge.timing.line import Line
-from sim_bridge.timing.loads import Bench
+from boebot_timing.emulated.line import Line
+from boebot_timing.emulated.loads import Bench
 
 SETPOINT_PERIOD = 159_001  # cycles: a prime below the tick, so at least one each tick, at each of its phases
 PROBE_PERIOD = 311_009  # cycles; shares no factor with the tick

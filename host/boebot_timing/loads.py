@@ -16,7 +16,7 @@ from avr_timing.interrupts.response import Source, Spell
 from boebot.errors import BoebotError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.timing.table import Constants, InterruptRow
+from boebot_timing.table import Constants, InterruptRow
 
 TICK = 160_000  # cycles, at 16 MHz
 BYTE = 320  # cycles of a byte at 500,000 bit/s

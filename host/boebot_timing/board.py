@@ -30,9 +30,9 @@ def maxima(
         TimingError: the board runs another image.
         AnalysisError: the image cannot be read.
     """
-    from avr_timing.image.elf import read_image
     from boebot.boards import BoardRequest
     from boebot.cli.board_link import board_link
+    from boebot.image.elf import read_image
     from boebot.link import task_times
 
     code = read_image(image).code

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from sim_bridge.timing.loads import TICK_CYCLES, Bench
+from boebot_timing.emulated.loads import TICK_CYCLES, Bench
 
 BYTE_CYCLES = 320  # 10 bits at 500,000 baud
 HOST_NONCE = 0x0A5A5A

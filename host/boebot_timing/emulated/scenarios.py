@@ -23,9 +23,9 @@ from boebot.devices.encoder import QuadratureEncoder, SingleEncoder
 from boebot.devices.ping import PingSensor
 from boebot.devices.whisker import WhiskerSwitch
 from boebot.link import frame, messages
-from sim_bridge.timing.line import BYTE_CYCLES, Line
-from sim_bridge.timing.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels, with_noise
-from sim_bridge.timing.traffic import EachTick, FullLine
+from boebot_timing.emulated.line import BYTE_CYCLES, Line
+from boebot_timing.emulated.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels, with_noise
+from boebot_timing.emulated.traffic import EachTick, FullLine
 
 EDGES_PER_S = {"figures": 1500, "overload": 4000, "faults": 1500, "everything": 1500}
 BURSTS = ((10, 120, 101_009), (110, 300, 397_001))  # edges, cycles apart and to the next burst: too close; too many

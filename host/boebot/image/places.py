@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 
-from avr_timing.image.elf import Image
+from boebot.image.elf import Image
 
 
 def place(image: Image, address: int) -> str:

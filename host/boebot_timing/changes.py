@@ -16,9 +16,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from avr_timing.interrupts.response import Schedule, Source, response
-from boebot.timing.costs import Costs
-from boebot.timing.firmware import Firmware
-from boebot.timing.loads import ENCODERS, Load
+from boebot_timing.costs import Costs
+from boebot_timing.firmware import Firmware
+from boebot_timing.loads import ENCODERS, Load
 
 
 def of_image(firmware: Firmware, found: Costs, schedule: Schedule, asked: Load) -> int | None:

@@ -11,13 +11,13 @@ from rich.table import Table
 from rich.text import Text
 
 from boebot.cli import output
-from boebot.timing.budget import FOR_EVER
+from boebot_timing.budget import FOR_EVER
 
 if TYPE_CHECKING:
-    from boebot.timing.budget import Report, Row
-    from boebot.timing.distributions import Distribution, JitterReport
-    from boebot.timing.realisable import Verdict
-    from boebot.timing.worst_path import WorstPath
+    from boebot_timing.budget import Report, Row
+    from boebot_timing.distributions import Distribution, JitterReport
+    from boebot_timing.realisable import Verdict
+    from boebot_timing.worst_path import WorstPath
 
 _UNKNOWN = "–"
 _BROKEN, _FINE, _ASIDE = "bold red", "green", "dim"
@@ -147,7 +147,7 @@ def show_verdict(verdict: Verdict) -> None:
 
 def show_jitter(report: JitterReport) -> None:
     """A table of distributions for each load; what broke its limit, and what was lost."""
-    from boebot.timing.distributions import rows
+    from boebot_timing.distributions import rows
 
     console = output.console()
     for load in dict.fromkeys(one.load for one in report.distributions):

@@ -1,1 +1,0 @@
-"""What a firmware image says: its ELF file, symbols, source lines and instructions."""
