@@ -6,7 +6,7 @@
     boebot.ports      a scheme of URLs               Callable[[str], Transport], given the whole URL
     boebot.commands   a sub-command                  Command
     boebot.lists      a list of `boebot list`        Callable[[], list[dict[str, Any]]]: rows with a name and a title
-    boebot.formats    a format of `boebot report`    Callable[[Mapping[int, RunResult], Path], list[Path]]: it writes
+    boebot.formats    a format of `boebot report`    Callable[[Mapping[int, Run], Path], list[Path]]: it writes
                                                      robots, by their numbers, into a folder
     boebot.records    a foreign record, by suffix    boebot.guests.ReadRecord
     boebot.checks     what cannot be in time         boebot.running.tasks.Check
@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 if TYPE_CHECKING:
-    from boebot.result import RunResult
+    from boebot.result import Run
 
 PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS = (
     f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records", "checks")
@@ -46,7 +46,7 @@ class Command(NamedTuple):
 class ReadRecord(Protocol):
     """Reads a record that others have made, as far as a run shows in it."""
 
-    def __call__(self, path: Path, robot: str | None, node: str | None, seed: int) -> RunResult:
+    def __call__(self, path: Path, robot: str | None, node: str | None, seed: int) -> Run:
         """The run of one board: of that kind (None: as it says itself), of that name there (None: the only one), with
         that seed of the brain's chance.
 
