@@ -23,10 +23,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
-
-if TYPE_CHECKING:
-    from boebot.result import Run
+from typing import Any, NamedTuple, Protocol
 
 PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS = (
     f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records", "checks")
@@ -46,8 +43,8 @@ class Command(NamedTuple):
 class ReadRecord(Protocol):
     """Reads a record that others have made, as far as a run shows in it."""
 
-    def __call__(self, path: Path, robot: str | None, node: str | None, seed: int) -> Run:
-        """The run of one board: of that kind (None: as it says itself), of that name there (None: the only one), with
+    def __call__(self, path: Path, robot: str | None, node: str | None, seed: int) -> Any:
+        """The run of one board (a `boebot.record.run.Run`): of that kind (None: as it says itself), of that name there (None: the only one), with
         that seed of the brain's chance.
 
         Raises:
