@@ -10,8 +10,8 @@ else it makes what follows from the protocol and the robots' files (protocol/gen
   else works without it.
 * `sim_bridge/images/firmware-<pin map>.so`: the firmware's own C, one library per pin map.
 
-A wheel also carries the robots and the AVR images. BOEBOT_SANITIZE=1 builds all C with the
-address and undefined-behaviour sanitizers.
+A wheel also carries the robots and the AVR images. BOEBOT_SANITIZE=1, for the makers' tests, builds all C with the
+address and undefined-behaviour sanitizers, and every warning about ours is an error.
 """
 
 from __future__ import annotations
@@ -70,6 +70,7 @@ SANITIZERS = [
     "-O1",
     "-g1",
 ]
+WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror".split()
 SANITIZE = SANITIZERS if os.environ.get("BOEBOT_SANITIZE") == "1" else []
 
 
@@ -111,6 +112,8 @@ class BuildExt(build_ext):
             changed = max(newest_header, Path(source).stat().st_mtime)
             if all(Path(name).exists() and Path(name).stat().st_mtime > changed for name in objects):
                 return objects
+            if SANITIZE and not source.startswith(self.build_temp):  # what cffi makes lies there
+                options = {**options, "extra_postargs": [*(options.get("extra_postargs") or []), *WARNINGS]}
             return compile_some([source], output_dir=output_dir, **options)
 
         def compile_all(sources: list[str], output_dir: str, **options: Any) -> list[str]:

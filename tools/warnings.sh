@@ -1,6 +1,7 @@
 #!/bin/sh
-# Compiles the C parts for this computer with gcc and with clang, every warning an error. The microcontroller's build
-# has the same warnings in platformio.ini. The frame code is standard C11, for any computer and for the microcontroller.
+# Reads the C parts for this computer with clang, every warning an error. gcc has the same warnings where `make test`
+# builds with sanitizers (setup.py), and for the microcontroller (platformio.ini). The frame code is standard C11, for any
+# computer and for the microcontroller.
 set -eu
 cd "$(dirname "$0")/.."
 warnings="-std=gnu11 -O2 -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
@@ -8,16 +9,14 @@ simavr=$(find build/simavr -name sim_avr.h -exec dirname {} \; 2>/dev/null | sed
 lists=$(mktemp -d)
 trap 'rm -rf "$lists"' EXIT
 
-# compile LIST FLAGS...: compiles the files in the list. clang gives its warnings before it makes code, gcc some of them
-# while it does.
-compile() {
+# read_with_clang LIST FLAGS...: the files in the list.
+read_with_clang() {
   list=$lists/$1
   shift
-  xargs -r -P "$(nproc)" -n 1 gcc $warnings "$@" -c -o /dev/null <"$list"
   xargs -r -P "$(nproc)" -n 20 clang $warnings "$@" -fsyntax-only <"$list"
 }
 
-# Most files of the firmware are the same for all pin maps: a file is compiled once for each text that the preprocessor
+# Most files of the firmware are the same for all pin maps: a file is read once for each text that the preprocessor
 # makes of it.
 touch "$lists/texts"
 for pin_map in $(grep -o 'PIN_MAP_[A-Z0-9_]*' platformio.ini | sort -u); do
@@ -27,16 +26,16 @@ for pin_map in $(grep -o 'PIN_MAP_[A-Z0-9_]*' platformio.ini | sort -u); do
     grep -qxF "$text" "$lists/texts" || echo "$source" >>"$lists/$pin_map"
     echo "$text" >>"$lists/texts"
   done
-  compile $pin_map -D$pin_map -Ifirmware/src
+  read_with_clang $pin_map -D$pin_map -Ifirmware/src
 done
 
 find host -name '*.c' -not -name '_*.c' >"$lists/host"
-compile host -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
+read_with_clang host -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
 find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' >"$lists/simulator"
-compile simulator -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
+read_with_clang simulator -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
 if [ -n "$simavr" ]; then
   find sim_bridge -name '*.c' -not -name '_*.c' -path '*/avr/*' >"$lists/avr"
-  compile avr -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -isystem "$simavr/sim" -isystem "$simavr/cores"
+  read_with_clang avr -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -isystem "$simavr/sim" -isystem "$simavr/cores"
 fi
 
 for end in BOARD HOST; do

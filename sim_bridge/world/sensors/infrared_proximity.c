@@ -25,22 +25,22 @@ static double reading_of(double c1, double c2, double distance, double inward) {
 }
 
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise) {
-  const beam *beam = &self->beam;
+  const beam *rays = &self->beam;
   double sum = 0.0;
   if (self->reflectance) { /* each surface reflects in its own way */
-    const beam_origin at = beam_from(beam, from);
-    for (int i = 0; i < beam->rays; i++) {
+    const beam_origin at = beam_from(rays, from);
+    for (int i = 0; i < rays->rays; i++) {
       ray_hit hit = {.infrared = 0.0};
-      const double distance = beam_ray(beam, from, at, i, self->range, &hit);
-      sum += reading_of(self->c1 * hit.infrared, self->c2, distance, beam->inward[i]);
+      const double distance = beam_ray(rays, from, at, i, self->range, &hit);
+      sum += reading_of(self->c1 * hit.infrared, self->c2, distance, rays->inward[i]);
     }
   } else {
     double distances[BEAM_RAYS];
-    beam_rays(beam, from, self->range, distances);
-    for (int i = 0; i < beam->rays; i++) sum += reading_of(self->c1, self->c2, distances[i], beam->inward[i]);
+    beam_rays(rays, from, self->range, distances);
+    for (int i = 0; i < rays->rays; i++) sum += reading_of(self->c1, self->c2, distances[i], rays->inward[i]);
   }
   const double draw = self->sigma > 0.0 ? noise_next_normal(noise) : 0.0;
-  const double exact = sum / (double)beam->rays;           /* (3.12) */
+  const double exact = sum / (double)rays->rays;           /* (3.12) */
   const double noisy = exact * (1.0 + self->sigma * draw); /* (3.1) */
   const double least = noisy > 0.0 ? noisy : 0.0;
   return least < 1.0 ? least : 1.0;
