@@ -112,7 +112,7 @@ pictures:
 	@$(VENV)/bin/boebot dbc build/pictures/boebot.dbc
 	@$(VENV)/bin/cantools plot build/pictures/boebot.dbc telemetry_5.ping_echo --ignore-unknown-frames -o docs/images/can-plot.png <build/pictures/can/can.log
 	@$(PYTHON_VENV) -m tools.live_pictures
-	@$(PYTHON_VENV) -m tools.experiment_pages
+	@$(PYTHON_VENV) -m boebot_course.pages
 	@$(MAKE) --no-print-directory timing
 
 timing:

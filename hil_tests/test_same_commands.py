@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import boebot
-from boebot.experiments.same_commands import BRAINS, along_walls, disagreements, judge_walls
 from boebot.record.compare import command_difference, telemetry_difference
+from boebot_course.experiments.same_commands import BRAINS, along_walls, disagreements, judge_walls
 
 pytestmark = pytest.mark.emulated
 

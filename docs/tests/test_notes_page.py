@@ -14,7 +14,7 @@ import pytest
 from boebot.arenas import arena_names
 from boebot.brains import bundled
 from boebot.description.robots import robot_names
-from boebot.experiments import all_experiments
+from boebot_course.experiments import all_experiments
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "reference" / "notes.md").read_text(encoding="utf-8")

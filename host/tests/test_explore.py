@@ -17,14 +17,14 @@ from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, 
 from boebot.brains import rounds
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
-from boebot.experiments import exploring
-from boebot.experiments.exploring import explored, explorer, starts
 from boebot.navigation import Coverage, Explore, GoTo, LineMap, Localization, Scan, TurretScan
 from boebot.navigation.corridor import is_clear
 from boebot.navigation.explore import State
 from boebot.navigation.frames import Pose
 from boebot.navigation.scan_error import heard
-from tools.navigation_figures.tasks import errand
+from boebot_course.experiments import exploring
+from boebot_course.experiments.exploring import explored, explorer, starts
+from boebot_course.tests.navigation_figures.tasks import errand
 
 HALF_TURN = (-math.pi / 2, math.pi / 2)
 

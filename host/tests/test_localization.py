@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boebot.experiments import patrol
-from boebot.experiments.patrol import patrolled
-from boebot.experiments.trials import trial_seeds
 from boebot.navigation import Estimator, Lattice, LineMap, ParticleFilter, RandomSearch, Scan, estimators
 from boebot.navigation.frames import Pose, composed, inverse, placed
 from boebot.navigation.match import Match
+from boebot_course.experiments import patrol
+from boebot_course.experiments.patrol import patrolled
+from boebot_course.trials import trial_seeds
 
 HALF_TURN = (-math.pi / 2, math.pi / 2)
 REACH, RAYS = 4.0, 120

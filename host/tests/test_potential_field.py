@@ -11,9 +11,9 @@ import boebot
 from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
-from boebot.experiments.potential_fields import WEDGE
 from boebot.navigation import FollowField, Lattice, LineMap, LockDetector, Potential, PotentialField
 from boebot.navigation.potential_field import check_goal, of_walls, waypoints
+from boebot_course.experiments.potential_fields import WEDGE
 
 GOAL = Potential(-1.3, 1.3, -1.0, 3.0, 3.0)
 

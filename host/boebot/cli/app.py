@@ -32,9 +32,6 @@ COMMANDS = {
         "Show a robot: a picture from above with its wiring, its measures, and a table of its wires.",
         "boebot.cli.robot:robot",
     ),
-    "experiment": Command(
-        "Run experiments of the notes: figures, measured against expected.", "boebot.cli.experiment:experiment"
-    ),
     "serve": Command("Offer the emulated robot to other programs, until Ctrl-C.", "boebot.cli.serve:serve"),
     "bridge": Command("Put a board on a CAN bus: every message both ways, until Ctrl-C.", "boebot.cli.bridge:bridge"),
     "dbc": Command("Write the CAN database of a robot's messages, for CAN tools; or check one.", "boebot.cli.dbc:dbc"),

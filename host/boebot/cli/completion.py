@@ -13,48 +13,42 @@ def robots(incomplete: str) -> list[str]:
     """Bundled robots, and TOML files."""
     from boebot.description.robots import robot_names
 
-    return [*_beginning(incomplete, robot_names()), *_files(incomplete, ".toml")]
+    return [*beginning(incomplete, robot_names()), *_files(incomplete, ".toml")]
 
 
 def arenas(incomplete: str) -> list[str]:
     """Bundled arenas, and TOML files."""
     from boebot.arenas import arena_names
 
-    return [*_beginning(incomplete, arena_names()), *_files(incomplete, ".toml")]
+    return [*beginning(incomplete, arena_names()), *_files(incomplete, ".toml")]
 
 
 def brains(incomplete: str) -> list[str]:
     """Bundled brains, and files that may hold one."""
     from boebot.brains import bundled
 
-    return [*_beginning(incomplete, bundled()), *_files(incomplete, ".py", ".toml")]
-
-
-def experiments(incomplete: str) -> list[str]:
-    """Experiments of the notes."""
-    from boebot.experiments import all_experiments
-
-    return _beginning(incomplete, all_experiments())
+    return [*beginning(incomplete, bundled()), *_files(incomplete, ".py", ".toml")]
 
 
 def boards(incomplete: str) -> list[str]:
     """What robots with boards run on."""
-    return [*_beginning(incomplete, ("native", "avr", "direct")), *_files(incomplete)]
+    return [*beginning(incomplete, ("native", "avr", "direct")), *_files(incomplete)]
 
 
 def imperfections(incomplete: str) -> list[str]:
     """Names of imperfections, for a value to follow."""
     from boebot import imperfections as table
 
-    return [f"{name}=" for name in _beginning(incomplete, table.imperfections())]
+    return [f"{name}=" for name in beginning(incomplete, table.imperfections())]
 
 
 def one_of(*names: str) -> Complete:
     """These names."""
-    return lambda incomplete: _beginning(incomplete, names)
+    return lambda incomplete: beginning(incomplete, names)
 
 
-def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+def beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+    """Those of these names."""
     return [name for name in names if name.startswith(incomplete)]
 
 

@@ -1,5 +1,5 @@
 """`boebot list WHAT`: what there is, with a line for each: robots, arenas, brains, behaviors,
-experiments, imperfections, and switches that take them away.
+imperfections, switches that take them away, and what guests add (boebot.guests).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from boebot.guests import LISTS, guests
 from boebot.imperfections import imperfections, switches
 
 Row = dict[str, Any]
-KINDS = ("robots", "arenas", "brains", "behaviors", "experiments", "imperfections", "switches", *guests(LISTS))
+KINDS = ("robots", "arenas", "brains", "behaviors", "imperfections", "switches", *guests(LISTS))
 
 
 def list_names(
@@ -100,14 +100,6 @@ def _behaviors() -> list[Row]:
     return [{"name": kind.__name__, "title": (inspect.getdoc(kind) or "").partition("\n")[0]} for kind in found]
 
 
-def _experiments() -> list[Row]:
-    # here, as it takes a while: no other list should wait for it
-    from boebot.experiments import all_experiments
-
-    fields = ("name", "slow", "title", "robot", "section", "source")
-    return [{field: getattr(one, field) for field in fields} for one in all_experiments().values()]
-
-
 def _imperfections() -> list[Row]:
     return [
         {"name": row.name, "value": row.value, "unit": row.unit, "title": row.what, "drawn": row.drawn}
@@ -134,7 +126,6 @@ _ROWS: dict[str, Callable[[], list[Row]]] = {
     "arenas": _arenas,
     "brains": _brains,
     "behaviors": _behaviors,
-    "experiments": _experiments,
     "imperfections": _imperfections,
     "switches": _switches,
 }

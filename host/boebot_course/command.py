@@ -1,0 +1,173 @@
+"""`boebot experiment NAME`: runs experiments of the notes; prints what was measured against what was expected."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from boebot import resources
+from boebot.cli import completion, options, output
+from boebot.errors import BoebotError
+
+if TYPE_CHECKING:
+    from boebot_course.experiments import Experiment
+    from boebot_course.running import Verdict
+
+FOLDER = Path("experiments")
+_HELP = """Run experiments of the notes: figures, measured against expected.
+
+  boebot list experiments         what there is
+
+  boebot experiment E29 E59       two of them
+
+  boebot experiment "E22*"        E22 and all its variants
+
+  boebot experiment --all         all of them, beside each other
+
+Each leaves NAME.png and NAME.svg, its figure; NAME.csv, the data; NAME.json, the verdict. Several leave index.html too,
+a page of all of them. The exit code is 1 when one is outside its criterion."""
+
+
+def listed() -> list[dict[str, Any]]:
+    """Rows of `boebot list experiments`."""
+    from boebot_course.experiments import all_experiments
+
+    fields = ("name", "slow", "title", "robot", "section", "source")
+    return [{field: getattr(one, field) for field in fields} for one in all_experiments().values()]
+
+
+def _complete(incomplete: str) -> list[str]:
+    from boebot_course.experiments import all_experiments
+
+    return completion.beginning(incomplete, all_experiments())
+
+
+def experiment(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="NAME",
+            autocompletion=_complete,
+            help="Of an experiment, or a pattern with * and ?.",
+            show_default=False,
+        ),
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Run all of them.")] = False,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of all that is left to chance.")] = 1,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where to write the files.")] = FOLDER,
+    jobs: Annotated[
+        int | None,
+        typer.Option("--jobs", metavar="N", min=1, help="Processes beside each other. Else one for each processor."),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """See `_HELP`."""
+    # here, as it takes a while: no other sub-command should wait for it
+    from boebot_course.experiments import all_experiments
+
+    known = all_experiments()
+    if every == bool(names):
+        raise _usage("give either NAME or --all")
+    chosen = list(known.values()) if every else _chosen(names or [], known)
+    _run(chosen, seed, out, jobs or os.cpu_count() or 1, json)
+
+
+experiment.__doc__ = _HELP
+
+
+def _usage(sentence: str) -> Exception:
+    from click import UsageError
+
+    return UsageError(sentence)
+
+
+def _chosen(wanted: Sequence[str], known: Mapping[str, Experiment]) -> list[Experiment]:
+    """Those that are meant, each once, in the order of all."""
+    names: set[str] = set()
+    for text in wanted:
+        found = {name for name in known if fnmatchcase(name.lower(), text.lower())}
+        if not found:
+            lower = {name.lower(): name for name in known}
+            near = [lower[name] for name in get_close_matches(text.lower(), lower, n=3, cutoff=0.5)]
+            hint = f"did you mean {' or '.join(near)}?" if near else "`boebot list experiments` names all"
+            raise _usage(f"there is no experiment {text!r}; {hint}")
+        names |= found
+    return [known[name] for name in known if name in names]
+
+
+def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_json: bool) -> None:
+    """Runs them, writes their files as they come, and prints what came of each.
+
+    Raises:
+        BoebotError: some are outside their criteria, or the files cannot be written.
+    """
+    from boebot import view
+    from boebot_course import index_page, output_files, running
+
+    view.make_folder(out)
+    by_name: dict[str, Verdict] = {}
+    files: list[Path] = []
+    with (
+        output.share_bars([one.name for one in experiments]) as watch,
+        closing(running.run(experiments, seed, jobs, watch, output_files.files)) as coming,
+    ):
+        for verdict in coming:
+            by_name[verdict.name] = verdict
+            files += output_files.write(out, verdict.files)
+            watch({verdict.name: 1.0})
+    verdicts = [by_name[one.name] for one in experiments]
+    if len(verdicts) > 1:
+        index = index_page.page(experiments, verdicts, seed)
+        files = output_files.write(out, {index_page.NAME: index}) + sorted(files)
+    if as_json:
+        found = [
+            output_files.record(one, verdict.measured, verdict.error)
+            for one, verdict in zip(experiments, verdicts, strict=True)
+        ]
+        version = resources.version()
+        output.print_json({"seed": seed, "version": version, "experiments": found, "files": list(map(str, files))})
+    else:
+        _print(experiments, verdicts)
+        if files:
+            few = len(verdicts) == 1
+            names = ", ".join(path.name for path in files)
+            output.line(f"files in {out}: {names}" if few else f"all figures: {files[0]}")
+    outside = [verdict.name for verdict in verdicts if not verdict.is_met]
+    if outside:
+        which = f"{len(outside)} of {len(verdicts)} experiments are" if len(verdicts) > 1 else "the experiment is"
+        raise BoebotError(f"{which} outside the criterion: {', '.join(outside)}")
+
+
+def _print(experiments: Sequence[Experiment], verdicts: Sequence[Verdict]) -> None:
+    """A table for each."""
+    from rich.text import Text
+
+    console = output.console()
+    colours = {"met": "green", "missed": "bold red", "failed": "bold red"}
+    for one, verdict in zip(experiments, verdicts, strict=True):
+        console.print(
+            Text.assemble((one.name, "bold"), f"  {one.title}  ", (verdict.word, colours[verdict.word])),
+            Text(f"{one.source}; robot: {one.robot}", style="dim"),
+            sep="\n",
+        )
+        if verdict.error:
+            console.print(Text(verdict.error))
+        else:
+            rows = output.empty_table()
+            for title in ("figure", "measured", "expected", "unit", ""):
+                rows.add_column(title, justify="right" if title == "measured" else "left", overflow="fold")
+            for figure in verdict.measured:
+                word = "met" if figure.is_met else "missed"
+                rows.add_row(
+                    *map(Text, (figure.name, figure.text, figure.expected, figure.unit)), Text(word, colours[word])
+                )
+            console.print(rows)
+        console.print(Text(f"Criterion: {one.criterion}", style="dim"))
+        console.print()

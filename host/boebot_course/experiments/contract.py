@@ -1,0 +1,238 @@
+"""What a brain may see, and that it sees no more: section 3.2.3 of the notes, E66.
+
+Two checks. *Static*: no module that brains are made of imports the simulator, or what opens boards and knows the truth
+of a run. *At run time*: from the robot that a brain is handed no chain of attributes, private ones included, of
+properties, containers, bound methods, closures and defaults leads to anything but sensor values, the robot's lengths
+and the brain's own commands and chance. The walk follows what Python's garbage collector says that an object refers to,
+so that nothing is too private for it, and knows by name the few kinds of objects that may be met.
+
+What nobody can guarantee in Python: a brain that imports the simulator itself, walks the interpreter's frames or lists
+all objects of the process finds the world. Its source then shows it, and it finds nothing on a robot.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import gc
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+import boebot
+from boebot_course.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from boebot.robot import Robot
+
+ROOMS = ("boebot.brain", "boebot.behaviors", "boebot.cognition", "boebot.navigation", "boebot.brains")
+"""Packages that brains are made of."""
+FORBIDDEN = (
+    "sim_bridge",
+    "boebot.boards",
+    "boebot_course",
+    "boebot.record",
+    "boebot.running",
+    "boebot.view",
+    "boebot.link.link",
+    "boebot.link.session",
+    "boebot.link.transport",
+    "boebot.link.telemetry",
+    "serial",
+)
+"""Modules of the world, of what opens it, and of what holds a run's truth."""
+ARENAS = "boebot.arenas"
+MAPS = "boebot.navigation.line_map"
+"""The one module of these rooms that imports arenas: it makes a map of the one that a brain's author names."""
+ALLOWED = (
+    "builtins",
+    "random",
+    "types",
+    "functools",
+    "boebot.robot",
+    "boebot.showing",
+    "boebot.description.equipment",
+    "boebot.devices.readings",
+    "boebot.devices",
+    "boebot.link.messages",
+)
+"""Where the classes come from whose objects a brain may meet: readings, lengths, commands, chance, what it shows."""
+LIMIT = 200_000  # objects
+
+
+def is_within(module: str, names: tuple[str, ...]) -> bool:
+    """One of these modules, or within one."""
+    return any(module == name or module.startswith(f"{name}.") for name in names)
+
+
+# ---- static ----------------------------------------------------------------------------------------------------------
+
+
+def imported(source: str) -> Iterator[str]:
+    """Full names of what a module imports when it is run: not what only type checkers see."""
+    waiting: list[ast.AST] = [ast.parse(source)]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            waiting += node.orelse
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        waiting += ast.iter_child_nodes(node)
+
+
+def imports() -> dict[str, set[str]]:
+    """What each module of these rooms imports."""
+    home = Path(boebot.__file__).parent.parent
+    found = {}
+    for room in ROOMS:
+        for path in sorted((home / room.replace(".", "/")).glob("*.py")):
+            module = f"{room}.{path.stem}".removesuffix(".__init__")
+            found[module] = set(imported(path.read_text(encoding="utf-8")))
+    return found
+
+
+def forbidden(found: Mapping[str, set[str]]) -> list[tuple[str, str]]:
+    """Modules that import what they may not, and what that is."""
+    return [
+        (module, name)
+        for module, names in found.items()
+        for name in names
+        if is_within(name, FORBIDDEN) or (is_within(name, (ARENAS,)) and module != MAPS)
+    ]
+
+
+# ---- at run time -----------------------------------------------------------------------------------------------------
+
+
+class Met(NamedTuple):
+    """An object that can be reached."""
+
+    way: str
+    """how, from where the walk began"""
+    kind: str
+    """the full name of its class"""
+
+    @property
+    def is_foreign(self) -> bool:
+        """No brain should meet it."""
+        return not is_within(self.kind, ALLOWED)
+
+
+def walk(start: object) -> list[Met]:
+    """All that an object leads to, to the first foreign one on each way; modules and classes do not count: any brain
+    can import them."""
+    seen: dict[int, object] = {}  # kept, so that no other object gets its id
+    met = []
+    waiting: list[tuple[str, object]] = [("robot", start)]
+    while waiting:
+        way, thing = waiting.pop()
+        if id(thing) in seen or isinstance(thing, type | ModuleType):
+            continue
+        seen[id(thing)] = thing
+        if len(seen) > LIMIT:
+            raise RuntimeError("the walk does not end")
+        kind = type(thing)
+        met.append(Met(way, f"{kind.__module__}.{kind.__qualname__}"))
+        if not met[-1].is_foreign:
+            waiting += [(f"{way}.{name}", one) for name, one in _parts(thing)]
+    return met
+
+
+def _parts(thing: object) -> Iterator[tuple[str, object]]:
+    if isinstance(thing, FunctionType):  # its globals are its module
+        for name, cell in zip(thing.__code__.co_freevars, thing.__closure__ or (), strict=True):
+            yield f"closure {name}", cell.cell_contents
+        yield "defaults", (thing.__defaults__, thing.__kwdefaults__, vars(thing))
+        return
+    if isinstance(thing, BuiltinFunctionType | MethodType):
+        yield "__self__", thing.__self__
+        yield "__func__", getattr(thing, "__func__", None)
+        return
+    for index, one in enumerate(gc.get_referents(thing)):
+        yield f"referent {index}", one
+    for name in dir(type(thing)):  # properties give what is made only when it is asked for
+        if isinstance(getattr(type(thing), name, None), property | functools.cached_property):
+            try:
+                yield name, getattr(thing, name)
+            except boebot.BoebotError:  # a device that the robot lacks
+                continue
+
+
+class Walker:
+    """A brain that drives, and once takes stock of all that it can reach.
+
+    Attributes:
+        met: what that is.
+    """
+
+    def __init__(self, at: float) -> None:
+        """`at`: when (s)."""
+        self.at = at
+        self.met: list[Met] = []
+
+    def step(self, robot: Robot) -> None:
+        """Looks once."""
+        robot.drive(0.3, 0.3)
+        if not self.met and robot.time >= self.at:
+            self.met = walk(robot)
+
+
+RUNS = (("shieldbot", "native"), ("arsim", "direct"))
+
+
+@experiment(
+    "E66",
+    title="No truth can be reached from a brain",
+    source="section 1.2.4, Fig. 1.18; section 3.2.3",
+    caption="Objects that a brain can reach from the robot that it is handed, by the module of their class.",
+    robot="shieldbot (native), arsim",
+    criterion="None. The walk must find devices and readings, on arsim of infra-red, odometer and "
+    "compass, on shieldbot of more, or it has not looked.",
+)
+def no_truth(seed: int, progress: Progress) -> Outcome:
+    found = imports()
+    guilty = len(forbidden(found))
+    measured = [
+        Measured("modules that brains are made of", len(found), least=len(ROOMS)),
+        exactly("imports of the simulator or of what knows the truth", guilty, 0),
+    ]
+    counts: dict[str, Counter[str]] = {}
+    for robot, on in with_progress(RUNS, progress):
+        walker = Walker(0.5)
+        boebot.run(walker, robot=robot, on=on, seconds=1, seed=seed)
+        counts[robot] = Counter(one.kind.rpartition(".")[0] for one in walker.met)
+        devices = {one.kind for one in walker.met if is_within(one.kind, ("boebot.devices", "boebot.devices.readings"))}
+        measured += [
+            # kinds: of objects themselves there are some more where the interpreter has run other things before
+            Measured(f"{robot}: kinds of objects that can be reached", len({one.kind for one in walker.met}), least=10),
+            Measured(f"{robot}: kinds of devices and readings among them", len(devices), least=3),
+            exactly(
+                f"{robot}: objects of the simulator, or that no brain should meet",
+                sum(one.is_foreign for one in walker.met),
+                0,
+            ),
+        ]
+    modules = sorted(set().union(*counts.values()))
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        places = np.arange(len(modules))
+        for number, (robot, of_module) in enumerate(counts.items()):
+            axes.barh(places + 0.4 * number, [of_module[module] for module in modules], 0.4, label=robot)
+        axes.set_xscale("log")
+        axes.set(xlabel="objects", yticks=places + 0.2, yticklabels=modules)
+        axes.tick_params(axis="y", labelsize="small")
+        axes.legend()
+
+    data = {"module": modules} | {robot: [of[module] for module in modules] for robot, of in counts.items()}
+    return Outcome(measured, data, draw)

@@ -1,0 +1,141 @@
+"""Following the walls of a room: named in chapter 5 of the notes, Fig. 5.1; the law is the kit's own. E35."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boebot import run
+from boebot.behaviors import FollowWall
+from boebot.brain import Brain
+from boebot.description.robots import RobotDescription
+from boebot_course.experiment import Measured, Outcome, Progress, experiment
+from boebot_course.paths import floor
+from boebot_course.variants import SMALL_SPEED, arena_file, small_arsim, varied
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from boebot.result import RunResult
+
+LENGTH, WIDTH = 3.0, 2.0  # of the room (m)
+ROOM = f"""
+[[outline]]
+corners_m = [[0, 0], [{LENGTH}, 0], [{LENGTH}, {WIDTH}], [0, {WIDTH}]]
+"""
+SECONDS = 80.0
+SPEED = 0.12  # v_0 (m/s)
+
+
+def follower() -> Brain:
+    """v_0 = 0.12 m/s, k = 0.5 m/s, S_ref = 0.25, as motor signals."""
+    return Brain([FollowWall(signal=SPEED / SMALL_SPEED, gain=0.5 / SMALL_SPEED, reference=0.25)])
+
+
+def lap(robot: RobotDescription, on: str | None, seed: int, start: float, progress: Progress) -> RunResult:
+    """A run along the walls, which begins `start` metres from one."""
+    with arena_file("room", ROOM) as arena:
+        return run(
+            follower(),
+            robot=robot,
+            arena=arena,
+            on=on,
+            seconds=SECONDS,
+            seed=seed,
+            pose=(0.8 * LENGTH, start, 0.0),
+            progress=lambda seconds: progress(min(seconds / SECONDS, 1.0)),
+        )
+
+
+def outcome(result: RunResult, least: float, most: float) -> Outcome:
+    """What is asked of every robot; distances from its middle to the nearest wall (m)."""
+    truth = result.truth
+    assert truth is not None
+    time, x, y = truth.time - result.clock_offset, truth.x, truth.y
+    distance = np.minimum(np.minimum(x, LENGTH - x), np.minimum(y, WIDTH - y))
+    turns = (np.unwrap(truth.heading) - truth.heading[0]) / (2 * np.pi)
+    measured = [
+        Measured("turns about the room", float(turns[-1]), least=1.0),
+        Measured("least distance from a wall", float(distance.min()), "m", least=least),
+        Measured("greatest distance", float(distance.max()), "m", most=most),
+        Measured("true contacts", float(result.true_contacts or 0), most=0.0),
+    ]
+    shown = slice(None, None, max(1, len(time) // 2000))
+    data = {
+        "time_s": time[shown],
+        "true_x_m": x[shown],
+        "true_y_m": y[shown],
+        "true_heading_rad": truth.heading[shown],
+        "true_distance_from_wall_m": distance[shown],
+    }
+
+    def draw(figure: Figure) -> None:
+        above, beside = figure.subplots(1, 2, width_ratios=(1.5, 1))
+        floor(above, truth.plan)
+        above.plot(x, y, color="#0072b2", linewidth=1.3, label="path of its middle")
+        above.plot(x[0], y[0], "o", color="#009e73", label="start")
+        above.plot(x[-1], y[-1], "s", color="#d55e00", label="end")
+        above.legend(loc="center", fontsize=9, frameon=False)
+        beside.axhspan(least, most, color="#e3e5ea", label="criterion")
+        beside.plot(time, distance, color="#0072b2", linewidth=1.0)
+        beside.set(xlabel="time (s)", ylabel="distance from the nearest wall (m)", ylim=(0, 0.4))
+        beside.legend(loc="lower right", fontsize=9, frameon=False)
+
+    return Outcome(measured, data, draw)
+
+
+@experiment(
+    "E35",
+    title="A lap along the walls",
+    source="chapter 5, Fig. 5.1",
+    caption="Path of a robot that follows the walls of a room of 3 m by 2 m, and its distance from them.",
+    robot="arsim in the size of a Boe-Bot, IR ahead and at -60 degrees",
+    criterion="Once about the room at least in 80 s, at 0.25 m ± 0.05 m from the nearest wall, without a contact.",
+)
+def wall(seed: int, progress: Progress) -> Outcome:
+    return outcome(lap(small_arsim(), None, seed, 0.25, progress), 0.20, 0.30)
+
+
+# ---- on shieldbot: what is expected of it, from its description -----------------------------------------------------
+
+START = 0.30  # m, about the distance that it will keep
+LEAST, MOST = 0.19, 0.345  # m
+DERIVED = (
+    "S_ref = 0.25 is 0.30 m by Ping, whose beam of ±20 degrees about -60 degrees meets the wall at 80 degrees: 0.295 m "
+    "from the middle, and as the notes' row has it 0.05 m more at most. In a corner it comes as near as its IR pairs "
+    "let it: they reach 0.20 m less 3 × 3 % of it, at 0.25 rad to the heading and 0.05 m ahead of the middle, 0.226 m; "
+    "until the wheels answer (0.05 s for a reading, 0.05 s for a step, 0.055 s of lag) its 0.168 m/s take it 0.027 m "
+    "farther: 0.199 m, less 0.01 m for skew. The parameters are those of the notes' row; by the servos' curve its "
+    "motor signal stands for 0.168 m/s instead of 0.12 m/s."
+)
+
+
+def pinger() -> RobotDescription:
+    """shieldbot with its Ping on the turret."""
+    return varied("shieldbot", "shieldbot-turret", turret={"on": True})
+
+
+@experiment(
+    "E35-shieldbot",
+    title="A lap along the walls by Ping and IR pairs",
+    source="chapter 5, Fig. 5.1",
+    caption="Path of shieldbot with the same brain: Ping on its turret looks to the wall, IR pairs look ahead.",
+    robot="shieldbot with its turret (native)",
+    criterion=DERIVED,
+)
+def wall_native(seed: int, progress: Progress) -> Outcome:
+    return outcome(lap(pinger(), "native", seed, START, progress), LEAST, MOST)
+
+
+@experiment(
+    "E35-avr",
+    title="A lap along the walls, with the firmware's AVR image",
+    source="chapter 5, Fig. 5.1",
+    caption="The same on the emulated ATmega328P.",
+    robot="shieldbot with its turret (avr)",
+    criterion=DERIVED,
+    slow=True,
+)
+def wall_avr(seed: int, progress: Progress) -> Outcome:
+    return outcome(lap(pinger(), "avr", seed, START, progress), LEAST, MOST)

@@ -1,0 +1,122 @@
+"""Files of an experiment: its figure as PNG and SVG, its data as CSV (RFC 4180), its verdict as JSON.
+
+The same experiment with the same seed gives the same bytes: no date, no times, no random names.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from boebot import resources
+from boebot.record.run_folder import write_whole
+from boebot.view import style
+from boebot_course.experiment import Experiment, Measured, Outcome
+
+HEIGHT_IN = 4.8  # of a figure, unless what draws it asks for another
+
+
+def stem(name: str) -> str:
+    """An experiment's name as that of a file."""
+    return re.sub(r"[^\w.-]+", "-", name).strip("-.")
+
+
+def files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:
+    """All of them: name -> content.
+
+    Raises:
+        ValueError: the data are no columns of one length.
+    """
+    name = stem(experiment.name)
+    table = as_csv(outcome)  # first: it finds fault sooner than the figure is drawn
+    png, svg = pictures(experiment, outcome, {"png": style.DPI, "svg": style.DPI})
+    verdict = record(experiment, outcome.measured) | {"seed": seed, "version": resources.version()}
+    return {f"{name}.png": png, f"{name}.svg": svg, f"{name}.csv": table, f"{name}.json": as_json(verdict)}
+
+
+def pictures(experiment: Experiment, outcome: Outcome, forms: dict[str, float]) -> list[bytes]:
+    """The figure in those forms, "png" or "svg", with that many dots per inch."""
+    found = []
+    with mpl.rc_context({**style.PLOTS, "svg.hashsalt": experiment.name}):
+        figure = Figure(figsize=(style.WIDTH_IN, HEIGHT_IN), layout="constrained")
+        FigureCanvasAgg(figure)
+        outcome.draw(figure)
+        for form, dpi in forms.items():
+            metadata: dict[str, Any] = {"Title": f"{experiment.name}: {experiment.title}"}
+            metadata |= {"Software": None} if form == "png" else {"Date": None, "Creator": None}
+            target = io.BytesIO()
+            figure.savefig(target, format=form, dpi=dpi, metadata=metadata)
+            found.append(target.getvalue())
+            figure.set_layout_engine("none")  # it is laid out
+    return found
+
+
+def as_csv(outcome: Outcome) -> bytes:
+    """The data; numbers in the fewest digits that are read back as the same, an empty cell for what is not a number."""
+    columns = outcome.columns()
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(zip(*(map(_cell, column.tolist()) for column in columns.values()), strict=True))
+    return text.getvalue().encode()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, bool):
+        return int(value)
+    return "" if value is None or value != value else value
+
+
+def record(experiment: Experiment, measured: Iterable[Measured], error: str = "") -> dict[str, Any]:
+    """What an experiment is and what came of it, for programs; None where a figure is not finite."""
+    figures = [
+        {
+            "name": one.name,
+            "value": _finite(one.value),
+            "unit": one.unit,
+            "least": _finite(one.least),
+            "most": _finite(one.most),
+            "expected": one.expected,
+            "met": one.is_met,
+        }
+        for one in measured
+    ]
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "source": experiment.source,
+        "robot": experiment.robot,
+        "criterion": experiment.criterion,
+        "met": not error and all(one["met"] for one in figures),
+        "error": error or None,
+        "measured": figures,
+    }
+
+
+def as_json(values: dict[str, Any]) -> bytes:
+    """As a file of JSON."""
+    return json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def write(folder: Path, contents: dict[str, bytes]) -> list[Path]:
+    """Writes them; each file is complete or what it was before, whatever comes between.
+
+    Raises:
+        BoebotError: the folder cannot be written to.
+    """
+    return [write_whole(folder / name, partial(Path.write_bytes, data=data)) for name, data in contents.items()]
