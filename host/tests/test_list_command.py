@@ -11,6 +11,7 @@ from boebot.arenas import arena_names
 from boebot.brains import bundled
 from boebot.description.robots import robot_names
 from boebot.errors import did_you_mean
+from boebot.guests import LISTS, guests
 from boebot.imperfections import imperfections, switches
 from command import boebot
 
@@ -19,7 +20,7 @@ def test_every_list_has_all_names_and_a_line_of_each(capsys: pytest.CaptureFixtu
     code, out, err = boebot(capsys, "list", "--json")
     assert (code, err) == (0, "")
     listed = json.loads(out)
-    assert list(listed) == ["robots", "arenas", "brains", "behaviors", "experiments", "imperfections", "switches"]
+    assert list(listed) == ["robots", "arenas", "brains", "behaviors", "imperfections", "switches", *guests(LISTS)]
     names = {kind: [row["name"] for row in rows] for kind, rows in listed.items()}
     assert (names["robots"], names["arenas"], names["brains"]) == (robot_names(), arena_names(), bundled())
     assert names["imperfections"] == list(imperfections()) and names["switches"] == list(switches())
