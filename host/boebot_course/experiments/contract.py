@@ -37,6 +37,7 @@ FORBIDDEN = (
     "sim_bridge",
     "boebot.boards",
     "boebot_course",
+    "boebot_timing",
     "boebot.record",
     "boebot.running",
     "boebot.view",
@@ -58,11 +59,12 @@ ALLOWED = (
     "boebot.robot",
     "boebot.showing",
     "boebot.description.equipment",
-    "boebot.devices.readings",
     "boebot.devices",
     "boebot.link.messages",
 )
 """Where the classes come from whose objects a brain may meet: readings, lengths, commands, chance, what it shows."""
+READ = ("boebot.devices", "boebot.description.equipment")
+"""Of these, what a brain reads: devices and readings."""
 LIMIT = 200_000  # objects
 
 
@@ -211,7 +213,7 @@ def no_truth(seed: int, progress: Progress) -> Outcome:
         walker = Walker(0.5)
         boebot.run(walker, robot=robot, on=on, seconds=1, seed=seed)
         counts[robot] = Counter(one.kind.rpartition(".")[0] for one in walker.met)
-        devices = {one.kind for one in walker.met if is_within(one.kind, ("boebot.devices", "boebot.devices.readings"))}
+        devices = {one.kind for one in walker.met if is_within(one.kind, READ)}
         measured += [
             # kinds: of objects themselves there are some more where the interpreter has run other things before
             Measured(f"{robot}: kinds of objects that can be reached", len({one.kind for one in walker.met}), least=10),
