@@ -283,19 +283,8 @@ class Batch:
         done = (lib.vehicles_steps_done(self.handle, i) for i in range(self.count))
         return np.fromiter(done, dtype=np.uint64, count=self.count)
 
-    def save(self, index: int) -> bytes:
-        """The state of one world; `restore` takes it into any world of the same model and arena, on any machine."""
-        world = self._index(index)
-        return worlds.save(self.handle, world, self.model, self.arenas[world], self.state_bytes)
-
-    def restore(self, index: int, state: bytes) -> None:
-        """Raises SavedStateError: it is of another model, arena, size of memory or format, or damaged."""
-        world = self._index(index)
-        arena = self.arenas[world]
-        worlds.restore(f"batch, world {world}", self.handle, world, self.model, arena, self.state_bytes, state)
-
     def hashes(self) -> NDArray[np.uint64]:
-        """Shape (N,): of all that `save` writes of each world, in the same order; the same on every machine."""
+        """Shape (N,): of all that each world has come to; the same on every machine."""
         return np.array([lib.vehicles_hash(self.handle, i) for i in range(self.count)], dtype=np.uint64)
 
     @property

@@ -63,7 +63,6 @@ class Vehicle:
         worlds.check_arena("vehicle", arena)
         self.model, self.arena = model, arena
         self.seed, self.robot = seed, robot
-        self._state_bytes = state_bytes
         self.handle = worlds.make_worlds("vehicle", model, 1, state_bytes)
         self.place(arena.start if pose is None else pose)
         count = lib.vehicles_reading_count(self.handle)
@@ -218,20 +217,8 @@ class Vehicle:
             pass
         raise _bad_signals(signals)
 
-    def save(self) -> bytes:
-        """The state of the whole world, in mid-run: the same bytes on every machine."""
-        return worlds.save(self.handle, 0, self.model, self.arena, self._state_bytes)
-
-    def restore(self, state: bytes) -> None:
-        """Goes on from a saved state of the same model in the same arena, bit for bit. What is refused changes nothing.
-
-        Raises:
-            SavedStateError: it is of another model, arena, size of a brain's memory or format, or damaged.
-        """
-        worlds.restore("vehicle", self.handle, 0, self.model, self.arena, self._state_bytes, state)
-
     def hash(self) -> int:
-        """Of all that `save` writes, in the same order: equal for runs that are equal bit for bit, on every machine."""
+        """Of all that the world has come to: equal for runs that are equal bit for bit, on every machine."""
         return int(lib.vehicles_hash(self.handle, 0))
 
 

@@ -151,32 +151,6 @@ static void check_world(vehicles *all, size_t i) {
   for (size_t k = 0; k < count; k++) CHECK(isfinite(vehicles_readings(all)[i * count + k]));
 }
 
-/* Saves world `from`, spoils the bytes, restores world `to` from them. */
-static void exchange(vehicles *all, size_t from, size_t to, input *in) {
-  const size_t size = vehicles_snapshot_size(all, from);
-  uint64_t *words = malloc(size);
-  vehicles_save(all, from, words);
-  const uint64_t before = vehicles_hash(all, to);
-  const uint64_t saved = vehicles_hash(all, from);
-  const uint8_t spoilt = byte(in) % 4;
-  for (uint8_t i = 0; i < spoilt; i++) {
-    const double value = number(in);
-    memcpy(&words[byte(in) % (size / 8)], &value, sizeof value);
-  }
-  const size_t given = byte(in) % 8 ? size : size - byte(in);
-  const int status = vehicles_restore(all, to, words, given);
-  if (!placed(all, to) || !placed(all, from)) {
-    CHECK(status != VEHICLE_OK);
-  } else if (status != VEHICLE_OK) {
-    CHECK(spoilt > 0 || given != size);
-    CHECK(vehicles_hash(all, to) == before);
-  } else {
-    CHECK(given == size);
-    CHECK(spoilt > 0 || vehicles_hash(all, to) == saved);
-  }
-  free(words);
-}
-
 static void act(vehicles *all, const arena *where, input *in) {
   const uint8_t action = byte(in);
   const size_t i = action / 8 % WORLDS;
@@ -189,7 +163,7 @@ static void act(vehicles *all, const arena *where, input *in) {
       (void)vehicles_set_speeds(all, i, number(in), number(in));
       break;
     case 2:
-      exchange(all, i, byte(in) % WORLDS, in);
+      (void)vehicles_hash(all, i);
       break;
     case 3:
       (void)vehicles_run(all, i, byte(in) % 4, vehicle_wander, byte(in) % STEPS);

@@ -81,7 +81,7 @@ def test_threads_end_with_close_with_the_block_and_with_the_batch() -> None:
         batch.step(signals)
     with pytest.raises(RobotError, match="batch: it is closed; expected no steps after"):
         batch.run(WANDER, 1)
-    assert np.array_equal(batch.readings, readings) and np.array_equal(batch.steps, steps) and batch.save(3)
+    assert np.array_equal(batch.readings, readings) and np.array_equal(batch.steps, steps) and batch.hashes()[3]
     with batch_of(3) as other:
         other.step(signals, 100)
     assert threads_end(before)

@@ -25,8 +25,7 @@ enum {
   VEHICLE_NOT_FREE = -3,   /* the start is not free space */
   VEHICLE_TOO_MANY = -4,   /* a second drive or battery */
   VEHICLE_NO_MEMORY = -5,
-  VEHICLE_BAD_SNAPSHOT = -6, /* of another size, or with a number that no world comes to */
-  VEHICLE_NOT_PLACED = -7,   /* a world that is not there or without an arena, or a model without a drive */
+  VEHICLE_NOT_PLACED = -6, /* a world that is not there or without an arena, or a model without a drive */
 };
 
 typedef struct vehicle_model vehicle_model;

@@ -20,7 +20,6 @@ from sim_bridge.devices.sensor import SensorKind
 from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.robots.outline import collision_outline
-from sim_bridge.saved import fingerprint_of
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct, values_of
 
 SIDES: Final = ("left", "right")
@@ -89,7 +88,6 @@ class VehicleModel:
         self.b: float = lib.body_b(parameters)
         self.handle = ffi.gc(handle, lib.vehicle_model_destroy)
         lib.vehicle_model_switch(self.handle, *switches)
-        self._built: list[Any] = [values_of(parameters), body.get("outline_m"), self.dt, switches]
 
     @property
     def euler_limit(self) -> float:
@@ -106,11 +104,6 @@ class VehicleModel:
         """Of the disc about its axle's middle in which the body fits (m)."""
         corners = self.body.get("outline_m")
         return float(self.body["radius"]) if corners is None else max(math.hypot(*corner) for corner in corners)
-
-    @property
-    def fingerprint(self) -> str:
-        """A number that two models share only if their worlds go on alike from the same state."""
-        return fingerprint_of(*self._built)
 
     @property
     def _open(self) -> Any:
@@ -140,7 +133,7 @@ class VehicleModel:
         """
         motors = [dc_parameters(f"vehicle: {side} motor", changes) for side, changes in _sides(left, right)]
         is_full = switch("vehicle: full", full, RobotError)
-        self._driven(lib.vehicle_model_drive_dc(self._open, *motors, is_full), motors, is_full)
+        self._driven(lib.vehicle_model_drive_dc(self._open, *motors, is_full))
 
     def regulated_motors(self, left: Mapping[str, Any] | None = None, right: Mapping[str, Any] | None = None) -> None:
         """Two velocity-regulated motors (3.15): torque K (v_ref - v), limited, with v_ref = s speed_maximum_m_s.
@@ -148,7 +141,7 @@ class VehicleModel:
         What is not said is as in `RegulatedMotor`, which has the keys.
         """
         motors = [regulated_parameters(f"vehicle: {side} motor", changes) for side, changes in _sides(left, right)]
-        self._driven(lib.vehicle_model_drive_regulated(self._open, *motors), motors)
+        self._driven(lib.vehicle_model_drive_regulated(self._open, *motors))
 
     def servos(self, left: Mapping[str, Any] | None = None, right: Mapping[str, Any] | None = None) -> None:
         """Two continuous-rotation servos driven by signal: 1500 us +- 200 us s, mirrored on the right.
@@ -160,9 +153,9 @@ class VehicleModel:
             servo_parameters(f"vehicle: {side} servo", changes, MOUNTS[side], radius)
             for side, changes in _sides(left, right)
         ]
-        self._driven(lib.vehicle_model_drive_servo(self._open, *servos), servos)
+        self._driven(lib.vehicle_model_drive_servo(self._open, *servos))
 
-    def _driven(self, status: int, motors: list[Any], full: bool = False) -> None:
+    def _driven(self, status: int) -> None:
         if status == lib.VEHICLE_TOO_MANY:
             raise RobotError(
                 "vehicle: it has a drive already; expected one of dc_motors, regulated_motors or servos, once"
@@ -171,7 +164,6 @@ class VehicleModel:
             raise self.bad_step()
         if status:
             raise RobotError("vehicle: the drive's numbers are outside of what arithmetic holds; expected usual ones")
-        self._built.append(([values_of(motor) for motor in motors], full))
 
     # ---- battery and sensors -----------------------------------------------------------------------------------------
 
@@ -186,7 +178,6 @@ class VehicleModel:
         rates = struct("energy_parameters", where, energy, values)
         if lib.vehicle_model_battery(self._open, rates) == lib.VEHICLE_TOO_MANY:
             raise RobotError(f"{where}: it has a battery already; expected one")
-        self._built.append(values_of(rates))
         self.sensor("charge", name, empty=empty, full=full, sigma=sigma)
 
     def sensor(
@@ -225,7 +216,6 @@ class VehicleModel:
         if first < 0:
             raise RobotError(f"{where} has numbers that do not fit together; expected such as its header says")
         self.names[name] = slice(first, lib.vehicle_model_readings(self.handle))
-        self._built.append((what.name, time, values_of(given), None if table is None else table.data))
         if what.reach:
             self.looks[name] = (values_of(given.beam), float(getattr(given, what.reach)))
 

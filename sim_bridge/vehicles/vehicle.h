@@ -78,15 +78,9 @@ double vehicles_energy(const vehicles *self, size_t i);
  * give; 0 with another drive. */
 void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
 
-/* Of everything that a world has come to, which is what vehicles_save writes, in the same order; the same on every
+/* Of everything that a world has come to: body, drive, battery, sensors, readings, a brain's memory; the same on every
  * machine. */
 uint64_t vehicles_hash(const vehicles *self, size_t i);
-
-/* World i as bytes, the same on every machine, and back into a world of the same model and size of a brain's memory that is
- * placed in the same arena. Restoring checks every number; what it refuses changes nothing. */
-size_t vehicles_snapshot_size(const vehicles *self, size_t i);
-void vehicles_save(const vehicles *self, size_t i, void *bytes);
-int vehicles_restore(vehicles *self, size_t i, const void *bytes, size_t size);
 
 /* Memory of `count` worlds, bytes. */
 size_t vehicles_memory(const vehicles *self);

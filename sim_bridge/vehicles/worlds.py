@@ -1,4 +1,4 @@
-"""Worlds in C (vehicles/vehicle.h) as `Vehicle` and `Batch` have them: made, placed, saved and restored."""
+"""Worlds in C (vehicles/vehicle.h) as `Vehicle` and `Batch` have them: made and placed."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import ArenaError, RobotError
-from sim_bridge import saved
 from sim_bridge._core import ffi, lib
-from sim_bridge.saved import SavedStateError
 
 if TYPE_CHECKING:
     from sim_bridge.vehicles.model import VehicleModel
@@ -77,36 +75,3 @@ def place(
         raise MemoryError(f"{who}: no memory for the world's moving shapes or laser")
     if status:
         raise RobotError(f"{who}: cannot start at {pose}; expected a pose near the arena")
-
-
-def save(handle: Any, index: int, model: VehicleModel, arena: Arena, state_bytes: int) -> bytes:
-    """The state of one world."""
-    room = ffi.new("unsigned char[]", lib.vehicles_snapshot_size(handle, index))
-    lib.vehicles_save(handle, index, room)
-    return saved.encode(_heading(model, arena, state_bytes), bytes(ffi.buffer(room)))
-
-
-def restore(who: str, handle: Any, index: int, model: VehicleModel, arena: Arena, state_bytes: int, state: Any) -> None:
-    """World `index` goes on from a saved state; what is refused changes nothing.
-
-    Raises:
-        SavedStateError: it is of another model, format, arena, size of the brain's memory, or damaged.
-    """
-    heading, numbers = saved.decode(state)
-    here = _heading(model, arena, state_bytes)
-    if heading.model != here.model:
-        raise SavedStateError(
-            f"{who}: the state was saved by another model; expected one whose body, drive and sensors are the same"
-        )
-    if heading.arena_fingerprint != here.arena_fingerprint:
-        raise SavedStateError(
-            f"{who}: the state was saved in another arena; expected one saved in this arena, {arena.name}"
-        )
-    if heading.state_bytes != here.state_bytes:
-        raise SavedStateError(f"{who}: the state has another size of a brain's memory; expected the same state_bytes")
-    if lib.vehicles_restore(handle, index, numbers, len(numbers)) != lib.VEHICLE_OK:
-        raise SavedStateError(f"{who}: the saved state has a number that no world comes to; expected what save() gave")
-
-
-def _heading(model: VehicleModel, arena: Arena, state_bytes: int) -> saved.World:
-    return saved.World(saved.FORMAT, model.fingerprint, arena.name, arena.fingerprint, state_bytes)

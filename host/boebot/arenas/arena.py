@@ -5,10 +5,8 @@ Lengths in m, angles in rad. A wrong file gets one sentence that names file, lin
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Sequence
-from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
@@ -80,11 +78,6 @@ class Arena:
         for moving in self.description.moving:
             self._add_moving(moving)
         lib.arena_build(self.handle)
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """A number that two arenas share only if their descriptions are equal."""
-        return hashlib.sha256(repr(self.description).encode()).hexdigest()
 
     def __reduce__(self) -> tuple[type[Arena], tuple[ArenaDescription]]:
         """To copy and pickle it: made anew of its description."""

@@ -109,6 +109,3 @@ def test_worlds_side_by_side_read_what_one_alone_reads() -> None:
     for _ in range(40):
         alone.step(0.3, 0.5)
     assert np.array_equal(batch.readings[6], np.array(alone.readings)) and batch.hashes()[6] == alone.hash()
-    again = Vehicle(crowded(), room, seed=6)
-    again.restore(alone.save())
-    assert again.hash() == alone.hash()
