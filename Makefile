@@ -158,6 +158,7 @@ lock:
 check-python:
 	@$(PYTHON_VENV) -m ruff check --quiet .
 	@$(PYTHON_VENV) -m ruff format --check --quiet . || { echo "run: make format"; exit 1; }
+	@$(PYTHON_VENV) -m tools.house --check
 check-types:
 	@$(PYTHON_VENV) -m mypy --no-error-summary
 	@$(PYTHON_VENV) -m tools.examples

@@ -1,4 +1,4 @@
-"""Which file knows which: imports of Python modules and includes of C files, read from the sources of a tree."""
+"""Which file knows which: imports of Python modules, includes and calls of C files, read from the sources of a tree."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
+C_FUNCTION = re.compile(r"^(?!static\b|typedef\b)\w[\w *]*?\b(\w+)\([^;{}]*\)\s*\{", re.MULTILINE)
 C_ROOMS = ("firmware/src", "sim_bridge", "host")
 Graph = dict[str, set[str]]
 
@@ -41,6 +42,24 @@ def c_modules(root: Path, folder: str) -> Graph:
     return {module: others - {module} for module, others in knows.items()}
 
 
+def c_calls(folder: Path) -> Graph:
+    """Of each .c file right in a folder those whose functions it calls."""
+    texts = {source.name: c_code(source) for source in sorted(folder.glob("[!_]*.c"))}
+    defined = {name: set(C_FUNCTION.findall(text)) for name, text in texts.items()}
+    called = {name: set(re.findall(r"\b(\w+)\(", text)) - defined[name] for name, text in texts.items()}
+    return {name: {other for other in texts if calls & defined[other]} for name, calls in called.items()}
+
+
+def c_code(source: Path) -> str:
+    """The text of a C file without its comments."""
+    return re.sub(r"/\*.*?\*/", " ", source.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+def guests(root: Path) -> list[str]:
+    """The packages beside the library."""
+    return sorted(path.parent.name for path in (root / "host").glob("*/__init__.py") if path.parent.name != "boebot")
+
+
 def python_modules(root: Path) -> dict[str, Path]:
     """Modules but tests and what only builds: full name -> file."""
     packages = [path.parent for path in (root / "host").glob("*/__init__.py")]
@@ -53,18 +72,14 @@ def python_modules(root: Path) -> dict[str, Path]:
     return found
 
 
-def python_imports(modules: dict[str, Path], *, types: bool) -> Graph:
-    """Modules that each one imports, also within functions; with `types` those for type checkers as well."""
-    return {name: _needed(source, modules, types=types) - {name} for name, source in modules.items()}
+def python_imports(modules: dict[str, Path]) -> Graph:
+    """Modules that each one imports, also within functions and for type checkers."""
+    return {name: _needed(source, modules) - {name} for name, source in modules.items()}
 
 
-def _needed(source: Path, known: dict[str, Path], *, types: bool) -> set[str]:
-    tree = ast.parse(source.read_text(encoding="utf-8"))
-    left_out = set() if types else set(_for_type_checkers(tree))
+def _needed(source: Path, known: dict[str, Path]) -> set[str]:
     found = set()
-    for node in ast.walk(tree):
-        if node in left_out:
-            continue
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -72,12 +87,6 @@ def _needed(source: Path, known: dict[str, Path], *, types: bool) -> set[str]:
                 name = f"{node.module}.{alias.name}"
                 found.add(name if name in known else node.module)
     return found & known.keys()
-
-
-def _for_type_checkers(tree: ast.Module) -> list[ast.stmt]:
-    """What is below `if TYPE_CHECKING:`."""
-    tests = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
-    return [line for node in tests if ast.unparse(node.test) == "TYPE_CHECKING" for line in node.body]
 
 
 def closure(start: str, knows: Graph) -> set[str]:
