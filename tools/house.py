@@ -22,7 +22,6 @@ import tomllib
 from collections import Counter
 from pathlib import Path
 
-
 ROOT = Path(__file__).resolve().parents[1]
 NUMBERS = ROOT / "tools" / "rooms.toml"
 HEAD = """\
