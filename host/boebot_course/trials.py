@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.record.series import Pose, truth_at
+from boebot.record.truth import Pose, truth_at
 from boebot.running.runner import run
 from boebot_course.experiment import Floats
 

@@ -353,9 +353,9 @@ def test_sweeps_older_than_the_tick_that_has_them_are_where_they_were_taken(
     few = copy.copy(scanned)
     few.__dict__.pop("overview", None)
     ahead, _ = scene.view(few).swept
-    assert few.overview.series.time[1] == pytest.approx(0.07)
-    index = int(np.argmax(few.overview.series.time[ahead.ticks] - ahead.time))
-    assert few.overview.series.time[ahead.ticks[index]] - ahead.time[index] > 0.05
+    assert few.overview.columns.time[1] == pytest.approx(0.07)
+    index = int(np.argmax(few.overview.columns.time[ahead.ticks] - ahead.time))
+    assert few.overview.columns.time[ahead.ticks[index]] - ahead.time[index] > 0.05
     assert np.median(misses(few, ahead, index)) < 2e-3
 
 

@@ -26,8 +26,8 @@ from mcap.reader import make_reader
 
 import boebot
 from boebot.arenas.floor_plan import floor_plan
-from boebot.record import windows
-from boebot.record.series import Pose
+from boebot.record import columns
+from boebot.record.truth import Pose
 from boebot.result import RunResult, TogetherResult, robots_of
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
@@ -217,7 +217,7 @@ def test_movers_that_were_put_elsewhere(tmp_path: Path) -> None:
 
 def test_windows_of_any_size_give_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     at_once = saved(dataclasses.replace(showcase()), tmp_path / "at_once")
-    monkeypatch.setattr(windows, "TICKS", 70)
+    monkeypatch.setattr(columns, "TICKS", 70)
     by_windows = saved(dataclasses.replace(showcase()), tmp_path / "by_windows")
     assert {topic: len(each) for topic, each in at_once.items()} == {
         topic: len(each) for topic, each in by_windows.items()

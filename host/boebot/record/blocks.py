@@ -52,22 +52,15 @@ class Block:
         ends = np.concatenate(([0], np.cumsum(self.sizes, dtype=np.int64)))
         return Block(self.times[begin:end], self.data[ends[begin] : ends[end]], self.sizes[begin:end])
 
-    def chosen(self, which: NDArray[np.intp]) -> Block:
-        """Its rows of these indices."""
-        if len(self.sizes) == 1:
-            table = np.frombuffer(self.data, np.uint8).reshape(len(self), int(self.sizes[0]))
-            return Block(self.times[which], table[which].tobytes(), self.sizes)
-        rows = self.rows()
-        return Block.of([rows[index] for index in which.tolist()])
-
     def rows(self) -> list[Row]:
         """Each row by itself."""
         ends = np.cumsum(np.broadcast_to(self.sizes, len(self.times)), dtype=np.int64).tolist()
-        begins = [0, *ends[:-1]]
+        begins = [0, *ends][:-1]
         times = self.times.tolist()
         return [(time, self.data[begin:end]) for time, begin, end in zip(times, begins, ends, strict=True)]
 
 
+EMPTY = Block(np.empty(0), b"", np.zeros(1, np.uint32))
 Group = Mapping[str, Block]
 """What came in one stretch of a run, at most a second of the wall clock: a block of each stream that had rows."""
 
@@ -90,15 +83,16 @@ def group_of(rows: Rows) -> Group:
     return {name: some if isinstance(some, Block) else Block.of(some) for name, some in rows.items() if some}
 
 
-def joined(first: Block | None, second: Block) -> Block:
-    """One block after another."""
-    if first is None:
-        return second
-    sizes = first.sizes
-    if len(first.sizes) != 1 or len(second.sizes) != 1 or first.sizes[0] != second.sizes[0]:
-        each = [np.broadcast_to(block.sizes, len(block)) for block in (first, second)]
+def joined(*blocks: Block | None) -> Block:
+    """One block after another; at least one is there."""
+    there = [block for block in blocks if block is not None]
+    if len(there) == 1:
+        return there[0]
+    sizes = there[0].sizes
+    if any(len(block.sizes) != 1 or block.sizes[0] != sizes[0] for block in there):
+        each = [np.broadcast_to(block.sizes, len(block)) for block in there]
         sizes = np.concatenate(each).astype(np.uint32)
-    return Block(np.concatenate((first.times, second.times)), first.data + second.data, sizes)
+    return Block(np.concatenate([block.times for block in there]), b"".join(block.data for block in there), sizes)
 
 
 def schema() -> bytes:

@@ -20,7 +20,7 @@ from boebot.brain.process import MotorBehavior
 
 if TYPE_CHECKING:
     from boebot.record.record import Record
-    from boebot.record.series import Floats
+    from boebot.record.truth import Floats
     from boebot.robot import Robot
 
 

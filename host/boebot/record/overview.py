@@ -1,25 +1,26 @@
 """A run as tables, pictures and pages show it: figures computed from every tick, and few enough ticks to draw.
 
-It takes one pass over the record, window by window, and so no more memory for a day than for a minute.
+It takes one pass over the record, piece by piece, and so no more memory for a day than for a minute.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from boebot.link.messages import DevicesTelemetry, EventKind, Status
-from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
-from boebot.record.record import Record
-from boebot.record.series import APART_S, Bools, Floats, Pose, Series
+from boebot.devices.device import SlowDevice
+from boebot.link.messages import EventKind, Status
+from boebot.record.brain_record import BrainRecord, read_brain
+from boebot.record.columns import Columns, chained, columns, whole
 from boebot.record.shown import Layer, Shown, read_layers, read_shown
-from boebot.record.telemetry_series import Directions
-from boebot.record.truth import Track, track_of
-from boebot.record.windows import windows
+from boebot.record.truth import APART_S, Bools, Floats, Pose, Track
+from boebot.showing import SKETCH
+
+if TYPE_CHECKING:
+    from boebot.record.run import Run
 
 POINTS = 20_000  # ticks at most that are drawn
 PLACES = 5_000  # touches at most whose places are drawn
@@ -31,11 +32,7 @@ class Overview:
     """Of one robot's run. Lengths in m, times in s.
 
     Attributes:
-        record: of at most `POINTS` ticks, the first and the last among them; of all, where there are no more.
-        series: these ticks as arrays.
-        true_pose: at these ticks; None: no simulator knows it.
-        odometry: at these ticks, as seen from the start; None: the robot has none.
-        contact: at these ticks, whether the body touches something.
+        columns: at most `POINTS` ticks, the first and the last among them; all, where there are no more.
         true_distance, odometry_distance: path lengths. None: as above.
         true_contacts, whisker_touches: how many. None: nobody knows, or the robot has none.
         contact_places, touch_places: where the robot was at them, shape (n, 2).
@@ -45,11 +42,7 @@ class Overview:
         brain: of a brain of processes, at most `POINTS` of its steps; None: a brain of another kind, or not recorded.
     """
 
-    record: Record
-    series: Series
-    true_pose: Pose | None
-    odometry: Pose | None
-    contact: Bools
+    columns: Columns
     true_distance: float | None
     odometry_distance: float | None
     true_contacts: int | None
@@ -68,9 +61,8 @@ class Overview:
     def placed_odometry(self) -> Pose | None:
         """The odometry as it lies in the arena, from the true pose at the start; None: there is no truth, or no
         odometry."""
-        if self.true_pose is None or self.odometry is None:
-            return None
-        return self.odometry.placed(*self.true_pose.at(0))
+        true, odometry = self.columns.true_pose, self.columns.odometry
+        return None if true is None or odometry is None else odometry.placed(*true.at(0))
 
 
 class _Places:
@@ -144,42 +136,6 @@ class _Contacts:
         self._seen_s = max(self._seen_s, end_s)
 
 
-class _Thinned:
-    """The record of few ticks: every `stride`-th, and the last one."""
-
-    def __init__(self, record: Record) -> None:
-        self.record = Record()
-        self._stream, self._last = record.tick_stream, record.ticks - 1
-        self._stride = max(1, math.ceil(record.ticks / POINTS))
-        self._passed = 0
-        self._message = b""
-
-    @property
-    def is_whole(self) -> bool:
-        """No tick is left out."""
-        return self._stride == 1
-
-    def choose(self, first: int, count: int) -> NDArray[np.intp]:
-        """Which ticks of a window are kept; those from `first` on are new."""
-        number = self._passed + np.arange(count - first)
-        self._passed += count - first
-        return first + np.flatnonzero((number % self._stride == 0) | (number == self._last))
-
-    def add(self, window: Record, series: Series, kept: NDArray[np.intp]) -> None:
-        """These ticks, and what was in force and newest at each."""
-        rows, commands = window.rows(self._stream), series.commands
-        held = series.held(DevicesTelemetry) if window.count(DevicesTelemetry.NAME) else None
-        for index in kept.tolist():
-            time_s, data = rows[index]
-            self.record.append(self._stream, time_s, data)
-            self.record.append_command(time_s, *commands[index])
-            if held is not None and held.newest[index] >= 0:
-                message = held.messages[held.newest[index]].pack()
-                if message != self._message:
-                    self.record.append(DevicesTelemetry.NAME, time_s, message)
-                    self._message = message
-
-
 class _Counts:
     """What is counted from tick to tick."""
 
@@ -187,18 +143,19 @@ class _Counts:
         self.touches = self.overruns = self.dead_man = self.fallback = 0
         self.oldest: float | None = None  # reading of a slow device, at a step of the brain
 
-    def add(self, window: Record, series: Series, first: int, whiskers: list[str], slow: list[str]) -> Bools:
+    def add(self, part: Columns, whiskers: list[str], slow: list[str]) -> Bools:
         """Some more ticks. Returns where a whisker was pressed that was not pressed a tick before."""
-        flags = [series.flag(name, "pressed") for name in whiskers]
+        first = part.first
+        flags = [part.flag(name, "pressed") for name in whiskers]
         self.touches += sum(int(_rises(each, first).sum()) for each in flags)
-        self.overruns += series.overruns
-        self.dead_man += int(_rises((series.status & int(Status.DEAD_MAN)) != 0, first).sum())
-        self.fallback += int(_rises((series.status & int(Status.FALLBACK)) != 0, first).sum())
-        steps = np.array([index for index, *_ in window.steps if index >= first], dtype=np.intp)
-        ages = [series.number(name, "age")[steps] for name in slow] if len(steps) else []
+        self.overruns += part.overruns
+        self.dead_man += int(_rises((part.status & int(Status.DEAD_MAN)) != 0, first).sum())
+        self.fallback += int(_rises((part.status & int(Status.FALLBACK)) != 0, first).sum())
+        steps = part.steps[part.steps >= first]
+        ages = [part.number(name, "age")[steps] for name in slow] if len(steps) else []
         known = [float(np.nanmax(each)) for each in ages if not np.isnan(each).all()]
         self.oldest = max(known if self.oldest is None else [self.oldest, *known], default=None)
-        return _rises(np.any(flags or [np.zeros(len(series), dtype=np.bool_)], axis=0), first)
+        return _rises(np.any(flags or [np.zeros(len(part), dtype=np.bool_)], axis=0), first)
 
 
 def _rises(flags: Bools, first: int) -> Bools:
@@ -209,71 +166,38 @@ def _rises(flags: Bools, first: int) -> Bools:
     return up
 
 
-def overview(
-    record: Record,
-    series_of: Callable[[Record, Directions | None], Series],
-    *,
-    clock_offset_s: float,
-    whiskers: list[str],
-    slow: list[str],
-    has_odometry: bool,
-    has_truth: bool,
-    brain_names: BrainNames | None,
-) -> Overview:
-    """Of a run.
-
-    Args:
-        series_of: makes arrays of a part of the record, which goes on with the directions of the wheels before it.
-        clock_offset_s: the transport's clock at the run's time 0.
-        whiskers, slow: names of these devices.
-        has_odometry: the robot has what it takes. has_truth: a simulator knows what happened.
-        brain_names: of a brain of processes.
-    """
+def overview(result: Run) -> Overview:
+    """Of a run."""
+    record, offset_s, whiskers = result.record, result.clock_offset, result.whiskers
+    slow = [name for name, device in result.robot.device.items() if isinstance(device, SlowDevice)]
     ticks = record.ticks
-    thinned, counts = _Thinned(record), _Counts()
+    stride = max(1, math.ceil(ticks / POINTS))
+    counts, touches, contacts = _Counts(), _Places(), _Contacts()
     true_walk, odometry_walk = _Walk(), _Walk(ODOMETRY_S)
-    contacts, touches = _Contacts(), _Places()
-    true_poses: list[Pose] = []
-    odometry: list[Pose] = []
-    contact: list[Bools] = []
-    place: tuple[float, float, float] | None = None
-    directions = Directions()
+    few: list[Columns] = []
     seen = 0
-    for window in windows(record, clock_offset_s):
-        series, first = series_of(window.record, directions), window.first
-        seen += len(series) - first
-        kept, new = thinned.choose(first, len(series)), slice(first, None)
-        time_s = series.time + clock_offset_s
-        pose = Pose(*np.zeros((3, len(series))))
-        if has_odometry:
-            pose = series.odometry() if place is None else series.odometry().placed(*place)
-            place = pose.at(-1)
-            odometry_walk.add(series.time[new], pose.part(new), is_last=seen == ticks)
-            odometry.append(pose.part(kept))
-        if has_truth:
-            track = track_of(window.record)
-            pose = track.at(time_s)
-            lifts = track.lifts - clock_offset_s
-            true_walk.add(series.time[new], pose.part(new), is_last=seen == ticks, lifts=lifts)
-            contacts.add(track, clock_offset_s, float(time_s[-1]))
-            true_poses.append(pose.part(kept))
-            contact.append(track.contact_at(time_s[kept]))
-        pressed = counts.add(window.record, series, first, whiskers, slow)
+    for part in columns(result):
+        new, number = slice(part.first, None), seen + np.arange(len(part) - part.first)
+        seen += len(number)
+        time, pose, is_last = part.time[new], Pose(*np.zeros((3, len(part)))), seen == ticks
+        if part.odometry is not None:
+            pose = part.odometry
+            odometry_walk.add(time, pose.part(new), is_last=is_last)
+        if part.true_pose is not None and part.track is not None:
+            pose = part.true_pose
+            true_walk.add(time, pose.part(new), is_last=is_last, lifts=part.track.lifts - offset_s)
+            contacts.add(part.track, offset_s, float(time[-1] + offset_s))
+        pressed = counts.add(part, whiskers, slow)
         touches.add(pose.x[pressed], pose.y[pressed])
-        if not thinned.is_whole:
-            thinned.add(window.record, series, kept)
-    few = record if thinned.is_whole else thinned.record
+        few.append(part.part(part.first + np.flatnonzero((number % stride == 0) | (number == ticks - 1))))
+    drawn = chained(few) if few else whole(result)
     events = [(event.kind, event.value) for event in record.events]
-    series = series_of(few, None)
+    names = result.brain_names if result.is_recorded else None
     return Overview(
-        record=few,
-        series=series,
-        true_pose=_chained(true_poses),
-        odometry=_chained(odometry),
-        contact=np.concatenate(contact) if contact else np.zeros(len(series), dtype=np.bool_),
-        true_distance=true_walk.length if has_truth and ticks else None,
-        odometry_distance=odometry_walk.length if has_odometry and ticks else None,
-        true_contacts=contacts.places.count if has_truth and ticks else None,
+        columns=drawn,
+        true_distance=None if drawn.true_pose is None or not ticks else true_walk.length,
+        odometry_distance=None if drawn.odometry is None or not ticks else odometry_walk.length,
+        true_contacts=None if drawn.true_pose is None or not ticks else contacts.places.count,
         whisker_touches=counts.touches if whiskers and ticks else None,
         contact_places=contacts.places.found,
         touch_places=touches.found,
@@ -283,12 +207,6 @@ def overview(
         fallback_takeovers=max(counts.fallback, events.count((EventKind.FALLBACK, 1))),
         slow_reading_age=counts.oldest,
         shown=read_shown(record, POINTS),
-        layers=read_layers(record),
-        brain=None if brain_names is None else read_brain(record, brain_names, POINTS),
+        layers=read_layers(record.each_row(SKETCH)),
+        brain=None if names is None else read_brain(record, names, POINTS),
     )
-
-
-def _chained(poses: list[Pose]) -> Pose | None:
-    if not poses:
-        return None
-    return Pose(*(np.concatenate([getattr(pose, name) for pose in poses]) for name in ("x", "y", "heading")))

@@ -1,6 +1,6 @@
 """The record of a run: an append-only sequence of (stream, time, bytes), and what its streams mean.
 
-While a run goes on, only that is kept. Everything else is computed afterwards (boebot.record.series, overview).
+While a run goes on, only that is kept. Everything else is made of it (boebot.record.columns, overview).
 
 stream              time, s                     bytes
 to_board, to_host   transport's clock           as they crossed the wire, piece by piece
@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from boebot.devices.readings import Readings
 from boebot.link.events import BoardEvent
-from boebot.record.blocks import Block, Group, Row, Rows, chain, group_of, joined
+from boebot.record.blocks import EMPTY, Block, Group, Row, Rows, chain, group_of, joined
 from boebot.record.keepers import InMemory, Keeper
 
 Append = Callable[[str, float, bytes], None]
@@ -53,6 +53,12 @@ _COMMAND = Struct("<Bdd")
 _EVENT = Struct("<BIB")
 _CLOCK = Struct("<d")
 _READINGS = Struct("<IHdd")
+
+
+def readings_row(count: int) -> np.dtype[np.void]:
+    """Of a robot without a board that has `count` readings."""
+    numbers = [("left", "<f8"), ("right", "<f8"), ("ages", "<f8", (count,)), ("values", "<f8", (count,))]
+    return np.dtype([("tick", "<u4"), ("status", "<u2"), *numbers])
 
 
 class Record:
@@ -69,6 +75,13 @@ class Record:
         self._counts: Counter[str] | None = Counter() if is_new else None  # of the rows that are kept; None: not known
         self._due_s = wall.perf_counter() + EACH_S
         self._decoded: dict[str, tuple[int, Any]] = {}
+
+    @classmethod
+    def of(cls, group: Group) -> Record:
+        """In memory, of these rows alone."""
+        record = cls()
+        record.put(group)
+        return record
 
     def __repr__(self) -> str:
         names = ("telemetry", "readings", "event", "command", "vehicle")
@@ -244,13 +257,12 @@ class Record:
 
     def readings(self, count: int) -> NDArray[np.void]:
         """Steps of a robot without a board that has `count` readings, with the motor signals in force."""
-        numbers = [("left", "<f8"), ("right", "<f8"), ("ages", "<f8", (count,)), ("values", "<f8", (count,))]
-        return self.table("readings", np.dtype([("tick", "<u4"), ("status", "<u2"), *numbers]))
+        return self.table("readings", readings_row(count))
 
     @property
     def events(self) -> list[BoardEvent]:
         """What the board sent exactly once."""
-        return self._each("event", "event", _event)
+        return self._each("event", "event", event_of)
 
     @property
     def steps(self) -> list[tuple[int, str, float, float]]:
@@ -269,6 +281,11 @@ class Record:
     def blocks(self, stream: str) -> Iterator[Block]:
         """The rows of a stream in blocks, each small."""
         return chain(self.groups(), stream)
+
+    def block(self, stream: str) -> Block:
+        """All of them in one block."""
+        blocks = list(self.blocks(stream))
+        return joined(*blocks) if blocks else EMPTY
 
     def _index(self, time_s: float) -> int:
         return bisect.bisect_right(self.times, time_s) - 1
@@ -315,6 +332,7 @@ class Unrecorded(Record):
         """Nothing is kept there."""
 
 
-def _event(row: Row) -> BoardEvent:
+def event_of(row: Row) -> BoardEvent:
+    """A row of the stream "event"."""
     kind, value, earlier = _EVENT.unpack(row[1])
     return BoardEvent(kind, value, row[0], bool(earlier))

@@ -14,23 +14,21 @@ from boebot.arenas.floor_plan import FloorPlan
 from boebot.boards import Truth, WatchdogReset
 from boebot.brain.composition import MadeOf
 from boebot.description.robots import RobotDescription
-from boebot.devices.device import SlowDevice
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
 from boebot.errors import brief
 from boebot.link.fields import text
-from boebot.link.messages import DevicesTelemetry, Identity
+from boebot.link.messages import Identity
 from boebot.record import hangs
 from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
+from boebot.record.columns import MESSAGES, Columns, whole
 from boebot.record.figures import counted
 from boebot.record.interventions import touched
 from boebot.record.overview import Overview, overview
-from boebot.record.readings_series import ReadingsSeries
 from boebot.record.record import Record, Unrecorded
-from boebot.record.series import Pose, Series, truth_at
 from boebot.record.shown import Layer, Shown, read_layers, read_shown
-from boebot.record.telemetry_series import Directions, TelemetrySeries
-from boebot.record.truth import plan_of, truth_of
+from boebot.record.truth import Pose, plan_of, truth_of
+from boebot.showing import SKETCH
 
 
 @dataclass(kw_only=True, repr=False)
@@ -153,33 +151,20 @@ class Run:
         return plan_of(self.record, self.world) if self.world is not None else FloorPlan()
 
     @cached_property
-    def series(self) -> Series:
+    def series(self) -> Columns:
         """Telemetry or readings as arrays, one entry per control tick received."""
-        return self.telemetry if self.layout is None else self.series_of(self.record)
+        return whole(self)
 
-    def series_of(self, record: Record, directions: Directions | None = None) -> Series:
-        """Of a part of the record."""
-        if self.layout is not None:
-            return ReadingsSeries(record, self.robot, self.tick, self.layout)
-        return TelemetrySeries(record, self.robot, self.tick, directions)
-
-    @cached_property
-    def telemetry(self) -> TelemetrySeries:
-        """The board's telemetry, with what only boards send; empty without a board."""
-        return TelemetrySeries(self.record, self.robot, self.tick)
-
-    @cached_property
+    @property
     def true_pose(self) -> Pose | None:
         """The true pose at each of those ticks, where somebody knows it."""
-        if self.truth is None or not len(self.truth.time) or not len(self.series):
-            return None
-        return truth_at(self.truth, self.series.time + self.clock_offset)
+        return self.series.true_pose
 
-    @cached_property
+    @property
     def odometry(self) -> Pose | None:
         """Where the robot is by encoders or odometer at each of those ticks, as seen from where the run began: there it
         is at 0, 0 and heads along x. None: it has neither."""
-        return self.series.odometry() if self.has_odometry else None
+        return self.series.odometry
 
     @cached_property
     def brain_record(self) -> BrainRecord | None:
@@ -195,7 +180,7 @@ class Run:
     @cached_property
     def layers(self) -> list[Layer]:
         """What the brain sketched (`robot.sketch`), layer by layer."""
-        return read_layers(self.record, None)
+        return read_layers(self.record.each_row(SKETCH), None)
 
     @property
     def bytes_from_board(self) -> bytes:
@@ -212,16 +197,7 @@ class Run:
     @cached_property
     def overview(self) -> Overview:
         """What tables, pictures and pages show of it; takes no more memory for a long run than for a short one."""
-        return overview(
-            self.record,
-            self.series_of,
-            clock_offset_s=self.clock_offset,
-            whiskers=self.whiskers,
-            slow=[name for name, device in self.robot.device.items() if isinstance(device, SlowDevice)],
-            has_odometry=self.has_odometry,
-            has_truth=self.has_truth,
-            brain_names=self.brain_names if self.is_recorded else None,
-        )
+        return overview(self)
 
     @property
     def true_distance(self) -> float | None:
@@ -279,12 +255,6 @@ class Run:
         return self.overview.fallback_takeovers if self.is_recorded else None
 
     @property
-    def has_odometry(self) -> bool:
-        """The robot has what an estimate of its pose needs: encoders, or an odometer."""
-        measures = ("odometer",) if self.layout is not None else ("encoder_left", "encoder_right")
-        return all(self.robot.has(device) for device in measures)
-
-    @property
     def whiskers(self) -> list[str]:
         """Names of the robot's whiskers."""
         return [name for name, device in self.robot.device.items() if device.on and device.READING is Whisker]
@@ -300,7 +270,7 @@ class Run:
     @property
     def odometry_error(self) -> float | None:
         """Distance of the estimate from the true place at the end (m); None: there is no truth, or no odometry."""
-        pose, placed = self.overview.true_pose, self.overview.placed_odometry
+        pose, placed = self.overview.columns.true_pose, self.overview.placed_odometry
         return None if pose is None or placed is None else math.dist(placed.at(-1)[:2], pose.at(-1)[:2])
 
     @property
@@ -344,7 +314,7 @@ class Run:
             "behavior_switches": None if brain is None else brain.behavior_switches,
             **{f"{name}_share": _rounded(share, 4) for name, share in shares.items()},
             "ticks": self.ticks,
-            "slow_readings": None if slow_age is None else self.record.count(DevicesTelemetry.NAME),
+            "slow_readings": None if slow_age is None else sum(map(self.record.count, MESSAGES)),
             "slow_reading_age_s": _rounded(slow_age, 6),
             "lost_frames": self.lost_frames,
             "bad_frames": self.bad_frames,

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
-from boebot.showing import SKETCH, VALUES, Sketch
+from boebot.showing import VALUES, Sketch
 
 if TYPE_CHECKING:
+    from boebot.record.blocks import Row
     from boebot.record.record import Record
-    from boebot.record.series import Floats
+    from boebot.record.truth import Floats
 
 SKETCH_BYTES = 3_000_000  # of all sketches that are drawn
 
@@ -45,29 +46,33 @@ class Shown:
 
 def shown_names(record: Record) -> dict[str, bool]:
     """Of all that was shown, and whether it was ever a text."""
+    return names_in(record.each_row(VALUES))
+
+
+def names_in(rows: Iterable[Row]) -> dict[str, bool]:
+    """The same of those rows."""
     names: dict[str, bool] = {}
-    for _, data in record.each_row(VALUES):
+    for _, data in rows:
         for name, value in msgspec.json.decode(data).items():
             names[name] = names.get(name, False) or isinstance(value, str)
     return names
 
 
-def read_shown(record: Record, most: int | None = None, names: Mapping[str, bool] | None = None) -> Shown:
-    """All of it. `most`: how many rows at most, the first and the last among them. `names`: of the whole run, where
-    this is a part of its record (`shown_names`)."""
-    names = shown_names(record) if names is None else names
+def read_shown(record: Record, most: int | None = None) -> Shown:
+    """All of it. `most`: how many rows at most, the first and the last among them."""
     count = record.count(VALUES)
     stride = 1 if most is None else max(1, math.ceil(count / most))
-    times: list[float] = []
-    rows: list[dict[str, float | str | None]] = []
-    for index, (time_s, data) in enumerate(record.each_row(VALUES)):
-        if index % stride == 0 or index == count - 1:
-            times.append(time_s)
-            rows.append(msgspec.json.decode(data))
+    rows = enumerate(record.each_row(VALUES))
+    return shown_in((row for index, row in rows if index % stride == 0 or index == count - 1), shown_names(record))
+
+
+def shown_in(rows: Iterable[Row], names: Mapping[str, bool]) -> Shown:
+    """Of those rows. `names`: of all that is shown, and whether it is a text (`shown_names`)."""
+    decoded = [(time_s, msgspec.json.decode(data)) for time_s, data in rows]
     return Shown(
-        np.array(times),
-        {name: np.array([_number(row.get(name)) for row in rows]) for name, is_text in names.items() if not is_text},
-        {name: [_text(row.get(name)) for row in rows] for name, is_text in names.items() if is_text},
+        np.array([time_s for time_s, _ in decoded]),
+        {name: np.array([_number(row.get(name)) for _, row in decoded]) for name, text in names.items() if not text},
+        {name: [_text(row.get(name)) for _, row in decoded] for name, text in names.items() if text},
     )
 
 
@@ -128,11 +133,11 @@ def _size(sketch: Sketch) -> int:
     return 100 + 8 * sketch.size + (0 if sketch.grid is None else len(sketch.grid.cells))
 
 
-def read_layers(record: Record, most: int | None = SKETCH_BYTES) -> list[Layer]:
-    """The sketches, layer by layer in the order of their first ones. `most`: about how many bytes of them; a layer that
-    has more changes less often."""
+def read_layers(rows: Iterable[Row], most: int | None = SKETCH_BYTES) -> list[Layer]:
+    """The sketches in those rows, layer by layer in the order of their first ones. `most`: about how many bytes of
+    them; a layer that has more changes less often."""
     layers: dict[str, _Kept] = {}
-    for time_s, data in record.each_row(SKETCH):
+    for time_s, data in rows:
         sketch = msgspec.json.decode(data, type=Sketch)
         layers.setdefault(sketch.layer, _Kept()).add(time_s, sketch)
         while most is not None and sum(kept.size for kept in layers.values()) > most:

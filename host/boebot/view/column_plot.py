@@ -15,7 +15,7 @@ from boebot.view import figure_file, style, tables
 
 if TYPE_CHECKING:
     from boebot.record.run import Run
-    from boebot.record.series import Floats
+    from boebot.record.truth import Floats
 
 TIME = "time_s"
 PANEL_IN = 1.7  # height of a panel

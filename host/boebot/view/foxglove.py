@@ -42,8 +42,7 @@ from boebot.arenas.floor_plan import floor_plan, moving_solids
 from boebot.devices.laser import Laser
 from boebot.errors import brief
 from boebot.record.brain_record import each_switch
-from boebot.record.parts import Part, events, parts
-from boebot.record.record import KINDS
+from boebot.record.columns import Columns, columns, events
 from boebot.record.shown import shown_names
 from boebot.record.truth import lateness, shifts
 from boebot.showing import SKETCH, VALUES, Sketch
@@ -52,7 +51,7 @@ from boebot.view import foxglove_numbers, foxglove_scene, style
 if TYPE_CHECKING:
     from boebot.devices.device import Column
     from boebot.record.run import Run
-    from boebot.record.series import Pose
+    from boebot.record.truth import Pose
 
 WORLD = "world"
 FIELD = re.compile(r"\W|^(?=\d)", re.ASCII)  # what no name of a Protobuf field has
@@ -162,15 +161,16 @@ def _scene(results: Sequence[Run], prefixes: Sequence[str], colours: Sequence[st
         entities += [foxglove_scene.mover(solid, _mover(number)) for number, solid in enumerate(solids)]
     for result, prefix, colour in zip(results, prefixes, colours, strict=True):
         entities.append(foxglove_scene.robot(result.robot, f"{prefix}robot", colour))
-        if result.has_odometry:
+        if result.overview.columns.odometry is not None:
             entities.append(foxglove_scene.ghost(result.robot, f"{prefix}odometry"))
     yield _entry(0.0, "/scene", SceneUpdate(entities=entities))
     for result, prefix in zip(results, prefixes, strict=True):
-        few = result.overview
-        if few.true_pose is None and few.odometry is None:  # it stays at the middle, for all that is known
+        few, true = result.overview, result.overview.columns.true_pose
+        odometry = few.columns.odometry
+        if true is None and odometry is None:  # it stays at the middle, for all that is known
             yield _entry(0.0, "/tf", FrameTransforms(transforms=[_transform(0.0, f"{prefix}robot", 0.0, 0.0, 0.0)]))
         for topic, path in (
-            ("path", few.true_pose if few.true_pose is not None else few.odometry),
+            ("path", odometry if true is None else true),
             ("odometry_path", few.placed_odometry),
         ):
             if path is not None:
@@ -212,7 +212,7 @@ def _ticks(result: Run, prefix: str) -> Iterator[Entry]:
     """Poses, sweeps, numbers and commands of a robot."""
     kinds: dict[str, Any] = {}
     start: tuple[float, float, float] | None = None
-    for part in parts(result):
+    for part in columns(result):
         if start is None:
             start = (0.0, 0.0, 0.0) if part.true_pose is None else part.true_pose.at(0)
         estimate = None if part.odometry is None else part.odometry.placed(*start)
@@ -221,19 +221,19 @@ def _ticks(result: Run, prefix: str) -> Iterator[Entry]:
             _sweeps(result, part, prefix),
             *(
                 _numbers(part, f"/{prefix}{name}", name, columns, kinds)
-                for name, columns in _columns(result, part).items()
+                for name, columns in _columns_of(result, part).items()
             ),
             _commands(part, prefix, kinds),
             key=lambda entry: entry.time_ns,
         )
 
 
-def _poses(part: Part, estimate: Pose | None, prefix: str) -> Iterator[Entry]:
+def _poses(part: Columns, estimate: Pose | None, prefix: str) -> Iterator[Entry]:
     seen = part.true_pose if part.true_pose is not None else estimate
     if seen is None:
         return
     placed = [("robot", "pose", seen)] + ([] if estimate is None else [("odometry", "odometry", estimate)])
-    for index, time_s in itertools.islice(enumerate(part.series.time.tolist()), part.first, None):
+    for index, time_s in itertools.islice(enumerate(part.time.tolist()), part.first, None):
         transforms = []
         for frame, topic, path in placed:
             x, y, heading = path.at(index)
@@ -243,13 +243,13 @@ def _poses(part: Part, estimate: Pose | None, prefix: str) -> Iterator[Entry]:
         yield _entry(time_s, "/tf", FrameTransforms(transforms=transforms))
 
 
-def _sweeps(result: Run, part: Part, prefix: str) -> Iterator[Entry]:
+def _sweeps(result: Run, part: Columns, prefix: str) -> Iterator[Entry]:
     """Of each laser range finder, when it was read anew."""
     for name, laser in result.robot.device.items():
-        if not isinstance(laser, Laser) or not part.series.device_columns(name):
+        if not isinstance(laser, Laser) or not part.device_columns(name):
             continue
-        distances = part.series.values(name)
-        sampled = part.series.time - part.series.ages(name)
+        distances = part.values(name)
+        sampled = part.time - part.ages(name)
         is_new = np.diff(sampled, prepend=-np.inf) > SAME_S
         half = laser.step_rad * (laser.rays - 1) / 2
         place = foxglove_scene.pose(*laser.position_m, laser.heading_rad, height=laser.height_m)
@@ -263,39 +263,35 @@ def _sweeps(result: Run, part: Part, prefix: str) -> Iterator[Entry]:
                 end_angle=half,
                 ranges=np.where(row < 0, np.inf, row).tolist(),
             )
-            yield _entry(part.series.time[index], f"/{prefix}{name}", sweep)
+            yield _entry(part.time[index], f"/{prefix}{name}", sweep)
 
 
-def _columns(result: Run, part: Part) -> dict[str, Sequence[Column]]:
+def _columns_of(result: Run, part: Columns) -> dict[str, Sequence[Column]]:
     """Of each device that has no topic of another kind, and of the board."""
     devices = {
-        name: list(part.series.device_columns(name).values())
+        name: list(part.device_columns(name).values())
         for name, device in result.robot.device.items()
         if not isinstance(device, Laser)
     }
-    return {name: columns for name, columns in devices.items() if columns} | {"board": part.series.own_columns()}
+    return {name: columns for name, columns in devices.items() if columns} | {"board": part.own_columns()}
 
 
-def _numbers(part: Part, topic: str, name: str, columns: Sequence[Column], kinds: dict[str, Any]) -> Iterator[Entry]:
+def _numbers(part: Columns, topic: str, name: str, columns: Sequence[Column], kinds: dict[str, Any]) -> Iterator[Entry]:
     table = {"_".join(filter(None, (column.name, column.unit))): column.values for column in columns}
     if name not in kinds:
         kinds[name] = foxglove_numbers.descriptor(name, list(table))
-    rows = zip(part.series.time.tolist(), foxglove_numbers.packed(table), strict=True)
+    rows = zip(part.time.tolist(), foxglove_numbers.packed(table), strict=True)
     for time_s, data in itertools.islice(rows, part.first, None):
         yield Entry(_ns(time_s), topic, kinds[name], data)
 
 
-def _commands(part: Part, prefix: str, kinds: dict[str, Any]) -> Iterator[Entry]:
-    steps = [step for step in part.record.steps if step[0] >= part.first]
-    table = {
-        "kind": np.array([KINDS.index(kind) for _, kind, _, _ in steps]),
-        "left": np.array([left for *_, left, _ in steps]),
-        "right": np.array([right for *_, right in steps]),
-    }
+def _commands(part: Columns, prefix: str, kinds: dict[str, Any]) -> Iterator[Entry]:
+    steps = part.steps[part.steps >= part.first]
+    table = {name: part.command[name][steps] for name in ("kind", "left", "right")}
     if "command" not in kinds:
         kinds["command"] = foxglove_numbers.descriptor("command", list(table))
-    for (index, *_), data in zip(steps, foxglove_numbers.packed(table), strict=True):
-        yield Entry(_ns(float(part.series.time[index])), f"/{prefix}command", kinds["command"], data)
+    for time_s, data in zip(part.time[steps].tolist(), foxglove_numbers.packed(table), strict=True):
+        yield Entry(_ns(time_s), f"/{prefix}command", kinds["command"], data)
 
 
 # ---- what the brain shows ----------------------------------------------------------------------------------------
@@ -323,7 +319,7 @@ def _shown(result: Run, prefix: str) -> Iterator[Entry]:
 def _sketches(result: Run, prefix: str) -> Iterator[Entry]:
     """Each sketch of each layer, in the frame that it is in."""
     layers: list[str] = []
-    start = result.overview.true_pose
+    start = result.overview.columns.true_pose
     place = (0.0, 0.0, 0.0) if start is None or not len(start.x) else start.at(0)
     for number, (time_s, data) in enumerate(result.record.each_row(SKETCH)):
         if number == 0:

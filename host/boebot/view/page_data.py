@@ -33,7 +33,7 @@ import numpy as np
 from boebot.description import robots
 from boebot.devices.device import pin_name
 from boebot.link.messages import Status
-from boebot.record.series import touch_indices
+from boebot.record.truth import touch_indices
 from boebot.view import scene, style
 
 if TYPE_CHECKING:
@@ -41,10 +41,11 @@ if TYPE_CHECKING:
 
     from boebot.arenas.floor_plan import FloorPlan, Moving, Solid
     from boebot.devices.device import Readout
+    from boebot.record.blocks import Block
     from boebot.record.brain_record import BrainNames, BrainRecord
-    from boebot.record.record import Record
-    from boebot.record.series import Bools, Floats, Pose, Series
+    from boebot.record.columns import Columns
     from boebot.record.shown import Layer, Shown
+    from boebot.record.truth import Bools, Floats, Pose
 
 FORMAT = 9
 RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
@@ -78,7 +79,6 @@ class Stretch:
         series: its ticks as arrays.
         path: the true pose at each of them, where it is known; else by odometry, or zeros.
         estimate: the odometry as it lies in the arena, at each of them; None: there is no truth, or no odometry.
-        contact: whether the body touches something, at each of them.
         start: pose in which the run began, in the frame of `path`: m, m, rad.
         shown, layers: what the brain showed and sketched.
         brain: steps and switches of a brain of processes; None: a brain of another kind, or no step yet.
@@ -89,10 +89,9 @@ class Stretch:
         pins: output edges by the name of the pin: times (s of the run) and levels.
     """
 
-    series: Series
+    series: Columns
     path: Pose
     estimate: Pose | None
-    contact: Bools
     start: tuple[float, float, float]
     shown: Shown
     layers: Sequence[Layer] = ()
@@ -126,7 +125,7 @@ def plan_data(plan: FloorPlan) -> dict[str, Any]:
 
 def robot_data(
     robot: robots.RobotDescription,
-    series: Series,
+    series: Columns,
     *,
     number: int,
     title: str,
@@ -234,7 +233,7 @@ def rows_data(
         "right": _array(series.signals[1]),
         "pulses": None if any(np.isnan(each).all() for each in pulses) else [_array(each) for each in pulses],
         "ping": _array(np.nan_to_num(series.number("ping", "distance"), nan=-1.0)),
-        "flags": _small(flags(series, stretch.contact)),
+        "flags": _small(flags(series)),
         "readings": [{"values": _array(one.values), "ages": _array(one.ages)} for one in readouts],
         "shown": _shown(stretch.shown),
         "layers": [_layer(layer, stretch.start) for layer in stretch.layers],
@@ -248,9 +247,9 @@ def rows_data(
     }
 
 
-def flags(series: Series, contact: Bools) -> NDArray[np.intp]:
+def flags(series: Columns) -> NDArray[np.intp]:
     """The bits of each tick."""
-    status = series.status
+    status, contact = series.status, np.False_ if series.contact is None else series.contact
     found: NDArray[np.intp] = (
         series.flag("whisker_left", "pressed") * LEFT_WHISKER
         | series.flag("whisker_right", "pressed") * RIGHT_WHISKER
@@ -264,13 +263,14 @@ def flags(series: Series, contact: Bools) -> NDArray[np.intp]:
     return found
 
 
-def events(series: Series, contact: Bools, whiskers: Sequence[str], *, first: int = 0) -> list[Event]:
-    """What happened to a robot, by its ticks: contacts, touches, faults, lost frames, restarts of the board; oldest
-    first. `first`: index of the first tick that is new; one before it only says how things were."""
+def events(series: Columns, whiskers: Sequence[str]) -> list[Event]:
+    """What happened to a robot, by its ticks that are new: contacts, touches, faults, lost frames, restarts of the
+    board; oldest first."""
     time = series.time
     if not len(time):
         return []
-    found = [(index, "contact", "true contact") for index in touch_indices(time, contact)]
+    touched = () if series.contact is None else touch_indices(time, series.contact)
+    found = [(index, "contact", "true contact") for index in touched]
     for name in whiskers:
         pressed = series.flag(name, "pressed")
         found += [(index, "touch", f"{name.replace('_', ' ')} pressed") for index in _rises(pressed)]
@@ -283,12 +283,13 @@ def events(series: Series, contact: Bools, whiskers: Sequence[str], *, first: in
         found.append((index, "lost", f"{lost} {'frame' if lost == 1 else 'frames'} of telemetry lost"))
     ticks = np.diff(series.raw["tick"].astype(np.uint32)).astype(np.int32)
     found += [(index + 1, "reset", "the board restarted") for index in np.flatnonzero(ticks < 0)]
-    return [(float(time[index]), kind, text) for index, kind, text in sorted(found) if index >= first]
+    return [(float(time[index]), kind, text) for index, kind, text in sorted(found) if index >= series.first]
 
 
-def pins(record: Record, robot: robots.RobotDescription, begin: float) -> dict[str, tuple[Floats, NDArray[np.uint8]]]:
-    """Output edges in a record by the name of the pin, on the run's clock, which begins at `begin` (s)."""
-    times, rows = record.times_of("pins"), record.table("pins", np.dtype([("pin", "u1"), ("level", "u1")]))
+def pins(block: Block, robot: robots.RobotDescription, begin: float) -> dict[str, tuple[Floats, NDArray[np.uint8]]]:
+    """Output edges of a record, rows of its stream "pins", by the name of the pin: on the run's clock, which begins at
+    `begin` (s)."""
+    times, rows = block.times, np.frombuffer(block.data, dtype=[("pin", "u1"), ("level", "u1")])
     devices: dict[int, list[str]] = {}
     for name, device in robot.device.items():
         for pin in device.pins().values() if device.on else ():

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from boebot.description.robots import Body
     from boebot.record.brain_record import BrainRecord
     from boebot.record.run import Run
-    from boebot.record.series import Floats, Pose
+    from boebot.record.truth import Floats, Pose
 
 SEGMENTS_MAXIMUM = 6000  # of a path as it is drawn
 SPOT_M = 0.03  # a shorter stretch would hardly be seen
@@ -50,10 +50,10 @@ def draw(result: Run) -> Sheet:
     axes = sheet.axes
     draw_arena(axes, view.plan)
     if record is None:
-        _draw_path(axes, view.path, result.overview.series.time)
+        _draw_path(axes, view.path, result.overview.columns.time)
     else:
         assert sheet.panel is not None
-        _draw_behaviors(axes, view.path, result.overview.series.time, record)
+        _draw_behaviors(axes, view.path, result.overview.columns.time, record)
         with rc_context({"text.parse_math": False}):
             utility_panel.draw(sheet.panel, record, result.run_time)
     if view.estimate is not None:

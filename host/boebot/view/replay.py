@@ -55,7 +55,7 @@ def run_data(result: Run, view: scene.View, number: int = 1, room: int | None = 
     cognitive = () if brain is None else shown_cognitive(brain)
     about = page_data.robot_data(
         result.robot,
-        result.overview.series,
+        result.overview.columns,
         number=number,
         title=f"{result.brain} on {result.robot.name} ({result.board})",
         brain=result.brain,
@@ -82,10 +82,9 @@ def stretch(result: Run, view: scene.View) -> page_data.Stretch:
     """The whole run."""
     few = result.overview
     return page_data.Stretch(
-        series=few.series,
+        series=few.columns,
         path=view.path,
         estimate=view.estimate,
-        contact=few.contact,
         start=view.pose(0) if view.known else (0.0, 0.0, 0.0),
         shown=few.shown,
         layers=view.layers,
@@ -93,6 +92,6 @@ def stretch(result: Run, view: scene.View) -> page_data.Stretch:
         swept=view.swept,
         true_contacts=view.true_contacts,
         touches=view.touches,
-        events=sorted(page_data.events(few.series, few.contact, result.whiskers) + _deeds(result), key=itemgetter(0)),
-        pins=page_data.pins(result.record, result.robot, result.clock_offset),
+        events=sorted(page_data.events(few.columns, result.whiskers) + _deeds(result), key=itemgetter(0)),
+        pins=page_data.pins(result.record.block("pins"), result.robot, result.clock_offset),
     )

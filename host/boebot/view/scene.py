@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan
-from boebot.record.series import Pose
+from boebot.record.truth import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from boebot.description.robots import RobotDescription
     from boebot.devices.drawing import Shape, Sweeps
+    from boebot.record.columns import Columns
     from boebot.record.run import Run
-    from boebot.record.series import Floats, Series
     from boebot.record.shown import Layer
+    from boebot.record.truth import Floats
     from boebot.showing import Sketch
 
 MARGIN = 0.03  # of the greater side
@@ -91,10 +92,10 @@ class View:
 def view(result: Run) -> View:
     """The run as the pictures show it."""
     few = result.overview
-    series = few.series
-    seen = few.odometry if few.true_pose is None else few.true_pose
+    series = few.columns
+    seen = series.odometry if series.true_pose is None else series.true_pose
     return View(
-        known=few.true_pose is not None,
+        known=series.true_pose is not None,
         path=Pose(*np.zeros((3, len(series)))) if seen is None else seen,
         estimate=few.placed_odometry,
         plan=result.plan if result.has_truth else FloorPlan(),
@@ -107,7 +108,7 @@ def view(result: Run) -> View:
     )
 
 
-def swept(series: Series, path: Pose) -> list[Swept]:
+def swept(series: Columns, path: Pose) -> list[Swept]:
     """The sweeps of each such sensor of a robot on that path, which has a pose for each tick."""
     found = []
     for sweeps in series.sweeps():

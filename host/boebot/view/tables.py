@@ -5,17 +5,18 @@ from __future__ import annotations
 import csv
 import heapq
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from boebot.record.brain_record import each_part, each_switch
-from boebot.record.parts import Part, parts
+from boebot.record.columns import Columns
+from boebot.record.columns import columns as pieces
+from boebot.record.record import KINDS
 from boebot.record.run_folder import FORMAT
+from boebot.record.shown import shown_in, shown_names
 
 if TYPE_CHECKING:
     from boebot.record.brain_record import BrainNames, BrainRecord
@@ -25,25 +26,20 @@ if TYPE_CHECKING:
 
 def columns(result: Run) -> dict[str, list[str]]:
     """The columns of run.csv: heading (unit in its name) -> cells; a cell is empty where nothing is known."""
-    contact = None
-    if result.true_pose is not None and result.truth is not None:
-        moment = np.searchsorted(result.truth.time, result.series.time + result.clock_offset)
-        contact = result.truth.contact[np.minimum(moment, len(result.truth.contact) - 1)]
-    return _columns(Part(result.record, 0, result.series, result.odometry, result.true_pose, contact, result.shown))
+    return _columns(result.series, shown_names(result.record))
 
 
-def _columns(part: Part) -> dict[str, list[str]]:
-    series, estimate, true = part.series, part.odometry, part.true_pose
-    kinds, left, right = zip(*series.commands, strict=True) if len(series) else ((), (), ())
+def _columns(part: Columns, names: Mapping[str, bool]) -> dict[str, list[str]]:
+    estimate, true = part.odometry, part.true_pose
     table: dict[str, list[str]] = {
-        "time_s": _cells(series.time, 4),
-        "tick": _cells(series.raw["tick"]),
-        **{name: _cells(values, digits) for name, (values, digits) in series.columns().items()},
-        "command": list(kinds),
-        "command_left": [f"{value:.4f}" for value in left],
-        "command_right": [f"{value:.4f}" for value in right],
+        "time_s": _cells(part.time, 4),
+        "tick": _cells(part.raw["tick"]),
+        **{name: _cells(values, digits) for name, (values, digits) in part.columns().items()},
+        "command": [KINDS[kind] for kind in part.command["kind"].tolist()],
+        "command_left": _cells(part.command["left"], 4),
+        "command_right": _cells(part.command["right"], 4),
     }
-    shown = part.shown.at(series.time)
+    shown = shown_in(part.showing.rows(), names).at(part.time)
     table |= {f"shown_{name}": _cells(values, 6) for name, values in shown.numbers.items()}
     table |= {f"shown_{name}": texts for name, texts in shown.texts.items()}
     if estimate is not None:
@@ -67,10 +63,9 @@ def write_run(result: Run, path: Path) -> None:
     """run.csv, part by part."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        if not result.ticks:
-            writer.writerow(columns(result))
-        for part in parts(result):
-            table = _columns(part)
+        names = shown_names(result.record)
+        for part in pieces(result):
+            table = _columns(part, names)
             if not part.first:
                 writer.writerow(table)
             writer.writerows(islice(zip(*table.values(), strict=True), part.first, None))

@@ -44,7 +44,8 @@ def ghost_path(trial: Straight) -> NDArray[np.float64]:
     assert estimate is not None
     if trial.result.layout is not None:  # the odometer's own: it has the factor
         return np.column_stack((estimate.x, estimate.y))
-    left, right = trial.result.telemetry.wheel_travel
+    assert trial.result.series.travel is not None
+    left, right = trial.result.series.travel
     left = FACTOR * left
     turn = (right - left) / trial.result.robot.body.track_width_m
     middle, step = np.cumsum(turn) - turn / 2, (left + right) / 2

@@ -22,8 +22,8 @@ import boebot
 from boebot.behaviors import Avoid
 from boebot.brain import Brain, MotorBehavior, Utility
 from boebot.cognition import near, wrapped
-from boebot.record.readings_series import ReadingsSeries
-from boebot.record.series import touch_indices
+from boebot.record.columns import VehicleColumns
+from boebot.record.truth import touch_indices
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.variants import narrow_arsim
@@ -132,11 +132,11 @@ def cross(brain: object, start: tuple[float, float], seed: int) -> Crossing:
 def _reaction(result: RunResult) -> float:
     """From the first reading that is near, and near for a period of the brain: noise lets it flicker at first."""
     series = result.series
-    assert isinstance(series, ReadingsSeries)
+    assert isinstance(series, VehicleColumns)
     nearness = np.maximum(series.values("infrared_left")[:, 0], series.values("infrared_right")[:, 0])
     ticks = round(PERIOD / result.tick)
     lasting = np.flatnonzero(np.lib.stride_tricks.sliding_window_view(nearness, ticks).min(axis=1) >= SEEN)
-    turns = np.array([left == -right != 0.0 for _, left, right in series.commands])
+    turns = np.array([left == -right != 0.0 for _, left, right in series.command.tolist()])
     after = np.flatnonzero(turns[lasting[0] :]) if len(lasting) else lasting
     return float(after[0] * result.tick) if len(after) else math.nan
 

@@ -294,7 +294,7 @@ def test_the_same_hands_give_the_same_bits(on: str, sessions: list[Any]) -> None
     assert first.error is None
     ours = streams(first)
     assert ours == streams(second) and ours != streams(alone)
-    assert len(ours["shifts"]) == 1 and len(track_of(first.record).lifts) == 3
+    assert len(ours["shifts"]) == 1 and len(track_of(first.record.block("truth")).lifts) == 3
     assert streams(alone)["shifts"] == []
 
 
@@ -319,7 +319,7 @@ def test_two_in_one_world(sessions: list[Any]) -> None:
     assert other.truth is not None and one.truth is not None
     assert poses[1].pose == (1.5, 0.9, 0.0) and poses[0].shapes == poses[1].shapes
     assert poses[0].shapes[1][:2] == pytest.approx((-1.0, 0.2))
-    assert len(track_of(one.record).lifts) == 0 and len(track_of(other.record).lifts) == 1
+    assert len(track_of(one.record.block("truth")).lifts) == 0 and len(track_of(other.record.block("truth")).lifts) == 1
     for each in (one, other):
         assert [shift.shape for shift in shifts(each.record)] == [1]
         assert each.plan.moving[1].pose(1.0)[1] == pytest.approx(0.2)
@@ -336,9 +336,9 @@ def test_what_is_made_of_a_run_with_lifts(on: str, sessions: list[Any], tmp_path
     assert result.true_distance == pytest.approx(counted[0], abs=0.02)
     assert result.truth is not None and np.isfinite(result.truth.x).all()
     assert (np.diff(result.truth.time) > 0).all()
-    assert result.overview.true_pose is not None
+    assert result.overview.columns.true_pose is not None
     poses = [(each.x, each.y, each.heading) for each in result.plan.moving]
-    path = result.overview.true_pose
+    path = result.overview.columns.true_pose
     assert all(np.isfinite(pose).all() for pose in [(path.x, path.y, path.heading), *poses])
     assert (out / "replay.html").exists() and (out / "run.png").exists()
     shape = result.plan.moving[0]

@@ -25,6 +25,7 @@ import boebot
 from boebot import cli
 from boebot.boards import BoardRequest, BoardSession, VehicleSession, open_board, open_vehicle
 from boebot.errors import BoebotError, BrainError
+from boebot.record.record import KINDS
 from boebot.result import RunResult, read_run
 from boebot.robot import Robot
 from boebot.running import runner
@@ -116,7 +117,7 @@ def complete(folder: Path) -> None:
     result = read_run(folder)
     assert isinstance(result, RunResult)
     assert result.record.times == pytest.approx([n / 100 for n in range(31)])
-    assert {kind for kind, *_ in result.series.commands[1:]} == {"signal"}
+    assert set(result.series.command["kind"][1:]) == {KINDS.index("signal")}
     assert (folder / "summary.json").exists()
 
 
