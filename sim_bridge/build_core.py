@@ -38,7 +38,6 @@ SOURCES = [
     "vehicles/*.c",
     "parts/*.c",
     "boards/board_access.c",
-    "boards/script_board.c",
     "boards/native/*.c",
     "loop/*.c",
 ]
@@ -63,7 +62,7 @@ def headers() -> list[str]:
             found[path.relative_to(ROOM).as_posix()] = None
 
     for path in sorted(ROOM.rglob("*.h")):
-        if not {"avr", "native"} & set(path.parts) or path.name == "native_board.h":
+        if not {"avr", "native", "tests"} & set(path.parts) or path.name == "native_board.h":
             visit(path)
     return list(found)
 

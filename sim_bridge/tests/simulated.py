@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+import subprocess
+import tempfile
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from cffi import FFI
 
 from boebot.arenas import Arena, ArenaDescription, Polygon, Start
 from boebot.description.robots import RobotDescription, Supply, load_robot
-from sim_bridge._core import ffi, lib
+from sim_bridge._core import ffi
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.pins import BoardPins
@@ -20,6 +25,21 @@ from sim_bridge.sim import Sim, SimRobot
 MS = CLOCK_HZ // 1000
 SUPPLY = Supply(7.75, 5.0, 7200.0, 0.6, 0.5, "regulated", 4.2)  # full, empty, A s, ohm, drop-out, servos, minimum
 US = CLOCK_HZ // 1_000_000
+
+
+def _scripts() -> Any:
+    """script_board.c, compiled; the tests may lie in a copy of the package below the checkout."""
+    here = Path(__file__).parent
+    core = next(folder / "sim_bridge" for folder in here.parents if (folder / "sim_bridge/boards/board.h").exists())
+    own = FFI()
+    own.cdef("".join(re.findall(r"python: begin \*/(.*?)/\* python: end", (here / "script_board.h").read_text(), re.S)))
+    with tempfile.NamedTemporaryFile(suffix=".so") as library:
+        command = ["cc", "-std=gnu11", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", f"-I{core}"]
+        subprocess.run([*command, "-o", library.name, str(here / "script_board.c")], check=True)
+        return own.dlopen(library.name)
+
+
+scripts = _scripts()
 
 
 def square(x: float, y: float, side: float) -> list[tuple[float, float]]:
@@ -65,7 +85,7 @@ class Scripted:
 
     def edge(self, cycle: int, pin: int, level: int) -> None:
         """The board will do `level` to `pin` at `cycle`; call in order of time."""
-        assert lib.script_board_edge(self.script, cycle, pin, level) == 0
+        assert scripts.script_board_edge(self.script, cycle, pin, level) == 0
 
     def pulses(self, seconds: float, widths: dict[int, float], start: float = 0.0) -> None:
         """Servo pulses of those widths (us) by pin every 20 ms."""
@@ -85,17 +105,17 @@ class Scripted:
 
     def inputs(self, pin: int) -> list[tuple[int, int]]:
         """(cycle, level) of the changes that were driven on a pin so far."""
-        count = lib.script_board_inputs(self.script, pin, ffi.NULL, ffi.NULL, 0)
+        count = scripts.script_board_inputs(self.script, pin, ffi.NULL, ffi.NULL, 0)
         cycles, levels = ffi.new("uint64_t[]", count + 1), ffi.new("uint8_t[]", count + 1)
-        lib.script_board_inputs(self.script, pin, cycles, levels, count)
+        scripts.script_board_inputs(self.script, pin, cycles, levels, count)
         return [(int(cycles[i]), int(levels[i])) for i in range(count) if i == 0 or levels[i] != levels[i - 1]]
 
 
 def script_board() -> tuple[Any, EmulatedBoard]:
     """A board that plays a script, and its place in a simulation."""
-    script = lib.script_board_new()
-    address = int(lib.script_board_address(script))
-    return script, EmulatedBoard(address, "script", lambda: lib.script_board_destroy(script))
+    script = scripts.script_board_new()
+    address = int(scripts.script_board_address(script))
+    return script, EmulatedBoard(address, "script", lambda: scripts.script_board_destroy(script))
 
 
 def scripted(

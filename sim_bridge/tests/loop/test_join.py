@@ -12,7 +12,7 @@ from boebot.arenas import Arena, ArenaDescription, Moving, Polygon, Waypoint
 from boebot.errors import ArenaError, BoardError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sim import NEVER, Sim
-from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, square
+from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, scripts, square
 
 LED, RECEIVER, PING, LEFT_WHISKER = 9, 10, 8, 5
 
@@ -100,12 +100,11 @@ def test_whisker_feels_the_other_robot() -> None:
 
 
 def test_each_robot_has_its_own_line() -> None:
-    from sim_bridge._core import lib
 
     sim = sim_of()
     robots = [add_scripted(sim, pose=(0.5 * i, 0, 0)) for i in range(2)]
-    lib.script_board_byte(robots[0].script, 5 * MS, 10)
-    lib.script_board_byte(robots[1].script, 9 * MS, 20)
+    scripts.script_board_byte(robots[0].script, 5 * MS, 10)
+    scripts.script_board_byte(robots[1].script, 9 * MS, 20)
     robots[1].robot.listen(1)
     sim.run_until(CLOCK_HZ)  # the first one's byte does not end it
     assert 9 * MS < sim.cycle < 10 * MS
@@ -114,11 +113,10 @@ def test_each_robot_has_its_own_line() -> None:
 
 
 def test_bytes_end_a_run_of_listeners_only() -> None:
-    from sim_bridge._core import lib
 
     sim = sim_of()
     robots = [add_scripted(sim, pose=(0.5 * i, 0, 0)) for i in range(2)]
-    lib.script_board_byte(robots[1].script, 5 * MS, 20)
+    scripts.script_board_byte(robots[1].script, 5 * MS, 20)
     for robot in robots:
         robot.robot.listen(1)
     sim.run_until(CLOCK_HZ)
@@ -129,13 +127,12 @@ def test_bytes_end_a_run_of_listeners_only() -> None:
 
 def test_when_a_robot_is_heard_does_not_depend_on_the_cuts_of_others() -> None:
     """A byte at 5 ms is heard at the first look after two idle byte times (40 us), wherever the run is cut."""
-    from sim_bridge._core import lib
 
     heard = set()
     for cut in (0, 4001, 80_333, 80_640, 81_999):
         sim = sim_of()
         robots = [add_scripted(sim, pose=(0.5 * i, 0, 0)) for i in range(2)]
-        lib.script_board_byte(robots[0].script, 5 * MS, 10)
+        scripts.script_board_byte(robots[0].script, 5 * MS, 10)
         robots[0].robot.listen(1)
         robots[1].robot.listen(NEVER)
         if cut:
@@ -149,11 +146,10 @@ def test_when_a_robot_is_heard_does_not_depend_on_the_cuts_of_others() -> None:
 
 
 def test_crash_names_the_board() -> None:
-    from sim_bridge._core import lib
 
     sim = sim_of()
     robots = [add_scripted(sim, pose=(0.5 * i, 0, 0), number=4 * i) for i in range(2)]
-    lib.script_board_crash(robots[1].script)
+    scripts.script_board_crash(robots[1].script)
     with pytest.raises(BoardError, match="of robot 5 crashed"):
         sim.run(CLOCK_HZ)
 

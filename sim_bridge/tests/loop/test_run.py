@@ -19,7 +19,7 @@ from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.sessions.opening import alone
 from sim_bridge.sessions.with_board import SimTransport
 from sim_bridge.sim import Sim
-from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, scripted, square
+from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, scripted, scripts, square
 
 BYTE = 320  # cycles at 500,000 baud
 
@@ -27,7 +27,7 @@ BYTE = 320  # cycles at 500,000 baud
 def message(robot: Scripted, end: int, count: int = 10) -> None:
     """Bytes back to back, the last one's stop bit at `end`."""
     for i in range(count):
-        assert lib.script_board_byte(robot.script, end - (count - 1 - i) * BYTE, i) == 0
+        assert scripts.script_board_byte(robot.script, end - (count - 1 - i) * BYTE, i) == 0
 
 
 # ---- when it returns -------------------------------------------------------------------------------------
@@ -71,14 +71,14 @@ def test_bytes_reach_the_board() -> None:
     robot = scripted()
     SimTransport(robot.robot, "script").write(b"hello")
     buffer = ffi.new("uint8_t[]", 10)
-    assert lib.script_board_sent(robot.script, buffer, 10) == 5
+    assert scripts.script_board_sent(robot.script, buffer, 10) == 5
     assert ffi.buffer(buffer, 5)[:] == b"hello"
 
 
 def test_long_silence_of_the_reader_loses_nothing() -> None:
     robot = scripted()
     for i in range(200_000):
-        lib.script_board_byte(robot.script, i * BYTE, i & 0xFF)
+        scripts.script_board_byte(robot.script, i * BYTE, i & 0xFF)
     robot.run(4.1)
     assert robot.robot.receive() == bytes(i & 0xFF for i in range(200_000))
 
@@ -245,7 +245,7 @@ def test_pin_log_has_every_edge_in_order() -> None:
 def test_pin_log_keeps_the_newest_million() -> None:
     robot = scripted()
     for i in range(1_200_000):
-        lib.script_board_edge(robot.script, 10 * i, 4, i & 1)
+        scripts.script_board_edge(robot.script, 10 * i, 4, i & 1)
     robot.run(1.0)
     log = robot.pins.pin_log()
     assert len(log) == 1 << 20
@@ -330,13 +330,13 @@ def test_unknown_pins_and_levels_are_refused(pin: int, level: int) -> None:
 def test_crash_of_a_board_is_told() -> None:
     robot = scripted()
     robot.run(0.5)
-    lib.script_board_crash(robot.script)
+    scripts.script_board_crash(robot.script)
     with pytest.raises(BoardError, match=r"the script crashed at 0\.500 s: the script says so"):
         robot.run(0.1)
 
 
 def test_board_of_another_version_is_refused() -> None:
-    script = lib.script_board_new()
+    script = scripts.script_board_new()
     operations = ffi.new("uint32_t[64]")
     operations[0] = 99
     board = ffi.new("void *[8]")
@@ -345,4 +345,4 @@ def test_board_of_another_version_is_refused() -> None:
     with pytest.raises(BoardError, match="another version"):
         EmulatedBoard(int(ffi.cast("uintptr_t", board)), "old board", lambda: released.append(1))
     assert released
-    lib.script_board_destroy(script)
+    scripts.script_board_destroy(script)

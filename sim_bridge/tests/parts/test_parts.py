@@ -23,7 +23,7 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.devices import battery as battery_model
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
-from sim_bridge.tests.simulated import MS, SUPPLY, US, Scripted, arena_of, scripted, square
+from sim_bridge.tests.simulated import MS, SUPPLY, US, Scripted, arena_of, scripted, scripts, square
 
 LEFT, RIGHT = 13, 12
 ENCODERS = 16, 17
@@ -501,9 +501,9 @@ def test_voltage_at_the_analog_pin() -> None:
     robot = load_robot("shieldbot")
     with_battery = {**robot.device, "battery": BatteryDivider(pin="A0")}
     scene = scripted(robot=msgspec.structs.replace(robot, device=with_battery))
-    assert lib.script_board_volts(scene.script, 0) == pytest.approx((7.75 - 0.6 * 0.08) / 2, abs=1e-3)
-    assert lib.script_board_volts(scene.script, 1) == 0
-    assert lib.script_board_volts(scripted().script, 0) == 0
+    assert scripts.script_board_volts(scene.script, 0) == pytest.approx((7.75 - 0.6 * 0.08) / 2, abs=1e-3)
+    assert scripts.script_board_volts(scene.script, 1) == 0
+    assert scripts.script_board_volts(scripted().script, 0) == 0
 
 
 def test_charge_runs_out() -> None:
@@ -519,20 +519,20 @@ def test_charge_runs_out() -> None:
 def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
     robot = scripted()
     supply = 128  # BOARD_ANALOG_SUPPLY
-    assert lib.script_board_volts(robot.script, supply) == 5.0
+    assert scripts.script_board_volts(robot.script, supply) == 5.0
     parameters = battery_model.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 1.0
     assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
     robot.run(20.0)
     # an empty pack of 5.0 V, sagging under the board's 0.08 A, less the drop-out of 0.5 V
-    assert lib.script_board_volts(robot.script, supply) == pytest.approx(5.0 - 0.6 * 0.08 - 0.5)
+    assert scripts.script_board_volts(robot.script, supply) == pytest.approx(5.0 - 0.6 * 0.08 - 0.5)
     robot.pins.supply(3.9)
-    assert lib.script_board_volts(robot.script, supply) == pytest.approx(3.9)
+    assert scripts.script_board_volts(robot.script, supply) == pytest.approx(3.9)
     robot.run(0.1)
-    assert lib.script_board_volts(robot.script, supply) == pytest.approx(3.9)
+    assert scripts.script_board_volts(robot.script, supply) == pytest.approx(3.9)
     assert lib.sim_supply_voltage(robot.sim.handle, 0) == pytest.approx(3.9)
     robot.pins.supply(None)
-    assert lib.script_board_volts(robot.script, supply) == pytest.approx(4.452)
+    assert scripts.script_board_volts(robot.script, supply) == pytest.approx(4.452)
     with pytest.raises(BoardError):
         robot.pins.supply(-1.0)
 
@@ -550,7 +550,7 @@ def test_pins_of_no_part_are_left_alone() -> None:
     robot.run(0.05)
     driven = {pin for pin in range(20) if robot.inputs(pin)}
     assert driven == {*ENCODERS, *WHISKERS, 10, 3}
-    assert lib.script_board_inputs(robot.script, 99, ffi.NULL, ffi.NULL, 0) == 0
+    assert scripts.script_board_inputs(robot.script, 99, ffi.NULL, ffi.NULL, 0) == 0
 
 
 # ---- plugs -----------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from sim_bridge.devices import light as light_model
 from sim_bridge.devices.part import Part
 from sim_bridge.robots import imperfections
 from sim_bridge.robots.wiring import add_part
-from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
+from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, scripts, square
 
 LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8
 LIGHT_SENSOR = LightSensor(pin=LIGHT, position_m=(0.0, 0.0), heading_rad=0.0)
@@ -130,34 +130,34 @@ def test_voltage_falls_with_the_distance(distance: float) -> None:
     """V = 33.9 / (d + 4.74), d in cm, fitted to the curve of the data sheet (Sharp GP2D12)."""
     robot = sharp_before(distance)
     robot.run(0.1)
-    assert lib.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (100 * distance + 4.74), rel=1e-9)
-    assert lib.script_board_volts(robot.script, 1) == 0
+    assert scripts.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (100 * distance + 4.74), rel=1e-9)
+    assert scripts.script_board_volts(robot.script, 1) == 0
 
 
 def test_near_things_look_far() -> None:
     near, far = sharp_before(0.03), sharp_before(0.1)
     for robot in (near, far):
         robot.run(0.1)
-    assert lib.script_board_volts(near.script, 2) < 0.5 * lib.script_board_volts(far.script, 2)
+    assert scripts.script_board_volts(near.script, 2) < 0.5 * scripts.script_board_volts(far.script, 2)
 
 
 def test_a_new_value_every_38_ms_at_any_time_of_asking_and_7_6_ms_late() -> None:
     """The robot is put nearer at 50 ms: the measurement at 76.6 ms is the first that knows, out at 84.2 ms."""
     robot = sharp_before(0.8)
     robot.run(0.05)
-    before = lib.script_board_volts(robot.script, 2)
+    before = scripts.script_board_volts(robot.script, 2)
     robot.pins.place(0.4, 0, 0)
     seen = []
     for _ in range(60):
         robot.run(0.001)
-        seen.append((robot.sim.cycle / CLOCK_HZ, lib.script_board_volts(robot.script, 2)))
+        seen.append((robot.sim.cycle / CLOCK_HZ, scripts.script_board_volts(robot.script, 2)))
     change = next(time for time, volts in seen if volts != before)
     assert change == pytest.approx(2 * 0.0383 + 0.0076, abs=0.0011)
     silent = sharp_before(0.8)  # nobody asks until the end
     silent.run(0.05)
     silent.pins.place(0.4, 0, 0)
     silent.run(0.06)
-    assert lib.script_board_volts(silent.script, 2) == seen[-1][1]
+    assert scripts.script_board_volts(silent.script, 2) == seen[-1][1]
 
 
 # ---- turret ----------------------------------------------------------------------------------------------

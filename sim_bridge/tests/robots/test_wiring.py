@@ -19,11 +19,10 @@ from boebot.devices.encoder import SingleEncoder
 from boebot.devices.light import LightSensor
 from boebot.devices.turret import PositionServo
 from boebot.errors import ArenaError, BoardError
-from sim_bridge._core import lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim
-from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, square
+from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripts, square
 
 DEVICES: dict[str, robots.AnyDevice] = {
     "turret": PositionServo(pin=11, position_m=(0.045, 0.0)),
@@ -59,8 +58,8 @@ def test_each_device_sits_at_its_pins() -> None:
     assert lows[-1] - 501 * MS == pytest.approx(1500 * US, abs=2)
     assert robot.robot.tones()["frequency"] == pytest.approx([1000.0])
     ahead = 100 * (1.0 - 0.02) / math.cos(0.3)  # as it is mounted here
-    assert lib.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (ahead + 4.74))
-    assert lib.script_board_volts(robot.script, 0) == pytest.approx(robot.robot.pack_voltage / 2)
+    assert scripts.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (ahead + 4.74))
+    assert scripts.script_board_volts(robot.script, 0) == pytest.approx(robot.robot.pack_voltage / 2)
     assert {robot.inputs(pin)[0][1] for pin in (18, 19)} == {1}  # the compass board's pull-ups
 
 

@@ -4,7 +4,7 @@
 #ifndef SCRIPT_BOARD_H
 #define SCRIPT_BOARD_H
 
-#include "board.h"
+#include "boards/board.h"
 
 /* python: begin */
 typedef struct script_board script_board;
