@@ -11,8 +11,9 @@ import pytest
 from boebot.boards import BoardRequest, open_board
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.link import messages, task_times
+from boebot.link import messages
 from boebot.link.link import Link
+from boebot_timing.board import measure
 from hil_tests.minimal_host import TICK_S, MinimalHost, power_on
 from hil_tests.rig import CYCLES_PER_US
 from hil_tests.test_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted
@@ -149,22 +150,22 @@ def linked(url: str, image: str | None = None) -> Iterator[Link]:
 
 def test_the_link_keeps_what_was_told() -> None:
     for link in linked("avr"):
-        assert set(link.task_times.cycles.values()) == {None}, "not yet sent"
+        assert set(link.task_times.values()) == {None}, "not yet sent"
         shares: list[float] = []
-        times = task_times.measure(link, FRAME_S, shares.append)
-        assert times == link.task_times.cycles
+        times = measure(link, FRAME_S, shares.append)
+        assert times == link.task_times
         assert list(times) == [task.name.lower() for task in messages.Task]
         assert times.pop("line") == 0, "this image has no such task"
         assert all(10 < time < LONGEST for time in times.values()), times
         assert shares == sorted(shares) and 0 <= shares[0] < 0.1 and 0.9 < shares[-1] <= 1
         link.close()
         link.open()
-        assert set(link.task_times.cycles.values()) == {None}, "of this session"
+        assert set(link.task_times.values()) == {None}, "of this session"
 
 
 def test_the_native_board_takes_no_time_but_for_the_pulse_of_the_ping() -> None:
     for link in linked("native"):
-        times = task_times.measure(link, 0.1)
+        times = measure(link, 0.1)
         assert times.pop("ping") == 5 * CYCLES_PER_US
         assert set(times.values()) == {0}
 

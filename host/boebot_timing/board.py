@@ -4,16 +4,21 @@ image."""
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.cli import output
-from boebot.errors import TimingError
+from boebot.errors import BoardError, TimingError
+from boebot.link import messages
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
-    from boebot.link import messages
+    from boebot.link.link import Link
+
+_ROUND_PERIODS = 4 * (len(messages.Task) + 1)  # of telemetry: each task's time and the counters, a message in four
+_ROUNDS = 4  # in which each task's time came at least once, or something is wrong
+_LOOK_S = 0.05
 
 
 def maxima(
@@ -33,7 +38,6 @@ def maxima(
     from boebot.boards import BoardRequest
     from boebot.cli.board_link import board_link
     from boebot.image.elf import read_image
-    from boebot.link import task_times
 
     code = read_image(image).code
     request = BoardRequest(
@@ -43,11 +47,40 @@ def maxima(
         check_image(link.identity(), code, image.name, port)
         label = f"listening to {port}"
         with output.share_bars([label]) as watch:
-            found = task_times.measure(link, seconds, lambda share: watch({label: share}))
+            found = measure(link, seconds, lambda share: watch({label: share}))
     measured = {name: cycles for name, cycles in found.items() if cycles}
     if not measured:
         output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")
     return measured
+
+
+def measure(link: Link, seconds: float, progress: Callable[[float], object] = lambda _: None) -> dict[str, int]:
+    """Lets the board of a link work for a time; returns the longest times then, since the session was opened.
+    Telemetry and events that come meanwhile are dropped.
+
+    Args:
+        link: with an open session.
+        seconds: by the transport's clock. The board sends the times of one task after another, so that it takes up to
+            0.9 s longer, or more where the line is slow.
+        progress: called with the share of it that is over, 0 to 1.
+
+    Raises:
+        BoardError: the board has not sent all of them, in four times the time that it needs; or as `Link.poll`.
+    """
+    round_s = _ROUND_PERIODS * link.session.telemetry_s
+    begun = link.transport.now()
+    least, most = seconds + round_s, seconds + _ROUNDS * round_s
+    while (passed := link.transport.now() - begun) < least or (None in link.task_times.values() and passed < most):
+        progress(min(passed / least, 1.0))
+        link.poll(_LOOK_S)
+        link.events.fetch()
+    missing = [name for name, cycles in link.task_times.items() if cycles is None]
+    if missing:
+        raise BoardError(
+            f"the board at {link.transport.name} did not send the times of its tasks {', '.join(missing)} within "
+            f"{most:.1f} s; expected one task after another"
+        )
+    return {name: cycles for name, cycles in link.task_times.items() if cycles is not None}
 
 
 def check_image(identity: messages.Identity, code: bytes, name: str, port: str) -> None:

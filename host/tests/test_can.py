@@ -25,8 +25,7 @@ from boebot.can.transport import open_can
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
-from boebot.link.fields import text
-from boebot.link.frame import encode
+from boebot.link.frame import encode, text
 from boebot.link.link import Link
 from can_line import CanLine, Carry, after, drive
 from command import boebot

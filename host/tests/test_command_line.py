@@ -21,7 +21,7 @@ from boebot import cli
 from boebot.boards import BoardRequest, board_kinds
 from boebot.cli import board_link, run_table, teleop
 from boebot.cli import link as link_command
-from boebot.link import messages, mismatch
+from boebot.link import finding, messages
 from boebot.link.link import Link
 from boebot.result import RunResult, read_run
 from boebot.robot import Robot
@@ -266,7 +266,7 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         code == 0
         and out.startswith("boebot ")
-        and f"protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}" in out
+        and f"protocol {finding.version_name()}, schema {messages.SCHEMA_HASH:08x}" in out
     )
     code, out, _ = boebot(capsys, "--help")
     assert code == 0 and all(name in out for name in ("run", "serve", "info", "teleop", "new"))

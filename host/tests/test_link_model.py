@@ -14,10 +14,9 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from boebot.errors import BoardError
 from boebot.link import messages
+from boebot.link.delivery import Events, Request, Requests
 from boebot.link.errors import SessionLostError, TakenOverError
-from boebot.link.events import Events
 from boebot.link.link import Link
-from boebot.link.requests import Request, Requests
 from peer import QUEUE, InProcess, Peer, Protections, without
 
 VALUES = messages.PARAMETERS["wheel_radius"]

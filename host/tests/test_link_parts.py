@@ -11,19 +11,13 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link import messages
-from boebot.link.clock_sync import ClockSync, RoundTrips
+from boebot.link.clock import ClockSync, RoundTrips
 from boebot.link.counters import HostCounters
+from boebot.link.delivery import Events, MotorStop, Request, Requests, SlowDevices, TelemetryBuffer, retry_after
 from boebot.link.errors import SessionLostError, TakenOverError
-from boebot.link.events import Events
-from boebot.link.fields import reader, text
-from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
+from boebot.link.frame import NO_SESSION, SEED, Decoder, encode, reader, text
 from boebot.link.line import NEVER, Line
-from boebot.link.motor_stop import MotorStop
-from boebot.link.requests import Request, Requests
 from boebot.link.session import Session
-from boebot.link.slow_devices import SlowDevices
-from boebot.link.telemetry import TelemetryBuffer
-from boebot.link.times import LinkTimes
 
 TELEMETRY = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
 DEVICES = messages.DevicesTelemetry(*(0,) * len(messages.DevicesTelemetry._fields))
@@ -328,12 +322,10 @@ def test_too_many_waiting_requests_are_refused() -> None:
 
 
 def test_retry_time_follows_from_tick_line_and_round_trips() -> None:
-    times = LinkTimes()
-    assert times.retry_after(0.01, 2e-5, 0.0) == pytest.approx(0.012)
-    assert times.retry_after(0.01, 2e-5, 0.030) == pytest.approx(0.045)
-    assert times.retry_after(0.01, 2e-5, 5.0) == pytest.approx(0.108)
-    assert times.retry_after(0.01, 10 / 9600, 0.0) == pytest.approx(0.01 + 1000 / 9600)
-    assert LinkTimes(retry_s=0.2).retry_after(0.01, 2e-5, 5.0) == 0.2
+    assert retry_after(0.01, 2e-5, 0.0) == pytest.approx(0.012)
+    assert retry_after(0.01, 2e-5, 0.030) == pytest.approx(0.045)
+    assert retry_after(0.01, 2e-5, 5.0) == pytest.approx(0.108)
+    assert retry_after(0.01, 10 / 9600, 0.0) == pytest.approx(0.01 + 1000 / 9600)
 
 
 # ---- stop ------------------------------------------------------------------------------------------------------------
@@ -368,7 +360,7 @@ def test_session_begins_latched_so_that_a_stop_is_done() -> None:
 
 def clock_on(wire: Wire) -> ClockSync:
     """With an open session."""
-    clock = ClockSync(Line(wire), LinkTimes(), random.Random(1))
+    clock = ClockSync(Line(wire), random.Random(1))
     clock.session_opened(0.0)
     return clock
 

@@ -24,8 +24,8 @@ from boebot.description.board_parameters import adapted, parameters_of
 from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import BoebotError
 from boebot.files import regular
-from boebot.link import messages, mismatch
-from boebot.link.fields import text
+from boebot.link import finding, messages
+from boebot.link.frame import text
 from boebot.record.reading import CutError
 from boebot.record.record import Record
 from boebot.record.run import Run
@@ -242,8 +242,8 @@ def _chosen(path: Path, readers: dict[tuple[str, int], _LogReader], node: str | 
     reader = boards[node]
     hello = reader.hello
     assert hello is not None
-    if not mismatch.speaks_alike(hello):
-        raise mismatch.refusal(hello, str(path), _no_description)
+    if not finding.speaks_alike(hello):
+        raise finding.refusal(hello, str(path), _no_description)
     if reader.is_shared:
         raise BoebotError(f"{path} has two boards of node {node} on one bus; expected each to have another")
     if not reader.commands:

@@ -14,8 +14,7 @@ from collections.abc import Callable
 
 from boebot.can.frames import ALL_NODES, NODE_MASK, SET_POINTS, Assembler, CanFrame, FrameMaker, whole_tick
 from boebot.link import messages
-from boebot.link.fields import reader
-from boebot.link.frame import NO_SESSION, Decoder, encode
+from boebot.link.frame import NO_SESSION, Decoder, encode, reader
 
 _TICK = reader(messages.Telemetry, "tick")
 _HELLO_SESSION = reader(messages.Hello, "session")

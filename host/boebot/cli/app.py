@@ -109,10 +109,10 @@ def _version(wanted: bool) -> None:
     if wanted:
         import boebot
         from boebot.cli import output
-        from boebot.link import messages, mismatch
+        from boebot.link import finding, messages
 
         output.line(
-            f"boebot {boebot.__version__} (protocol {mismatch.version_name()}, schema {messages.SCHEMA_HASH:08x}, "
+            f"boebot {boebot.__version__} (protocol {finding.version_name()}, schema {messages.SCHEMA_HASH:08x}, "
             f"Python {sys.version.split()[0]})"
         )
         raise typer.Exit

@@ -24,8 +24,8 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import Checkup
 from boebot.devices.latest import Latest
 from boebot.errors import BoebotError
-from boebot.link import messages, mismatch, reset_cause
-from boebot.link.fields import text
+from boebot.link import finding, messages
+from boebot.link.frame import text
 from boebot.link.link import Link
 from boebot.link.ports import holder_of, remedy
 
@@ -83,7 +83,7 @@ def _checks(url: str | None, robot: RobotDescription) -> Iterator[Check]:
     Raises:
         BoebotError: there is no such board.
     """
-    yield Check("kit", f"boebot {boebot.__version__}, protocol {mismatch.version_name()}, Python {_python()}")
+    yield Check("kit", f"boebot {boebot.__version__}, protocol {finding.version_name()}, Python {_python()}")
     if url is None:
         ports = _ports()
         if len(ports) != 1:
@@ -155,10 +155,10 @@ def _firmware(link: Link, robot: RobotDescription) -> Iterator[Check]:
             "image", reads, f"{expected}, the kit's", "" if runs == ours else "if it is not meant, flash the kit's"
         )
     cause = hello.reset_cause
-    hint = "the firmware hung there: boebot link names the task" if reset_cause.by_watchdog(cause) else ""
+    hint = "the firmware hung there: boebot link names the task" if finding.by_watchdog(cause) else ""
     if cause == messages.ResetCause.BROWN_OUT:
         hint = "the supply was too low: charge or change the battery"
-    yield Check("last reset", reset_cause.in_words(cause), "power or external", hint)
+    yield Check("last reset", finding.reset_in_words(cause), "power or external", hint)
 
 
 def _running(link: Link, robot: RobotDescription) -> Iterator[Check]:

@@ -12,8 +12,8 @@ from boebot.cli import options, output
 from boebot.cli.board_link import board_link
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
-from boebot.link import messages, mismatch, reset_cause
-from boebot.link.fields import text
+from boebot.link import finding, messages
+from boebot.link.frame import text
 from boebot.link.link import Link
 
 
@@ -31,7 +31,7 @@ def info(
         values: dict[str, Any] = {
             "board": description,
             "robot": text(hello.robot),
-            "protocol_version": mismatch.version_name(hello.protocol_version),
+            "protocol_version": finding.version_name(hello.protocol_version),
             "schema": f"{hello.schema_hash:08x}",
             "firmware": text(identity.firmware_version),
             "compiler": text(identity.compiler),
@@ -42,7 +42,7 @@ def info(
             "telemetry_period_s": round(hello.telemetry_period / hello.tick_rate, 6),
             "session_time_out_s": hello.session_time_out / 1000,
             "boot_counter": hello.boot_counter,
-            "reset_cause": reset_cause.in_words(hello.reset_cause),
+            "reset_cause": finding.reset_in_words(hello.reset_cause),
             "parameters_saved": bool(hello.parameters_saved),
             "devices": [
                 device.name.lower() for device in messages.Devices if hello.devices & device and device.name is not None

@@ -11,8 +11,8 @@ from boebot.boards import BoardRequest
 from boebot.cli import options, output, quantity
 from boebot.cli.board_link import board_link
 from boebot.description.robots import load_robot
-from boebot.link import reset_cause
-from boebot.link.fields import text
+from boebot.link import finding
+from boebot.link.frame import text
 from boebot.link.link import Link
 from boebot.link.transport import BaudSelectable, OnBus, Transport
 
@@ -86,7 +86,7 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         **_bus(transport),
         "session": None if hello is None or not watched.session.is_open else f"{hello.session:06x}",
         "telemetry_period_s": None if hello is None else round(hello.telemetry_period / hello.tick_rate, 6),
-        "last_reset": None if hello is None else reset_cause.in_words(hello.reset_cause),
+        "last_reset": None if hello is None else finding.reset_in_words(hello.reset_cause),
         "session_time_out_s": None if hello is None else hello.session_time_out / 1000,
         "frame_rate_hz": round((watched.line.decoder.good - before.good) / passed_s, 1) if passed_s > 0 else None,
         "round_trip_p50_s": _rounded(trips.quantile(0.5)),
@@ -99,8 +99,7 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "host": watched.counters().as_dict(),
         "board_end": dict(watched.board_counters.values) if watched.board_counters.received else None,
         "task_longest_s": {
-            name: None if cycles is None else cycles / _CYCLES_PER_S
-            for name, cycles in watched.task_times.cycles.items()
+            name: None if cycles is None else cycles / _CYCLES_PER_S for name, cycles in watched.task_times.items()
         },
     }
 

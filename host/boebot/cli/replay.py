@@ -14,7 +14,7 @@ import typer
 from boebot.can.log import as_on_the_wire, is_log, read_log
 from boebot.cli import completion, ending, options, output, streams
 from boebot.errors import BoebotError
-from boebot.link.fields import reader
+from boebot.link.frame import reader
 from boebot.link.messages import Telemetry
 from boebot.record.reading import CutError
 from boebot.record.run import Run

@@ -9,6 +9,11 @@ No single wrong bit passes.
 
 from __future__ import annotations
 
+import re
+import struct
+from collections.abc import Callable
+from typing import Any
+
 from boebot.link import messages
 from boebot.link._codec import ffi, lib
 
@@ -125,3 +130,24 @@ class Decoder:
             messages.append((message_id, sequence, payloads[start:end]))
             start = end
         return messages
+
+
+def reader(message: type[messages.Message], *names: str) -> Callable[[bytes], tuple[Any, ...]]:
+    """A function that unpacks only these fields of a payload; it returns them in the message's order.
+
+    Raises:
+        ValueError: the message has no such field.
+    """
+    if missing := set(names) - set(message._fields):
+        raise ValueError(f"message {message.NAME} has no field {', '.join(sorted(missing))}")
+    codes = re.findall(r"\d*[a-zA-Z]", message.STRUCT.format)
+    wanted = (
+        code if name in names else f"{struct.calcsize('<' + code)}x"
+        for name, code in zip(message._fields, codes, strict=True)
+    )
+    return struct.Struct("<" + "".join(wanted)).unpack
+
+
+def text(field: bytes) -> str:
+    """A text field without its padding."""
+    return field.split(b"\0", 1)[0].decode("utf-8", errors="replace")

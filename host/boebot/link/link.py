@@ -15,21 +15,28 @@ import secrets
 from functools import partial
 
 from boebot.errors import BoardError
-from boebot.link import messages, reset_cause
-from boebot.link.clock_sync import ClockSync
+from boebot.link import finding, messages
+from boebot.link.clock import ClockSync
 from boebot.link.counters import BoardCounters, HostCounters
+from boebot.link.delivery import (
+    REQUEST_LIMIT_S,
+    STOP_LIMIT_S,
+    Events,
+    MotorStop,
+    Request,
+    RequestKind,
+    Requests,
+    SlowDevices,
+    StampedTelemetry,
+    TelemetryBuffer,
+    check,
+    retry_after,
+)
 from boebot.link.errors import LatchedAgainError
-from boebot.link.events import Events
-from boebot.link.fields import reader
+from boebot.link.frame import reader
 from boebot.link.line import AT_ONCE, NEVER, Append, Handlers, Line
-from boebot.link.motor_stop import MotorStop
 from boebot.link.parameter_requests import BoardParameters
-from boebot.link.requests import Request, RequestKind, Requests, check
 from boebot.link.session import Session
-from boebot.link.slow_devices import SlowDevices
-from boebot.link.task_times import TaskTimes
-from boebot.link.telemetry import StampedTelemetry, TelemetryBuffer
-from boebot.link.times import LinkTimes
 from boebot.link.transport import CountsOverruns, Transport
 
 _TIME_OUT = messages.PARAMETERS["session_time_out"]
@@ -39,6 +46,7 @@ _ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop this much before what w
 _STOP_BYTES = 20
 _FRAME_TICKS = 2  # of the servos: no pulse shows sooner
 
+_TASKS = tuple(task.name.lower() for task in messages.Task)
 _LATCH = reader(messages.Telemetry, "latch")
 _LATCHES = reader(messages.Telemetry, "latches")
 _SUPPLY = reader(messages.Telemetry, "supply")
@@ -49,12 +57,13 @@ class Link:
 
     Attributes:
         transport: where the board is.
-        times: time-outs.
         notices: sentences for the user; a program that shows them takes them out.
         line, session, clock, telemetry, devices, events, parameters: the parts.
         counts: what the host's end has counted; `counters` brings the frames' counts up to date.
         board_counters: what the board's end has counted.
-        task_times: the longest time of each task of the firmware.
+        task_times: the longest time of each task of the firmware in the session, in 1/16 us, interrupts on top
+            included; 65535: that or longer; 0: it took no time, as on the native board (where only the Ping's pulse
+            does); None: not yet known. The board sends one after another, all of them in 0.9 s where the line is fast.
         polled_s: when `poll_until` returned last, by the transport's clock.
     """
 
@@ -62,7 +71,6 @@ class Link:
         self,
         transport: Transport,
         record: Append | None = None,
-        times: LinkTimes | None = None,
         take_over: bool = False,
     ) -> None:
         """Nothing is sent yet: see `open`.
@@ -70,20 +78,18 @@ class Link:
         Args:
             transport: where the board is.
             record: gets all that crosses the wire, as `Line` says.
-            times: time-outs, if not the usual ones.
             take_over: take the board even if another host has it.
         """
         # in simulated time a run has to be the same each time; on a real line no session's seed may come again
         draw = random.Random(secrets.randbits(64) if transport.realtime else "link")
         self.transport = transport
-        self.times = times or LinkTimes()
         self.notices: list[str] = []
         self.board_counters = BoardCounters()
-        self.task_times = TaskTimes()
+        self.task_times: dict[str, int | None] = {}
         self.polled_s = 0.0
         self.counts = counts = HostCounters()
         self.line = line = Line(transport, record)
-        self.clock = ClockSync(line, self.times, draw)
+        self.clock = ClockSync(line, draw)
         self.session = Session(
             line,
             self._turn,
@@ -100,7 +106,7 @@ class Link:
         self._requests = Requests(line.send, counts, transport.name, self.session.restart)
         self.events = Events(line.send, counts, self.clock)
         self._stop = MotorStop(line.send, counts)
-        self.parameters = BoardParameters(line, self.session, self.times, self.request, self._turn)
+        self.parameters = BoardParameters(line, self.session, self.request, self._turn)
         self._now = line.now
         self._due = NEVER  # when something is to be sent next
         handshake: Handlers = self.session.handlers | {messages.Hello.ID: self._receive_hello}
@@ -110,7 +116,7 @@ class Link:
             messages.Event.ID: self.events.receive,
             messages.Stopped.ID: self._stop.receive,
             messages.Counters.ID: lambda payload, _: self.board_counters.add(messages.Counters.unpack(payload)),
-            messages.TaskTime.ID: self.task_times.receive,
+            messages.TaskTime.ID: self._receive_task_time,
             messages.ClockAnswer.ID: self.clock.receive,
             **{kind.ID: partial(self._receive_devices, kind) for kind in messages.DEVICE_MESSAGES},
         }
@@ -123,14 +129,14 @@ class Link:
         Finds the baud rate where the transport can change it. Returns at once if a session is open.
 
         Args:
-            limit_s: by the transport's clock; None: as `LinkTimes.open_limit_s` says.
+            limit_s: by the transport's clock; None: 2 s, or 4 s where opening the port resets the board.
 
         Raises:
             BoardError: nobody answers, or the board has gone.
             ProtocolError: something else speaks, or another version of this protocol.
         """
         if not self.session.is_open:
-            self.session.open(self.times.open_limit_s if limit_s is None else limit_s)
+            self.session.open(limit_s)
             self._report_thinning()
         assert self.session.hello is not None
         return self.session.hello
@@ -143,9 +149,7 @@ class Link:
 
     def identity(self) -> messages.Identity:
         """Which image runs on the board."""
-        return self.session.ask(
-            messages.Identify(), messages.Identity, "say which image it runs", self.times.request_limit_s
-        )
+        return self.session.ask(messages.Identify(), messages.Identity, "say which image it runs", REQUEST_LIMIT_S)
 
     def counters(self) -> HostCounters:
         """`counts`, with those of decoder and transport."""
@@ -222,21 +226,23 @@ class Link:
         self._stop.begin()
         self._service(self._now())
 
-    def stop_and_confirm(self, limit_s: float | None = None) -> bool:
+    def stop_and_confirm(self, limit_s: float = STOP_LIMIT_S) -> bool:
         """Stops the motors and waits until the board says so. A session that ends meanwhile latches them, too.
 
         Returns:
-            Whether it was confirmed within `limit_s` (None: `LinkTimes.stop_limit_s`).
+            Whether it was confirmed within `limit_s`.
         """
         self.stop()
-        end = self._now() + (self.times.stop_limit_s if limit_s is None else limit_s)
+        end = self._now() + limit_s
         while self._stop.pending and self._now() < end:
             self._turn(end)
         return not self._stop.pending
 
     # ---- requests ----------------------------------------------------------------------------------------------------
 
-    def request(self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None) -> messages.Answer:
+    def request(
+        self, kind: RequestKind, *arguments: int, what: str, limit_s: float = REQUEST_LIMIT_S
+    ) -> messages.Answer:
         """Asks the board once, for certain, and returns its answer.
 
         Args:
@@ -256,13 +262,13 @@ class Link:
         assert request.answer is not None
         return request.answer
 
-    def submit(self, kind: RequestKind, *arguments: int, what: str, limit_s: float | None = None) -> Request:
+    def submit(self, kind: RequestKind, *arguments: int, what: str, limit_s: float = REQUEST_LIMIT_S) -> Request:
         """As `request`, but does not wait: the answer comes while the program polls.
 
         Raises:
             BoardError: too many wait already.
         """
-        request = Request(kind, arguments, what, self.times.request_limit_s if limit_s is None else limit_s)
+        request = Request(kind, arguments, what, limit_s)
         self._requests.submit(request, self._now())
         self._due = AT_ONCE
         return request
@@ -278,7 +284,7 @@ class Link:
             LatchedAgainError: there has been another since.
             BoardError: refused while the supply is low; or as `request`.
         """
-        end = self._now() + self.times.request_limit_s
+        end = self._now() + REQUEST_LIMIT_S
         latest = self.telemetry.latest or self._fresh_telemetry(end)
         while True:
             answer = self.request(messages.Arm, *_LATCHES(latest), what="arm")
@@ -330,7 +336,7 @@ class Link:
         self._due = min(session.service(now), self._requests.service_waiting(now))
 
     def _retry_s(self) -> float:
-        return self.times.retry_after(self.session.tick_s, self.line.byte_s, self.clock.round_trips.longest())
+        return retry_after(self.session.tick_s, self.line.byte_s, self.clock.round_trips.longest())
 
     def _receive(self, wait_s: float, quiet_s: float) -> None:
         """Reads what arrived, and hands each message to its handler; without a session only the handshake's."""
@@ -353,7 +359,7 @@ class Link:
         self._requests.session_opened()
         self.events.session_opened()
         self._stop.session_opened()
-        self.task_times.session_opened()
+        self.task_times = dict.fromkeys(_TASKS)
         self._due = AT_ONCE
 
     def _session_ended(self) -> None:
@@ -378,8 +384,8 @@ class Link:
         has_started = self.telemetry.begin(payload, now, self.session.tick_s)
         if self.counts.board_resets != resets:
             self.board_counters.restarted()
-        if has_started and reset_cause.by_watchdog(hello.reset_cause):
-            cause = reset_cause.hang_in_words(hello.reset_cause)
+        if has_started and finding.by_watchdog(hello.reset_cause):
+            cause = finding.hang_in_words(hello.reset_cause)
             notice = f"the last reset of the board at {self.transport.name} was by {cause}"
             if notice not in self.notices:
                 self.notices.append(notice)
@@ -405,6 +411,11 @@ class Link:
         self._due = AT_ONCE  # the next may go
         if request.arguments[:1] == (_TIME_OUT.id,) and request.answer.status == messages.AnswerStatus.OK:
             self.session.time_out_s = request.answer.value * _TIME_OUT.scale
+
+    def _receive_task_time(self, payload: bytes, _: float) -> None:
+        task, longest = messages.TaskTime.unpack(payload)
+        if task < len(_TASKS):  # this kit knows it
+            self.task_times[_TASKS[task]] = longest
 
     def _report_thinning(self) -> None:
         """Where the line is slow the board sends telemetry less often than its parameter says."""

@@ -6,11 +6,10 @@ import math
 from collections.abc import Callable
 
 from boebot.errors import BoebotError, did_you_mean
-from boebot.link import messages, mismatch
+from boebot.link import finding, messages
+from boebot.link.delivery import REQUEST_LIMIT_S, SAVE_LIMIT_S, RequestKind, check
 from boebot.link.line import Line
-from boebot.link.requests import RequestKind, check
 from boebot.link.session import Session
-from boebot.link.times import LinkTimes
 
 _BUSY_AGAIN_S = 0.05  # while the EEPROM is being written
 
@@ -54,14 +53,12 @@ class BoardParameters:
         self,
         line: Line,
         session: Session,
-        times: LinkTimes,
         request: Callable[..., messages.Answer],
         wait: Callable[[float], None],
     ) -> None:
         """`request`: as `Link.request`; `wait`: as of `Session`."""
         self._line = line
         self._session = session
-        self._times = times
         self._request = request
         self._wait = wait
 
@@ -69,7 +66,7 @@ class BoardParameters:
     def names(self) -> list[str]:
         """Of the parameters that the board knows: those of its minor version."""
         assert self._session.hello is not None, "a session is open"
-        minor = mismatch.minor_of(self._session.hello)
+        minor = finding.minor_of(self._session.hello)
         return [name for name, spec in messages.PARAMETERS.items() if spec.since <= minor]
 
     def get(self, name: str) -> float:
@@ -91,19 +88,19 @@ class BoardParameters:
         Raises:
             BoardError: the supply is low, what was written does not read back; or as `Link.request`.
         """
-        self._change(messages.SaveParameters, what="save its parameters", limit_s=self._times.save_limit_s)
+        self._change(messages.SaveParameters, what="save its parameters", limit_s=SAVE_LIMIT_S)
 
     def reset(self) -> None:
         """All parameters to the image's defaults; those that are saved stay saved."""
         self._change(messages.ResetParameters, what="reset its parameters")
 
     def _change(
-        self, kind: RequestKind, *arguments: int, what: str, refused: str = "", limit_s: float | None = None
+        self, kind: RequestKind, *arguments: int, what: str, refused: str = "", limit_s: float = REQUEST_LIMIT_S
     ) -> messages.Answer:
         """As `Link.request`, but asks again while the board writes its EEPROM, and raises unless it agrees: `refused`
         says what the board does then, or else that it did not do `what`."""
         now = self._line.now
-        end = now() + self._times.save_limit_s
+        end = now() + SAVE_LIMIT_S
         while True:
             answer = self._request(kind, *arguments, what=what, limit_s=limit_s)
             if answer.status != messages.AnswerStatus.BUSY or now() >= end:

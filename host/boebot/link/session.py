@@ -17,8 +17,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from boebot.errors import BoardError, ProtocolError
-from boebot.link import finding, messages, mismatch
-from boebot.link.clock_sync import RoundTrips
+from boebot.link import finding, messages
+from boebot.link.clock import RoundTrips
 from boebot.link.counters import HostCounters
 from boebot.link.errors import TakenOverError
 from boebot.link.frame import SEED
@@ -237,7 +237,7 @@ class Session:
             TakenOverError: another host has taken the board.
         """
         hello = messages.Hello.unpack(payload)
-        if not mismatch.speaks_alike(hello):
+        if not finding.speaks_alike(hello):
             self.refused = hello
             return
         self._hello_s = now_s
@@ -317,7 +317,7 @@ class Session:
             self._open_due = NEVER
             if self.is_open:
                 self._end()
-            raise mismatch.refusal(hello, self._line.transport.name, lambda index: self._describe(hello, index))
+            raise finding.refusal(hello, self._line.transport.name, lambda index: self._describe(hello, index))
         finally:
             self._refusing = False
 

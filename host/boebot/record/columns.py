@@ -34,7 +34,7 @@ from boebot.showing import VALUES
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
     from boebot.devices.readings import Layout
-    from boebot.link.events import BoardEvent
+    from boebot.link.delivery import BoardEvent
     from boebot.record.run import Run
 
 TICKS = 20_000  # of a piece

@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.devices.readings import Readings
-from boebot.link.events import BoardEvent
+from boebot.link.delivery import BoardEvent
 from boebot.record.blocks import EMPTY, Block, Group, Row, Rows, chain, group_of, joined
 from boebot.record.keepers import InMemory, Keeper
 

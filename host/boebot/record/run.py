@@ -17,7 +17,7 @@ from boebot.description.robots import RobotDescription
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
 from boebot.errors import brief
-from boebot.link.fields import text
+from boebot.link.frame import text
 from boebot.link.messages import Identity
 from boebot.record import hangs
 from boebot.record.brain_record import BrainNames, BrainRecord, read_brain

@@ -24,12 +24,11 @@ from boebot.description.board_parameters import configure
 from boebot.devices.latest import NO_MESSAGES, Latest
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError, ProtocolError
-from boebot.link import messages, reset_cause
+from boebot.link import finding, messages
+from boebot.link.delivery import StampedTelemetry as Received
 from boebot.link.errors import LatchedAgainError, SessionLostError
-from boebot.link.fields import reader, text
-from boebot.link.frame import FRAME_OVERHEAD
+from boebot.link.frame import FRAME_OVERHEAD, reader, text
 from boebot.link.link import Link
-from boebot.link.telemetry import StampedTelemetry as Received
 from boebot.link.transport import OnBus
 from boebot.record import hangs
 from boebot.result import RunResult
@@ -189,8 +188,8 @@ class BoardDriver:
     def _never_ready(self) -> BoardError:
         hello, where = self.link.session.hello, self.session.transport.name
         why = ""
-        if hello is not None and reset_cause.by_watchdog(hello.reset_cause):
-            why = f"; its last reset was by {reset_cause.hang_in_words(hello.reset_cause)}"
+        if hello is not None and finding.by_watchdog(hello.reset_cause):
+            why = f"; its last reset was by {finding.hang_in_words(hello.reset_cause)}"
         return BoardError(
             f"the board at {where} ended {_READY_TRIES} sessions in a row before it was configured and armed{why}"
         )

@@ -44,7 +44,7 @@ FORBIDDEN = (
     "boebot.link.link",
     "boebot.link.session",
     "boebot.link.transport",
-    "boebot.link.telemetry",
+    "boebot.link.delivery",
     "serial",
 )
 """Modules of the world, of what opens it, and of what holds a run's truth."""
