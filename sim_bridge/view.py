@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.patches import Circle, Patch, Polygon
+from matplotlib.patches import Patch, Polygon
 from matplotlib.transforms import Affine2D
 
 from boebot.arenas.floor_plan import floor_plan, moving_solids, poses_of
 from boebot.description.outlines import way_out
+from boebot.devices.drawing import circle
 from boebot.errors import BoebotError
 from boebot.view import style
-from boebot.view.arena_drawing import draw_arena, frame
-from boebot.view.notebook_figure import NotebookFigure
-from boebot.view.robot_drawing import body_patch
-from boebot.view.scene import plan_bounds
+from boebot.view.painter import draw_arena, frame
+from boebot.view.scene import moving_item, plan_bounds
+from boebot.view.sheet import NotebookFigure
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicle import Vehicle
 
@@ -44,11 +44,14 @@ class View:
         x, y, _ = vehicle.true_pose
         frame(self._axes, *plan_bounds(plan, [(x, y)]))
         self._solids = moving_solids(vehicle.arena)
-        self._moving = [self._add_moving(solid.kind == "disc") for solid in self._solids]
-        radius, outline = vehicle.model.body["radius"], vehicle.model.body.get("outline_m", ())
-        self._front = way_out(outline) if len(outline) else radius
-        self._body = body_patch(radius, outline, facecolor=BODY, alpha=0.85, zorder=8)
-        self._ghost = body_patch(radius, outline, fill=False, edgecolor=GHOST, ls="--", zorder=9)
+        look: dict[str, Any] = {"facecolor": style.MOVING, "edgecolor": style.EDGE, "lw": 1.2, "zorder": 4}
+        self._moving = [Polygon(((0, 0), (1, 0), (0, 1)), **look) for _ in self._solids]
+        for patch in self._moving:
+            self._axes.add_patch(patch)
+        outline = vehicle.model.body.get("outline_m", ()) or circle((0.0, 0.0), vehicle.model.body["radius"])
+        self._front = way_out(outline)
+        self._body = Polygon(outline, closed=True, facecolor=BODY, alpha=0.85, zorder=8)
+        self._ghost = Polygon(outline, closed=True, fill=False, edgecolor=GHOST, ls="--", zorder=9)
         self._axes.add_patch(self._body)
         self._axes.add_patch(self._ghost)
         self._ghost.set_visible(ghost and "odometer" in vehicle.model.names)
@@ -58,12 +61,6 @@ class View:
         self._rays.set_visible(rays)
         self._trail: list[tuple[float, float]] = []
         self.update()
-
-    def _add_moving(self, is_disc: bool) -> Patch:
-        look: dict[str, Any] = {"facecolor": style.MOVING, "edgecolor": style.EDGE, "lw": 1.2, "zorder": 4}
-        patch: Patch = Circle((0, 0), 1.0, **look) if is_disc else Polygon([(0, 0), (1, 0), (0, 1)], **look)
-        self._axes.add_patch(patch)
-        return patch
 
     def update(self) -> None:
         """Takes the vehicle, and what moves beside it, as they are now."""
@@ -78,11 +75,7 @@ class View:
             self._put(self._ghost, *self.vehicle["odometer"])
         movers = poses_of(self.vehicle.movers)
         for patch, shape, (at_x, at_y, cosine, sine) in zip(self._moving, self._solids, movers.tolist(), strict=True):
-            solid = shape.placed(at_x, at_y, math.atan2(sine, cosine))
-            if isinstance(patch, Circle):
-                patch.center, patch.radius = tuple(solid.points[0]), solid.radius
-            elif isinstance(patch, Polygon):
-                patch.set_xy(solid.points)
+            patch.set_xy(moving_item(shape.placed(at_x, at_y, math.atan2(sine, cosine))).points)
         self._axes.set_title(f"{self.vehicle.time:.2f} s", color=style.INK)
 
     def _put(self, patch: Patch, x: float, y: float, heading: float) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def floor(axes: Axes, plan: FloorPlan, *places: Floats) -> None:
     """Draws an arena, wide enough for its walls or, in the open, for those places (m, shape (n, 2))."""
     from boebot.view import scene
-    from boebot.view.arena_drawing import draw_arena, frame
+    from boebot.view.painter import draw_arena, frame
 
     if plan.outlines:
         low, high = scene.plan_bounds(plan, [])
@@ -34,7 +34,7 @@ def floor(axes: Axes, plan: FloorPlan, *places: Floats) -> None:
 def draw_paths(axes: Axes, trials: Sequence[Trial]) -> None:
     """All paths, each up to its first contact, which a cross marks; the robot stands where the first one begins."""
     from boebot.view import style
-    from boebot.view.robot_drawing import draw_robot
+    from boebot.view.painter import draw_robot
 
     floor(axes, trials[0].plan)
     for number, trial in enumerate(trials, 1):

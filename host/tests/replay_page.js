@@ -7,12 +7,20 @@ const palette = Object.fromEntries([.../:root \{(.*?)\}/.exec(page)[1].matchAll(
 
 let drawn = [];
 function canvasContext() {
-  let path = [];
+  let path = [], matrix = [1, 0, 0, 1, 0, 0];
+  const kept = [], place = (x, y) => { const [a, b, c, d, e, f] = matrix; return [a * x + c * y + e, b * x + d * y + f]; };
+  const times = (a, b, c, d, e, f) => { matrix = [...place(a, b).map((v, k) => v - matrix[4 + k]), ...place(c, d).map((v, k) => v - matrix[4 + k]), ...place(e, f)]; };
   const state = {
+    save() { kept.push(matrix); },
+    restore() { matrix = kept.pop(); },
+    setTransform(...given) { matrix = given; },
+    translate(x, y) { times(1, 0, 0, 1, x, y); },
+    scale(x, y) { times(x, 0, 0, y, 0, 0); },
+    rotate(angle) { const cos = Math.cos(angle), sin = Math.sin(angle); times(cos, sin, -sin, cos, 0, 0); },
     beginPath() { path = []; },
-    arc(x, y, radius) { path.push([x, y, radius]); },
-    moveTo(x, y) { path.push([x, y]); },
-    lineTo(x, y) { path.push([x, y]); },
+    arc(x, y, radius) { path.push([...place(x, y), radius]); },
+    moveTo(x, y) { path.push(place(x, y)); },
+    lineTo(x, y) { path.push(place(x, y)); },
     fill() { drawn.push({ fill: this.fillStyle, alpha: this.globalAlpha ?? 1, path }); },
     stroke() { if (path.length < 40) drawn.push({ stroke: this.strokeStyle, path }); },
     createImageData(width, height) { return { data: new Uint8ClampedArray(4 * width * height) }; },
@@ -32,15 +40,13 @@ function element() {
     insertCell() { const cell = element(); cells.push(cell); return cell; },
     querySelector(name) { return (it[name] ??= element()); },
     getContext() { return (it.context ??= canvasContext()); },
-    addEventListener() {}, setPointerCapture() {},
+    addEventListener() {}, setAttribute() {}, setPointerCapture() {},
   };
   return it;
 }
-const byId = {}, lamps = [...page.matchAll(/class="lamp" data-bit="(\d+)" data-device="(\w+)"/g)].map(([, bit, device]) => {
-  const lamp = element(); lamp.dataset = { bit, device, colour: "x" }; return lamp;
-});
+const byId = {};
 Object.assign(globalThis, {
-  document: { getElementById: id => (byId[id] ??= element()), createElement: element, querySelectorAll: () => lamps, documentElement: {} },
+  document: { getElementById: id => (byId[id] ??= element()), createElement: element, querySelectorAll: () => [], documentElement: {} },
   getComputedStyle: () => ({ getPropertyValue: name => palette[name] }), matchMedia: () => ({ addEventListener() {} }),
   ResizeObserver: class { observe() {} },
   location: { hash: "" }, addEventListener() {}, requestAnimationFrame() {}, devicePixelRatio: 1,
@@ -53,7 +59,7 @@ for (const time of process.argv.slice(3)) {
   const texts = Object.fromEntries(Object.entries(byId).map(([id, it]) => [id, it.textContent]));
   const readings = (byId.readings?.table?.children ?? []).map(row => row.cells.map(cell => cell.textContent));
   const hidden = Object.keys(byId).filter(id => byId[id].hidden);
-  const lit = lamps.filter(lamp => !lamp.hidden).map(lamp => [lamp.dataset.device, lamp.on]);
+  const lit = (byId.lamps?.children ?? []).map(lamp => [lamp.textContent, lamp.on]);
   const values = (byId.shownRows?.children ?? []).filter(row => row.children.length === 2).map(row => row.children.map(cell => cell.textContent));
   console.log(JSON.stringify({ texts, shown: values, readings, hidden, lamps: lit, still, drawn, scale: vm.runInThisContext("[scale, shiftX, shiftY]") }));
 }

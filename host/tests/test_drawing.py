@@ -28,8 +28,7 @@ from boebot.record import overview
 from boebot.result import RunResult
 from boebot.running import runner
 from boebot.view import picture, scene, style
-from boebot.view.arena_drawing import draw_arena, frame, ghost_times, legend_entries
-from boebot.view.robot_drawing import draw_robot
+from boebot.view.painter import draw_arena, draw_robot, frame, ghost_times, legend_entries, paint
 from peer import InProcess, Peer
 
 numbers = st.floats(-3, 3)
@@ -117,7 +116,7 @@ def test_words_say_what_cannot_be_seen() -> None:
 
 def test_legend_has_only_kinds_that_are_drawn() -> None:
     words = [str(entry.get_label()) for entry in legend_entries(PLAN)]
-    assert words == ["low: some sensors look over it", "throws back less", "moves, shown at the start", "lamp"]
+    assert words == ["throws back less", "low: some sensors look over it", "lamp", "moves, shown at the start"]
     assert legend_entries(FloorPlan(solids=[Solid(kind="outline", points=box(0, 0))])) == []
 
 
@@ -227,17 +226,16 @@ def test_robot_without_whiskers_or_ways_to_measure_says_nothing_of_them(monkeypa
 
 def test_pictures_show_the_sensors_that_are_on() -> None:
     shown = {
-        name: sorted((device, type(shape).__name__) for device, shape in scene.shapes(load_robot(name)))
-        for name in ("shieldbot", "shieldbot-basic", "boebot", "arsim")
+        name: set(scene.device_items(load_robot(name))) for name in ("shieldbot", "shieldbot-basic", "boebot", "arsim")
     }
-    pair = [("infrared_left", "Cone"), ("infrared_right", "Cone")]
-    lights = [("light_left", "Spot"), ("light_right", "Spot")]
-    whiskers = [("whisker_left", "Stroke"), ("whisker_right", "Stroke")]
-    assert shown["shieldbot"] == [*pair, ("ping", "Cone"), *whiskers]
-    assert shown["shieldbot-basic"] == [*pair, *lights, *whiskers]
-    turning = [("ping", "Cone"), ("turret", "Axis")]
-    assert shown["boebot"] == [("analog_infrared", "Ray"), *pair, *lights, *turning, *whiskers]
+    pair = {"infrared_left", "infrared_right"}
+    whiskers = {"whisker_left", "whisker_right"}
+    lights = {"light_left", "light_right"}
+    assert shown["shieldbot"] == {*pair, "ping", *whiskers}
+    assert shown["shieldbot-basic"] == {*pair, *lights, *whiskers}
+    assert shown["boebot"] == {"analog_infrared", *pair, *lights, "ping", "turret", *whiskers}
     assert shown["arsim"] == pair
+    assert scene.pivot(load_robot("boebot")) == (0.045, 0.0) and scene.pivot(load_robot("shieldbot")) is None
 
 
 OUTLINES = {"circle": [], "box": [(-0.08, -0.05), (0.06, -0.05), (0.06, 0.05), (-0.08, 0.05)]}
@@ -273,7 +271,7 @@ def test_the_ghost_is_drawn_as_the_body(monkeypatch: pytest.MonkeyPatch) -> None
     odometry = result.odometry
     assert odometry is not None
     axes = Figure().subplots()
-    picture._draw_ghost(axes, shaped(result.robot, OUTLINES["box"]).body, odometry)
+    paint(axes, scene.ghost_items(shaped(result.robot, OUTLINES["box"])), pose=odometry.at(-1))
     (ghost,) = axes.patches
     corners = (ghost.get_transform() - axes.transData).transform(ghost.get_path().vertices)
     end = odometry.at(-1)

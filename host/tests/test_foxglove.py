@@ -26,6 +26,7 @@ from mcap.reader import make_reader
 
 import boebot
 from boebot.arenas.floor_plan import floor_plan
+from boebot.devices.drawing import circle
 from boebot.record import columns
 from boebot.record.truth import Pose
 from boebot.result import RunResult, TogetherResult, robots_of
@@ -177,12 +178,10 @@ def test_scene_has_arena_movers_and_robot(tmp_path: Path) -> None:
     movers = [f"mover-{number}" for number in range(1, len(plan.moving) + 1)]
     assert time_s == 0 and list(entities) == ["arena", *movers, "robot", "odometry"] and movers
     assert all(entity.frame_locked for entity in scene.entities)
-    corners = [[(point.x, point.y) for point in line.points] for line in entities["arena"].lines]
+    corners = [[[point.x, point.y] for point in line.points] for line in entities["arena"].lines]
     for solid in plan.solids:
-        if solid.kind != "disc":
-            assert solid.points.tolist() in [[list(point) for point in line] for line in corners], solid.name
-    discs = [(one.pose.position.x, one.pose.position.y, one.size.x / 2) for one in entities["arena"].cylinders]
-    assert np.allclose(discs, [(*solid.points[0], solid.radius) for solid in plan.solids if solid.kind == "disc"])
+        disc = np.array(circle(solid.points[0].tolist(), solid.radius))
+        assert (disc if solid.kind == "disc" else solid.points).tolist() in corners, solid.name
     for mover, moving in zip(movers, plan.moving, strict=True):
         each = [
             (time, one)

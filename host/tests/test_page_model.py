@@ -35,7 +35,8 @@ def packed(values: list[float], form: str = "<f4") -> str:
     return base64.b64encode(np.array(values, form).tobytes()).decode()
 
 
-ABOUT = {"has_estimate": False, "readings": [], "swept": [], "mind": None, "robot": {"shapes": []}}
+LISTS = ("readings", "signs", "swept")
+ABOUT: dict[str, Any] = {name: [] for name in LISTS} | {"has_estimate": False, "mind": None, "robot": {"devices": []}}
 
 
 def rows(time: list[float], x: list[float] | None = None, **more: Any) -> dict[str, Any]:
@@ -47,7 +48,7 @@ def rows(time: list[float], x: list[float] | None = None, **more: Any) -> dict[s
         "path": [packed(time if x is None else x), none, none],
         "flags": packed([0] * len(time), "u1"),
         "shown": {"time": packed([]), "numbers": [], "texts": []},
-        **{name: [] for name in ("readings", "layers", "swept", "true_contacts", "touches", "events", "pins")},
+        **{name: [] for name in ("readings", "signs", "layers", "swept", "true_contacts", "touches", "events", "pins")},
         **dict.fromkeys(("estimate", "pulses", "load", "mind")),
     }
     return made | more

@@ -13,6 +13,7 @@ import pytest
 
 import boebot
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
+from boebot.devices.drawing import circle
 from boebot.result import RunResult
 from boebot.view import replay, scene, style, web_page
 
@@ -81,7 +82,7 @@ def test_everything_that_stands_is_filled_by_its_kind(shown: list[dict[str, Any]
     }.items():
         assert np.allclose(centres(shown[0], still, colour), places, atol=1e-3), colour
     words = {row["text"] for row in still if "text" in row}
-    assert {"grip 0.9", "grip 0.15", "charger", "4 cm high", "IR 10%, sound 20%", "m", "0.5", "−0.5"} <= words
+    assert {"grip 0.9", "grip 0.15", "charger", "4 cm high", "IR 10%", "sound 20%", "m", "0.5", "−0.5"} <= words
 
 
 def test_slow_devices_are_read_at_the_cursor(result: RunResult, shown: list[dict[str, Any]]) -> None:
@@ -102,12 +103,12 @@ def test_slow_devices_are_read_at_the_cursor(result: RunResult, shown: list[dict
 
 def test_page_hides_what_the_robot_has_not(shown: list[dict[str, Any]], tmp_path: Path) -> None:
     assert [device for device, _ in shown[0]["lamps"]] == [
-        "whisker_left", "whisker_right", "infrared_left", "infrared_right",
+        "whisker left", "whisker right", "infrared left", "infrared right",
     ]  # fmt: skip
     assert {"estimateRow", "errorRow"} <= set(shown[0]["hidden"]), "a boebot has no encoders"
     arsim = boebot.run(lambda robot: robot.drive(0.5, 0.5), robot="arsim", seconds=1)
     (moment,) = moments(arsim, tmp_path, 0.5)
-    assert [device for device, _ in moment["lamps"]] == ["infrared_left", "infrared_right"]
+    assert [device for device, _ in moment["lamps"]] == ["infrared left", "infrared right"]
     assert "pingRow" in moment["hidden"] and "estimateRow" not in moment["hidden"]
     assert [row[0] for row in moment["readings"]] == ["infrared left", "infrared right", "compass"]
     assert moment["texts"]["clock"] == "0.50 / 1.00 s"
@@ -134,8 +135,12 @@ def test_page_draws_the_body_as_what_meets_things(outline: list[list[float]], tm
     members = [boebot.Member(brain=lambda robot: None, robot=mine, pose=(x, 0.0, 0.0)) for x in (0.0, 1.0)]
     run = boebot.run_together(members, arena="empty", seconds=0.2)
     (moment,) = moments(run, tmp_path, 0.1)  # type: ignore[arg-type]
-    bodies = [row["path"] for row in moment["drawn"] if row.get("fill") == style.BODY]
-    assert bodies == [outline or [[0, 0, run.robots[0].robot.body.radius_m]]] * 2
+    scale, shift_x, shift_y = moment["scale"]
+    paths = [np.array(row["path"]) for row in moment["drawn"] if row.get("fill") == style.BODY]
+    bodies = [(path - (shift_x, shift_y)) / (scale, -scale) for path in paths]
+    edge = outline or circle((0.0, 0.0), run.robots[0].robot.body.radius_m)
+    places = sorted(bodies, key=lambda body: float(body[0, 0]))
+    assert np.allclose(places, [np.add(edge, (x, 0.0)) for x in (0.0, 1.0)], atol=1e-4)
 
 
 # ---- a brain of processes -----------------------------------------------------------------------------------------
@@ -248,9 +253,9 @@ def scanned(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
 
 
 def swept(moment: dict[str, Any]) -> list[np.ndarray]:
-    """The areas on the page, back in metres."""
+    """The areas on the page, back in metres; they lie below the robots."""
     scale, shift_x, shift_y = moment["scale"]
-    found = [row["path"] for row in moment["drawn"] if row.get("fill") == style.colour(1) and row["alpha"] == 0.1]
+    found = [row["path"] for row in moment["drawn"] if row.get("fill") == style.colour(1) and row["alpha"] == 0.1][:2]
     return [(np.array(path) - (shift_x, shift_y)) / (scale, -scale) for path in found]
 
 

@@ -23,7 +23,7 @@ from boebot.link import frame, messages
 from boebot.result import RunResult, read_run
 from boebot.running import board_driver as board
 from boebot.running import runner
-from boebot.view import page_data, picture, replay, scene, tables
+from boebot.view import picture, replay, scene, tables
 from peer import InProcess, Peer
 
 
@@ -175,7 +175,9 @@ def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
     assert len(time) == len(x) == len(flags) == result.record.ticks
     assert time[-1] == 30.0
     assert np.allclose(x, result.true_pose.x, atol=1e-6)  # type: ignore[union-attr]
-    assert np.array_equal(flags & page_data.LEFT_WHISKER != 0, result.series.flag("whisker_left", "pressed"))
+    signs = dict(zip([sign["device"] for sign in data["signs"]], data["rows"]["signs"], strict=True))
+    pressed = np.frombuffer(base64.b64decode(signs["whisker_left"]), np.uint8)
+    assert np.array_equal(pressed != 0, result.series.flag("whisker_left", "pressed"))
     assert len(data["rows"]["true_contacts"]) == 1 and data["known"]
 
 
@@ -206,7 +208,7 @@ def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pyt
     assert result.odometry_error is None
     content = content_of((tmp_path / "replay.html").read_text())
     data = content["runs"][0]
-    assert not data["known"] and not data["has_estimate"] and content["plan"]["solids"] == []
+    assert not data["known"] and not data["has_estimate"] and content["plan"]["items"] == []
     header = tables.columns(result)
     assert "odometry_x_m" in header and "true_x_m" not in header
 

@@ -21,7 +21,7 @@ from boebot.record.record import Record
 from boebot.record.shown import read_layers, read_shown
 from boebot.result import RunResult, read_run
 from boebot.showing import BYTES_AT_ONCE, BYTES_S, NAMES, SKETCH, SKETCH_EACH_S, UNKNOWN, Showing, Sketch
-from boebot.view import scene, sketch_drawing
+from boebot.view import painter, scene
 
 START = (1.0, -2.0, math.pi / 2)
 LINE = [(0.0, 0.0), (0.5, 0.25)]
@@ -105,7 +105,7 @@ def test_picture_draws_each_layer_in_its_frame(result: RunResult) -> None:
     axes = Figure().add_subplot()
     axes.set_xlim(-3, 3)
     axes.set_ylim(-4, 4)
-    sketch_drawing.draw_layers(axes, scene.view(result))
+    painter.draw_layers(axes, scene.view(result))
     (line, points), (grid,) = axes.lines, axes.images
     to_arena = line.get_transform() - axes.transData
     assert to_arena.transform(line.get_xydata()) == pytest.approx(np.array([(1.0, -2.0), (0.75, -1.5)]))
@@ -128,10 +128,17 @@ def test_page_shows_values_and_sketches(folder: Path) -> None:
         {"whole": "2", "even": "1", "early": "–", "word": "two"},
     ]
     for second, moment in zip((0, 2), moments, strict=True):
-        paths = [row["path"] for row in moment["drawn"] if row.get("stroke") == "#7b4fa3"]
-        assert paths == [[list(point) for point in LINE]]
-        dots = [row["path"] for row in moment["drawn"] if row.get("fill") == "#7b4fa3"]
-        assert dots[0][-1][:2] == [0.25, second]
+        scale, *shift = moment["scale"]
+        paths, dots = (
+            [
+                (np.array(row["path"])[:, :2] - shift) / (scale, -scale)
+                for row in moment["drawn"]
+                if row.get(how) == "#7b4fa3"
+            ]
+            for how in ("stroke", "fill")
+        )
+        assert np.allclose(paths, [[(1.0, -2.0), (0.75, -1.5)]]), "as in the picture"
+        assert np.allclose(dots[0][-1], (1.0 - second, -1.75))
     assert [row["image"] for row in moments[1]["drawn"] if "image" in row] == [[-1, 2, pytest.approx(0.3), 0.2]]
     assert not [row for row in moments[0]["drawn"] if "image" in row], "not yet"
 

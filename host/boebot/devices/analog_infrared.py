@@ -19,7 +19,7 @@ from typing import ClassVar, NamedTuple
 
 from boebot.devices.analog import READ_TICKS, voltage
 from boebot.devices.device import ANALOG_PINS, Checkup, Place, Point, Reader, SlowDevice
-from boebot.devices.drawing import Ray, Shape
+from boebot.devices.drawing import Item, ray
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import DevicesTelemetry
@@ -95,6 +95,6 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
 
         return read
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Its line of sight."""
-        return [Ray(self.position_m, self.heading_rad, RANGE_MAX_M)]
+        return [ray(self.position_m, self.heading_rad, RANGE_MAX_M)]

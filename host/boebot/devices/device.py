@@ -25,7 +25,7 @@ from boebot.devices.wiring import BREADBOARD, Wire
 from boebot.link.messages import DevicesTelemetry
 
 if TYPE_CHECKING:
-    from boebot.devices.drawing import Shape, Sweeps
+    from boebot.devices.drawing import Item, Sweeps
 
 LARGEST = 1e12  # of any number of a robot without a board: products of some of them stay finite
 Positive = Annotated[float, msgspec.Meta(gt=0, le=LARGEST)]
@@ -164,6 +164,8 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     """Field of the reading, unit and digits of its column in run.csv."""
     SHOWN: ClassVar[tuple[str, str, float, int] | None] = None
     """What pages show of it as a number: name of the column, unit, factor, digits."""
+    SIGN: ClassVar[tuple[str, str] | None] = None
+    """What pages show of it as a lamp and a lane: name of the column that is true or false, and its colour."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -218,8 +220,8 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
         ages = columns["age"].values if "age" in columns else run.ages(place.name)
         return Readout(place.name, unit, digits, columns[name].values * factor, ages)
 
-    def drawing(self) -> list[Shape]:
-        """What it looks like from above, in the robot's frame."""
+    def drawing(self, name: str) -> list[Item]:
+        """What it looks like from above, in the robot's frame; `name`: of the device."""
         return []
 
     def sweeps(self, place: Place, run: Run) -> Sweeps | None:

@@ -43,7 +43,7 @@ from boebot.devices.device import (
     Sensor,
     Share,
 )
-from boebot.devices.drawing import Cone, Shape
+from boebot.devices.drawing import Item, cone
 from boebot.devices.latest import NEVER, STALE_PERIODS, Latest
 from boebot.devices.readings import Readings
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
@@ -52,7 +52,8 @@ from boebot.link.messages import Infrared as Bits
 
 SWEEP_TICKS = 5  # of a whole sweep: one frequency in each
 _PERIOD_TICKS = 5  # where no schedule is given
-_SHADE = 0.22
+_SHADE, _LIT = 0.22, 0.5
+_SIGN = ("detected", "charger")
 
 
 class Infrared(NamedTuple):
@@ -83,6 +84,7 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
 
     READING: ClassVar = Infrared
     GROUP: ClassVar[str] = "infrared"
+    SIGN: ClassVar = _SIGN
     NAMES: ClassVar[tuple[str, ...]] = ("infrared_left", "infrared_right")
     PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
     WIRES: ClassVar[tuple[Wire, ...]] = (
@@ -155,9 +157,9 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
             return None
         return Readout(place.name, "of 5", 0, columns["zone"].values, columns["age"].values)
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Its beam."""
-        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_m, _SHADE)]
+        return _beam(self, name)
 
 
 class InfraredSchedule(Device, tag="infrared_schedule", frozen=True, kw_only=True):
@@ -198,6 +200,7 @@ class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=T
 
     READING: ClassVar = Infrared
     GROUP: ClassVar[str] = "infrared"
+    SIGN: ClassVar = _SIGN
     SHOWN: ClassVar = ("reading", "", 1.0, 2)
 
     def reader(self, place: Place) -> Reader:
@@ -215,6 +218,12 @@ class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=T
         values = run.values(place.name)[:, 0]
         return [Column("detected", "", values >= self.threshold, None), Column("reading", "", values, 5)]
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Its beam."""
-        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_m, _SHADE)]
+        return _beam(self, name)
+
+
+def _beam(sensor: InfraredPair | InfraredProximity, name: str) -> list[Item]:
+    """Faint, and in its colour while something is detected."""
+    seen = cone(sensor.position_m, sensor.heading_rad, sensor.beam_rad, sensor.range_m, _SHADE)
+    return [seen, seen._replace(fill=_SIGN[1], alpha=_LIT, when=name)]

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from boebot.devices.device import Angle, Column, NotNegative, Place, Point, Positive, Reader, Readout, Run, Sensor
-from boebot.devices.drawing import Cone, Shape, Sweeps
+from boebot.devices.drawing import Item, Sweeps, cone
 from boebot.devices.readings import Readings
 
 _SHADE = 0.06
@@ -73,9 +73,9 @@ class Laser(Sensor, tag="laser_range_finder", frozen=True, kw_only=True):
         shown = np.where(np.isfinite(nearest), nearest, np.nan)
         return Readout(place.name, "m", 2, shown, run.ages(place.name))
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """The fan of its rays."""
-        return [Cone(self.position_m, self.heading_rad, self.step_rad * (self.rays - 1), self.range_m, _SHADE)]
+        return [cone(self.position_m, self.heading_rad, self.step_rad * (self.rays - 1), self.range_m, _SHADE)]
 
     def sweeps(self, place: Place, run: Run) -> Sweeps:
         """Each of its scans."""

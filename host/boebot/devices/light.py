@@ -32,7 +32,7 @@ from boebot.devices.device import (
     Sensor,
     SlowDevice,
 )
-from boebot.devices.drawing import Shape, Spot
+from boebot.devices.drawing import Item, spot
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
 from boebot.devices.wiring import GROUND, Wire
@@ -104,9 +104,9 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
 
         return read
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Where it sits, and which way it looks."""
-        return [Spot(self.position_m, self.heading_rad)]
+        return spot(self.position_m, self.heading_rad)
 
 
 class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
@@ -133,6 +133,6 @@ class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
 
         return read
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Where it sits, and which way it looks."""
-        return [Spot(self.position_m, self.heading_rad)]
+        return spot(self.position_m, self.heading_rad)

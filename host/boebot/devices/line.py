@@ -19,7 +19,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import msgspec
 
 from boebot.devices.device import Checkup, NotNegative, Place, Point, Reader, Sensor, Share, SlowDevice
-from boebot.devices.drawing import Shape, Spot
+from boebot.devices.drawing import Item, spot
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.readings import Readings
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
@@ -88,9 +88,9 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
 
         return read
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Where it sits."""
-        return [Spot(self.position_m, None)]
+        return spot(self.position_m)
 
 
 class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=True):
@@ -116,6 +116,6 @@ class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=T
 
         return read
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Where it sits."""
-        return [Spot(self.position_m, None)]
+        return spot(self.position_m)

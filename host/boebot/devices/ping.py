@@ -42,7 +42,7 @@ from boebot.devices.device import (
     Run,
     Sensor,
 )
-from boebot.devices.drawing import Cone, Shape
+from boebot.devices.drawing import Item, arc, cone
 from boebot.devices.latest import NEVER, STALE_PERIODS
 from boebot.devices.readings import Readings
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
@@ -51,7 +51,7 @@ from boebot.link.messages import PingStatus, Telemetry
 TEMPERATURE_C = 20.0
 SPEED_OF_SOUND = 331.5 + 0.6 * TEMPERATURE_C  # m/s, in air
 METRES_PER_US = SPEED_OF_SOUND / 2 * 1e-6
-_SHADE = 0.10
+_SHADE, _ECHO = 0.10, 0.14
 
 
 class Ping(NamedTuple):
@@ -142,9 +142,12 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
             Column("status", "", run.raw["ping_status"], None),
         ]
 
-    def drawing(self) -> list[Shape]:
-        """Its beam."""
-        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE, turns=True)]
+    def drawing(self, name: str) -> list[Item]:
+        """Its beam, which turns with the turret; and as far as an echo comes from."""
+        seen = cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE)
+        there = [self.position_m, *arc(self.position_m, self.heading_rad, self.beam_rad, 1.0)]
+        echo = seen._replace(points=there, ink="robot", width=0.6, alpha=_ECHO, reach_by=name)
+        return [seen._replace(turns=True), echo._replace(turns=True)]
 
 
 class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
@@ -185,6 +188,6 @@ class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
         distance = run.values(place.name)[:, 0]
         return [Column("distance", "m", np.where(distance < self.range_max_m, distance, np.nan), 5)]
 
-    def drawing(self) -> list[Shape]:
+    def drawing(self, name: str) -> list[Item]:
         """Its beam."""
-        return [Cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE)]
+        return [cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE)]

@@ -22,7 +22,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import msgspec
 
 from boebot.devices.device import Checkup, Place, Point, Reader, SlowDevice
-from boebot.devices.drawing import Axis, Shape
+from boebot.devices.drawing import Item, spot
 from boebot.devices.latest import Latest, fresh_ticks
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.devices.wiring import SERVO_CABLE, Wire, servo_socket
@@ -111,6 +111,6 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
 
         return read
 
-    def drawing(self) -> list[Shape]:
-        """What turns on it, turns about its axis."""
-        return [Axis(self.position_m)]
+    def drawing(self, name: str) -> list[Item]:
+        """Its axis."""
+        return spot(self.position_m)

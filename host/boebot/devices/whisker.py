@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Final, NamedTuple
 
 from boebot.devices.device import Checkup, Column, Device, Place, Point, Reader, Run, VehicleDevice
-from boebot.devices.drawing import Shape, Stroke
+from boebot.devices.drawing import PARTS, Item
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import Whiskers
 
@@ -35,6 +35,7 @@ class Whisker(NamedTuple):
     """Whether the value may be trusted."""
 
 
+_SIGN = ("pressed", "touch")
 _PRESSED: Final = Whisker(True, 0.0, True)
 _FREE: Final = Whisker(False, 0.0, True)
 
@@ -48,6 +49,7 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
 
     READING: ClassVar = Whisker
     GROUP: ClassVar[str] = "whiskers"
+    SIGN: ClassVar = _SIGN
     NAMES: ClassVar[tuple[str, ...]] = ("whisker_left", "whisker_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     WIRES: ClassVar[tuple[Wire, ...]] = (
@@ -74,9 +76,9 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
         """Pressed or not."""
         return [Column("pressed", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
 
-    def drawing(self) -> list[Shape]:
-        """The wire."""
-        return [Stroke(self.root_m, self.tip_m)]
+    def drawing(self, name: str) -> list[Item]:
+        """See `Device`."""
+        return _wire(self, name)
 
 
 def _bit(place: Place) -> int:
@@ -91,6 +93,7 @@ class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True
 
     READING: ClassVar = Whisker
     GROUP: ClassVar[str] = "whiskers"
+    SIGN: ClassVar = _SIGN
 
     def fault(self) -> tuple[str, str] | None:
         """See `Device`."""
@@ -107,6 +110,12 @@ class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True
         """Pressed or not."""
         return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
 
-    def drawing(self) -> list[Shape]:
-        """The wire."""
-        return [Stroke(self.root_m, self.tip_m)]
+    def drawing(self, name: str) -> list[Item]:
+        """See `Device`."""
+        return _wire(self, name)
+
+
+def _wire(whisker: WhiskerSwitch | TouchWhisker, name: str) -> list[Item]:
+    """Thicker and in its colour while it is pressed."""
+    free = Item([whisker.root_m, whisker.tip_m], ink="ink", width=1.1, layer=PARTS)
+    return [free, free._replace(ink=_SIGN[1], width=3.0, when=name)]

@@ -178,6 +178,11 @@ class Columns(ABC):
         ]
         return [readout for readout in found if readout is not None]
 
+    def signs(self) -> list[tuple[str, str, Bools]]:
+        """Devices that are on or off, as pages show them: name, colour, and whether on at each tick."""
+        signs = [(device, self.robot.device[device].SIGN) for device in self._places]
+        return [(device, sign[1], self.flag(device, sign[0])) for device, sign in signs if sign is not None]
+
     def sweeps(self) -> list[Sweeps]:
         """The areas that devices measured, which pictures and pages show."""
         found = [self.robot.device[device].sweeps(place, self) for device, place in self._places.items()]

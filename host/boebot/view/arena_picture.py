@@ -11,7 +11,7 @@ from matplotlib.patches import Circle
 from boebot.arenas.floor_plan import floor_plan, path_end
 from boebot.errors import printable
 from boebot.view import figure_file, style
-from boebot.view.arena_drawing import draw_arena, frame
+from boebot.view.painter import draw_arena, frame
 from boebot.view.scene import plan_bounds
 
 if TYPE_CHECKING:

@@ -46,7 +46,7 @@ from boebot.record.columns import Columns, columns, events
 from boebot.record.shown import shown_names
 from boebot.record.truth import lateness, shifts
 from boebot.showing import SKETCH, VALUES, Sketch
-from boebot.view import foxglove_numbers, foxglove_scene, style
+from boebot.view import foxglove_numbers, foxglove_scene, scene, style
 
 if TYPE_CHECKING:
     from boebot.devices.device import Column
@@ -156,13 +156,15 @@ def _scene(results: Sequence[Run], prefixes: Sequence[str], colours: Sequence[st
     entities = []
     if results[0].has_truth:
         assert results[0].world is not None
-        entities.append(foxglove_scene.arena(results[0].plan, WORLD))
-        solids = moving_solids(results[0].world)
-        entities += [foxglove_scene.mover(solid, _mover(number)) for number, solid in enumerate(solids)]
+        entities.append(foxglove_scene.items(scene.arena_items(results[0].plan), "arena", WORLD))
+        for number, solid in enumerate(moving_solids(results[0].world)):
+            entities.append(foxglove_scene.items([scene.moving_item(solid)], _mover(number), _mover(number)))
     for result, prefix, colour in zip(results, prefixes, colours, strict=True):
-        entities.append(foxglove_scene.robot(result.robot, f"{prefix}robot", colour))
+        frame = f"{prefix}robot"
+        entities.append(foxglove_scene.items(scene.robot_items(result.robot), frame, frame, colour))
         if result.overview.columns.odometry is not None:
-            entities.append(foxglove_scene.ghost(result.robot, f"{prefix}odometry"))
+            frame = f"{prefix}odometry"
+            entities.append(foxglove_scene.items(scene.ghost_items(result.robot), frame, frame))
     yield _entry(0.0, "/scene", SceneUpdate(entities=entities))
     for result, prefix in zip(results, prefixes, strict=True):
         few, true = result.overview, result.overview.columns.true_pose

@@ -1,4 +1,4 @@
-"""Arena and robot as entities of Foxglove's 3D panel: what stands there, with its edges and upright sides (m, rad)."""
+"""Paints display lists as entities of Foxglove's 3D panel, with edges and upright sides (m, rad); and sketches."""
 
 from __future__ import annotations
 
@@ -14,79 +14,36 @@ from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 
-from boebot.devices.drawing import Stroke
+from boebot.devices.drawing import SIGHTS
 from boebot.showing import UNKNOWN
-from boebot.view import scene, sketch_drawing, style
+from boebot.view import painter, style
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from boebot.arenas.arena import Floats
-    from boebot.arenas.floor_plan import FloorPlan, Solid
-    from boebot.description.robots import RobotDescription
+    from boebot.devices.drawing import Item
     from boebot.showing import Sketch
 
-HIGH_M = 0.2  # what has no height is drawn this high
-BODY_M = 0.08  # height of a robot's body, as drawn: descriptions do not say it
 PAINT_M = 0.001  # above the floor
-LAMP_M = 0.04
-RIM_M = 0.012  # width of a wheel
 CROSS_M = 0.01  # half the arm of a cross at a point that a brain sketches
 EDGE_PX = 2.0
-CORNERS = 48  # of a circle's edge
 
 
-def arena(plan: FloorPlan, frame: str) -> SceneEntity:
-    """What stays in its place."""
-    entity = SceneEntity(id="arena", frame_id=frame, frame_locked=True)
-    for patch in plan.patches:
-        _add_edge(entity, patch.corners, PAINT_M, style.ROUGH if patch.grip > plan.grip else style.SMOOTH)
-    for line in plan.lines:
-        colour = style.PAINT_DARK if line.is_dark else style.GRID
-        _add_edge(entity, line.points, PAINT_M, colour, is_closed=False, width_m=line.width)
-    if (charger := plan.charger) is not None:
-        _add_edge(entity, _circle(np.array((charger.x_m, charger.y_m)), charger.radius_m), PAINT_M, style.CHARGER)
-    for lamp in plan.lamps:
-        place = pose(lamp.x_m, lamp.y_m, 0.0, height=lamp.height_m)
-        entity.spheres.add(pose=place, size=Vector3(x=LAMP_M, y=LAMP_M, z=LAMP_M), color=_colour(style.LAMP))
-    for solid in plan.solids:
-        _add_solid(entity, solid, style.DULL if solid.is_dull else style.SOLID)
-    return entity
-
-
-def mover(solid: Solid, frame: str) -> SceneEntity:
-    """A moving shape, in its own frame."""
-    entity = SceneEntity(id=frame, frame_id=frame, frame_locked=True)
-    _add_solid(entity, solid, style.MOVING)
-    return entity
-
-
-def robot(description: RobotDescription, frame: str, colour: str) -> SceneEntity:
-    """Body, wheels, whiskers and where the front is, in the robot's frame."""
-    body = description.body
-    entity = SceneEntity(id=frame, frame_id=frame, frame_locked=True)
-    outline = _outline(description)
-    if body.outline_m:
-        _add_sides(entity, outline, BODY_M, style.BODY, is_closed=True)
-    else:
-        size = Vector3(x=2 * body.radius_m, y=2 * body.radius_m, z=BODY_M)
-        place = pose(0.0, 0.0, 0.0, height=BODY_M / 2)
-        entity.cylinders.add(pose=place, size=size, bottom_scale=1.0, top_scale=1.0, color=_colour(style.BODY))
-    _add_edge(entity, outline, BODY_M, colour)
-    nose = np.array([(0.9, 0.0), (0.35, 0.32), (0.35, -0.32)]) * body.front_m
-    entity.triangles.add(pose=pose(0.0, 0.0, 0.0), points=_points(nose, BODY_M + PAINT_M), color=_colour(colour))
-    for side in (-1, 1):
-        place = pose(0.0, side * body.track_width_m / 2, 0.0, height=body.wheel_radius_m)
-        size = Vector3(x=2 * body.wheel_radius_m, y=RIM_M, z=2 * body.wheel_radius_m)
-        entity.cubes.add(pose=place, size=size, color=_colour(style.INK))
-    for _, shape in scene.shapes(description):
-        if isinstance(shape, Stroke):
-            _add_edge(entity, np.array((shape.begin, shape.end)), BODY_M / 2, style.INK, is_closed=False)
-    return entity
-
-
-def ghost(description: RobotDescription, frame: str) -> SceneEntity:
-    """Where the odometry thinks that the robot is: its edge."""
-    entity = SceneEntity(id=frame, frame_id=frame, frame_locked=True)
-    _add_edge(entity, _outline(description), BODY_M / 2, style.ESTIMATE)
+def items(display_list: Iterable[Item], name: str, frame: str, robot: str = style.END) -> SceneEntity:
+    """A display list in its frame, without signs and measurements; `robot`: colour of that. What has a height gets
+    upright sides; what sensors see and texts are left out."""
+    entity = SceneEntity(id=name, frame_id=frame, frame_locked=True)
+    for item in display_list:
+        if item.when or item.text or item.layer == SIGHTS:
+            continue
+        corners = np.array(item.points)
+        if item.height:
+            colour = style.paint(item.fill or "solid", robot)
+            _add_sides(entity, corners, item.height, colour, is_closed=item.closed)
+        ink = style.paint(item.ink or item.fill, robot)
+        for level in (0.0, item.height) if item.height else (PAINT_M,):
+            _add_edge(entity, corners, level, ink, is_closed=item.closed, width_m=item.wide_m)
     return entity
 
 
@@ -94,9 +51,9 @@ def sketch(drawn: Sketch, entity_id: str, frame: str, colour: str) -> SceneEntit
     """What a layer of a brain's sketches shows; cells of a grid as squares on the floor, free ones none."""
     entity = SceneEntity(id=entity_id, frame_id=frame, frame_locked=True)
     for line in drawn.lines:
-        _add_edge(entity, sketch_drawing.pairs(line), PAINT_M, colour, is_closed=False)
+        _add_edge(entity, painter.pairs(line), PAINT_M, colour, is_closed=False)
     if drawn.points:
-        points = sketch_drawing.pairs(drawn.points)
+        points = painter.pairs(drawn.points)
         arms = np.array(((-CROSS_M, 0.0), (CROSS_M, 0.0), (0.0, -CROSS_M), (0.0, CROSS_M)))
         crosses = (points[:, None] + arms).reshape(-1, 2)
         _add_edge(entity, crosses, PAINT_M, colour, kind=LinePrimitive.LINE_LIST)
@@ -105,7 +62,7 @@ def sketch(drawn: Sketch, entity_id: str, frame: str, colour: str) -> SceneEntit
         row, column = np.nonzero((cells > 0) & (cells != UNKNOWN))
         corner = np.column_stack((column, row))
         squares = (corner[:, None] + np.array(((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)))).reshape(-1, 2)
-        opacity = np.repeat(sketch_drawing.rgba(grid, colour)[row, column, 3], 6)
+        opacity = np.repeat(painter.rgba(grid, colour)[row, column, 3], 6)
         entity.triangles.add(
             pose=pose(grid.x, grid.y, 0.0),
             points=_points(squares * grid.cell, 0.0),
@@ -122,24 +79,6 @@ def pose(x: float, y: float, heading: float, *, height: float = 0.0) -> Pose:
 def rotation(heading: float) -> Quaternion:
     """About the upright axis."""
     return Quaternion(z=math.sin(heading / 2), w=math.cos(heading / 2))
-
-
-def _outline(description: RobotDescription) -> Floats:
-    body = description.body
-    return np.array(body.outline_m) if body.outline_m else _circle(np.zeros(2), body.radius_m)
-
-
-def _add_solid(entity: SceneEntity, solid: Solid, colour: str) -> None:
-    height = solid.height if math.isfinite(solid.height) else HIGH_M
-    if solid.kind == "disc":
-        (x, y), size = solid.points[0].tolist(), Vector3(x=2 * solid.radius, y=2 * solid.radius, z=height)
-        place = pose(x, y, 0.0, height=height / 2)
-        entity.cylinders.add(pose=place, size=size, bottom_scale=1.0, top_scale=1.0, color=_colour(colour))
-        return
-    is_closed = solid.kind != "wall"
-    _add_sides(entity, solid.points, height, colour, is_closed=is_closed)
-    for level in (0.0, height):
-        _add_edge(entity, solid.points, level, style.EDGE, is_closed=is_closed)
 
 
 def _add_sides(entity: SceneEntity, corners: Floats, height: float, colour: str, *, is_closed: bool) -> None:
@@ -175,11 +114,6 @@ def _add_edge(
 
 def _points(corners: Floats, height: float) -> list[Point3]:
     return [Point3(x=x, y=y, z=height) for x, y in corners.tolist()]
-
-
-def _circle(centre: Floats, radius: float) -> Floats:
-    angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
-    return np.asarray(centre + radius * np.column_stack((np.cos(angles), np.sin(angles))), dtype=np.float64)
 
 
 def _colour(name: str, opacity: float = 1.0) -> Color:

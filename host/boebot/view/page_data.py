@@ -3,20 +3,22 @@ and *rows*, what it did in some stretch of time (`rows_data`). A replay has the 
 sends a stretch of a few ticks many times a second, and the page appends them.
 
 format   number of the data's form, which page and data share
-plan     what stands in the arena (boebot.arenas.floor_plan); `moving`: the moving shapes in their own frames
+plan     display lists (boebot.devices.drawing) of what stands in the arena; `moving`: of the moving shapes in their own
+         frames
 bounds   of what there is to see, from where the page fits its view
 runs     one per robot: `robot_data`, with its `rows`
 moving   poses of the moving shapes, on the clock of the truth, which begins `begin` before a run's own
 live     null; or what can be done while the run goes on (boebot.live)
 
-Of rows: `flags` are the bits below; `shown` and `layers`: what the brain showed and sketched; `mind`: what a brain of
-processes did, or null; `events`: time, kind ("contact", "touch", "fault", "lost", "reset" or "intervention") and a
-text, to which the page adds the switches of `mind`; `pins`: output edges of a board's pins, where they were recorded
-(`time`: float64); `swept`: of each sensor with a fan of rays, of each sweep its time, the sensor's pose and the rays'
-distances, sweep after sweep (uint16: 65535 is `reach`, in m), of at most `RAYS_AT_MOST` rays.
+Of rows: `flags` are the bits below, `signs` which devices are on; `shown` and `layers`: what the brain showed and
+sketched; `mind`: what a brain of processes did, or null; `events`: time, kind ("contact", "touch", "fault", "lost",
+"reset" or "intervention") and a text, to which the page adds the switches of `mind`; `pins`: output edges of a board's
+pins, where they were recorded (`time`: float64); `swept`: of each sensor with a fan of rays, of each sweep its time,
+the sensor's pose and the rays' distances, sweep after sweep (uint16: 65535 is `reach`, in m), of at most
+`RAYS_AT_MOST` rays.
 
-Arrays are little-endian float32 in base64 (`flags`, `motor` and `level`: uint8), one entry per tick; those of `mind`
-one per step of the brain.
+Arrays are little-endian float32 in base64 (`flags`, `signs`, `motor` and `level`: uint8), one entry per tick; those of
+`mind` one per step of the brain.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ import numpy as np
 
 from boebot.description import robots
 from boebot.devices.device import pin_name
+from boebot.devices.drawing import Item
 from boebot.link.messages import Status
 from boebot.record.truth import touch_indices
 from boebot.view import scene, style
@@ -39,7 +42,7 @@ from boebot.view import scene, style
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from boebot.arenas.floor_plan import FloorPlan, Moving, Solid
+    from boebot.arenas.floor_plan import FloorPlan, Moving
     from boebot.devices.device import Readout
     from boebot.record.blocks import Block
     from boebot.record.brain_record import BrainNames, BrainRecord
@@ -47,14 +50,14 @@ if TYPE_CHECKING:
     from boebot.record.shown import Layer, Shown
     from boebot.record.truth import Bools, Floats, Pose
 
-FORMAT = 9
+FORMAT = 10
 RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
 WHOLE = 65535  # such a number for the whole reach
 EVENTS_AT_MOST = 2_000  # of a stretch
 EDGES_AT_MOST = 50_000  # of a pin in a stretch: its first ones
 
 # bits of the page's `flags` array
-LEFT_WHISKER, RIGHT_WHISKER, LEFT_IR, RIGHT_IR, CONTACT, DEAD_MAN, MOTORS_OFF, FALLBACK = (1 << bit for bit in range(8))
+CONTACT, DEAD_MAN, MOTORS_OFF, FALLBACK = (1 << bit for bit in range(4))
 
 FAULTS = {
     Status.DEAD_MAN: "motors stopped by the dead-man",
@@ -108,18 +111,16 @@ class Stretch:
 
 
 def plan_data(plan: FloorPlan) -> dict[str, Any]:
-    """The plan as the page has it (m, rad)."""
-    charger = plan.charger
+    """The plan as the page has it (m, rad): display lists, and for the pointer what has remarks."""
     return {
-        "solids": [_solid(solid) for solid in plan.solids],
-        "patches": [
-            {"points": _points(patch.corners), "grip": patch.grip, "rough": patch.grip > plan.grip}
-            for patch in plan.patches
+        "items": [_item(item) for item in scene.arena_items(plan)],
+        "outlines": [_points(outline.points) for outline in plan.outlines],
+        "remarks": [
+            {"points": _item(scene.solid_item(solid))["points"], "text": ", ".join(solid.remarks)}
+            for solid in plan.obstacles
+            if solid.remarks and solid.kind != "wall"
         ],
-        "lines": [{"points": _points(line.points), "width": line.width, "dark": line.is_dark} for line in plan.lines],
-        "lamps": [[lamp.x_m, lamp.y_m] for lamp in plan.lamps],
-        "charger": None if charger is None else [charger.x_m, charger.y_m, charger.radius_m],
-        "moving": [{"solid": _solid(moving.solid)} for moving in plan.moving],
+        "moving": [_item(scene.moving_item(moving.solid)) for moving in plan.moving],
     }
 
 
@@ -164,6 +165,7 @@ def robot_data(
         "cell": style.CELL,
         "has_estimate": has_estimate,
         "readings": [_reading(readout) for readout in series.readouts()],
+        "signs": [{"device": device, "colour": colour} for device, colour, _ in series.signs()],
         "mind": mind,
         "swept": [
             {"reach": sweeps.reach, "angles": _array(sweeps.angles[_rays(sweeps.angles)])} for sweeps in series.sweeps()
@@ -171,16 +173,11 @@ def robot_data(
     }
 
 
-def _solid(solid: Solid) -> dict[str, Any]:
-    return {
-        "kind": solid.kind,
-        "points": _points(solid.points),
-        "radius": solid.radius,
-        "low": solid.is_low,
-        "dull": solid.is_dull,
-        "remarks": ", ".join(solid.remarks),
-        "top": [float(value) for value in ((solid.box[0][0] + solid.box[1][0]) / 2, solid.box[1][1])],
-    }
+def _item(item: Item) -> dict[str, Any]:
+    """An item of a display list; what is usual is left out."""
+    usual = Item([])._asdict()
+    given = {name: value for name, value in item._asdict().items() if value != usual[name]}
+    return given | {"points": _points(np.array(item.points))}
 
 
 def _reading(readout: Readout) -> dict[str, Any]:
@@ -188,17 +185,13 @@ def _reading(readout: Readout) -> dict[str, Any]:
 
 
 def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
-    """What the page needs to draw the robot (m, rad): its body, and what it has."""
+    """What the page needs to draw the robot (m, rad)."""
     return {
         "radius": robot.body.radius_m,
-        "outline": _points(np.array(robot.body.outline_m).reshape(-1, 2)),  # none: the circle
-        "front": robot.body.front_m,
-        "track": robot.body.track_width_m,
-        "wheel": robot.body.wheel_radius_m,
-        "shapes": [
-            {"device": device, "form": type(shape).__name__.lower(), **shape._asdict()}
-            for device, shape in scene.shapes(robot)
-        ],
+        "items": [_item(item) for item in scene.robot_items(robot)],
+        "ghost": [_item(item) for item in scene.ghost_items(robot)],
+        "pivot": scene.pivot(robot),
+        "devices": [name for name, device in robot.device.items() if device.on],
     }
 
 
@@ -234,6 +227,7 @@ def rows_data(
         "pulses": None if any(np.isnan(each).all() for each in pulses) else [_array(each) for each in pulses],
         "ping": _array(np.nan_to_num(series.number("ping", "distance"), nan=-1.0)),
         "flags": _small(flags(series)),
+        "signs": [_small(values) for _, _, values in series.signs()],
         "readings": [{"values": _array(one.values), "ages": _array(one.ages)} for one in readouts],
         "shown": _shown(stretch.shown),
         "layers": [_layer(layer, stretch.start) for layer in stretch.layers],
@@ -251,11 +245,7 @@ def flags(series: Columns) -> NDArray[np.intp]:
     """The bits of each tick."""
     status, contact = series.status, np.False_ if series.contact is None else series.contact
     found: NDArray[np.intp] = (
-        series.flag("whisker_left", "pressed") * LEFT_WHISKER
-        | series.flag("whisker_right", "pressed") * RIGHT_WHISKER
-        | series.flag("infrared_left", "detected") * LEFT_IR
-        | series.flag("infrared_right", "detected") * RIGHT_IR
-        | contact * CONTACT
+        contact * CONTACT
         | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
         | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
         | ((status & int(Status.FALLBACK)) != 0) * FALLBACK

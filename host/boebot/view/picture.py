@@ -10,15 +10,12 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
-from matplotlib.transforms import Affine2D
 
 from boebot.errors import brief
 from boebot.record.figures import counted
 from boebot.view import scene, style, utility_panel
-from boebot.view.arena_drawing import draw_arena, legend_entries
-from boebot.view.robot_drawing import body_patch, draw_robot, draw_swept
+from boebot.view.painter import draw_arena, draw_layers, draw_robot, draw_swept, layer_entries, legend_entries, paint
 from boebot.view.sheet import Sheet
-from boebot.view.sketch_drawing import draw_layers, layer_entries
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from boebot.description.robots import Body
     from boebot.record.brain_record import BrainRecord
     from boebot.record.run import Run
     from boebot.record.truth import Floats, Pose
@@ -59,7 +55,7 @@ def draw(result: Run) -> Sheet:
     if view.estimate is not None:
         thin = slice(None, None, max(1, len(view.estimate.x) // SEGMENTS_MAXIMUM))  # each dash takes memory
         axes.plot(view.estimate.x[thin], view.estimate.y[thin], color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
-        _draw_ghost(axes, result.robot.body, view.estimate)
+        paint(axes, scene.ghost_items(result.robot), pose=view.estimate.at(-1))
     draw_layers(axes, view)
     draw_marks(axes, view)
     for index, colour in ((0, style.START), (-1, style.END)):
@@ -92,15 +88,6 @@ def _draw_behaviors(axes: Axes, path: Pose, time: Floats, record: BrainRecord) -
         axes.plot(x, y, color=colour, lw=2.4, solid_capstyle="round", zorder=7)
         if len(x) and np.hypot(np.ptp(x), np.ptp(y)) < SPOT_M:
             axes.plot(x[0], y[0], "o", ms=5.5, color=colour, mec=style.FLOOR, mew=0.6, zorder=8)
-
-
-def _draw_ghost(axes: Axes, body: Body, estimate: Pose) -> None:
-    """The odometric ghost: the robot where it believes to be at the end."""
-    x, y, heading = float(estimate.x[-1]), float(estimate.y[-1]), float(estimate.heading[-1])
-    on_axes = Affine2D().rotate(heading).translate(x, y) + axes.transData
-    look = {"facecolor": "none", "edgecolor": style.ESTIMATE, "lw": 1.1, "ls": (0, (3, 2)), "zorder": 8}
-    axes.add_patch(body_patch(body.radius_m, body.outline_m, transform=on_axes, **look))
-    axes.plot((0.0, body.front_m), (0.0, 0.0), color=style.ESTIMATE, lw=1.1, transform=on_axes, zorder=8)
 
 
 def draw_marks(axes: Axes, view: scene.View) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from typing import TYPE_CHECKING
 
@@ -11,19 +10,19 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from boebot.description.wiring import connections
-from boebot.devices.drawing import Axis, Cone, Ray, Shape, Spot, Stroke
 from boebot.errors import printable
 from boebot.view import figure_file, scene, style, wiring_drawing
-from boebot.view.arena_drawing import frame
-from boebot.view.robot_drawing import REACH_SHOWN_M, draw_robot
+from boebot.view.painter import draw_robot, frame
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from matplotlib.axes import Axes
 
     from boebot.arenas.arena import Floats
     from boebot.description.robots import RobotDescription
+    from boebot.devices.drawing import Item
 
 LEFT_IN, BELOW_IN, ABOVE_IN = 0.72, 0.55, 0.6  # around the field
 FIELD_IN, TALLEST_IN = 5.2, 4.2  # of the field: across, and at most upwards
@@ -44,7 +43,7 @@ def write(robot: RobotDescription, path: Path) -> Path:
     low, high = _bounds(robot)
     scale = min(FIELD_IN / (high - low)[0], TALLEST_IN / (high - low)[1])
     across, upwards = ((high - low) * scale).tolist()
-    room = max(upwards, NAME_ROW_IN * len({name for name, _ in scene.shapes(robot)}))  # for the field and the names
+    room = max(upwards, NAME_ROW_IN * len(scene.device_items(robot)))  # for the field and the names
     wiring = wiring_drawing.height(wires) if wires else 0.0
     tall = ABOVE_IN + room + BELOW_IN + wiring
     figure = Figure(figsize=(style.WIDTH_IN, tall), dpi=style.DPI, facecolor=style.PAPER)
@@ -74,55 +73,33 @@ def _bounds(robot: RobotDescription) -> tuple[Floats, Floats]:
     wheel = (body.wheel_radius_m, body.track_width_m / 2 + WHEEL_M)
     points = [*(body.outline_m or [(body.radius_m, body.radius_m)]), wheel]
     points += [(-x, -y) for x, y in points] if not body.outline_m else [(-wheel[0], -wheel[1])]
-    for _, shape in scene.shapes(robot):
-        points += _corners(shape)
+    points += [point for items in scene.device_items(robot).values() for item in _shown(items) for point in item.points]
     corners = np.array(points, dtype=np.float64)
     low, high = corners.min(axis=0), corners.max(axis=0)
     edge = MARGIN * float((high - low).max())
     return low - edge, high + edge
 
 
-def _corners(shape: Shape) -> list[tuple[float, float]]:
-    match shape:
-        case Cone():
-            half = shape.opening / 2
-            turns = np.linspace(shape.heading - half, shape.heading + half, 9).tolist()
-            return [_away(shape.position, turn, shape.reach) for turn in turns]
-        case Ray():
-            return [_away(shape.position, shape.heading, shape.reach)]
-        case Stroke():
-            return [shape.begin, shape.end]
-        case Spot() | Axis():
-            return [shape.position]
+def _shown(items: Sequence[Item]) -> list[Item]:
+    """Those that do not wait for a sign or a measurement."""
+    return [item for item in items if not item.when and not item.reach_by]
 
 
-def _away(start: tuple[float, float], heading: float, reach: float, share: float = 1.0) -> tuple[float, float]:
-    """A point that far from there, as far as a reach is drawn (m, rad)."""
-    shown = share * min(reach, REACH_SHOWN_M)
-    return start[0] + shown * math.cos(heading), start[1] + shown * math.sin(heading)
-
-
-def _named_place(shape: Shape) -> tuple[float, float]:
-    """Where the line to a shape's name begins."""
-    match shape:
-        case Cone():
-            return _away(shape.position, shape.heading, shape.reach, 0.85)
-        case Ray():
-            return _away(shape.position, shape.heading, shape.reach, 0.6)
-        case Stroke():
-            return shape.end
-        case Spot() | Axis():
-            return shape.position
+def _named_place(item: Item) -> tuple[float, float]:
+    """Where the line to its name begins: within what a sensor sees, at the end of a wire."""
+    (x, y), (end_x, end_y) = item.points[0], item.points[len(item.points) // 2]
+    share = 0.85 if item.closed else 0.6
+    return x + share * (end_x - x), y + share * (end_y - y)
 
 
 def _write_names(axes: Axes, robot: RobotDescription, scale: float, room: float) -> None:
     """Names right of the field, each with a line to its device, about as high as that; `scale`: inches per m; `room`:
     for the names, inches."""
-    named: dict[str, tuple[tuple[float, float], str]] = {}
-    for name, shape in scene.shapes(robot):
-        reach = shape.reach if isinstance(shape, Cone | Ray) else 0.0
-        named.setdefault(name, (_named_place(shape), f"{name}, up to {reach:g} m" if reach else name))
-    rows = sorted(named.values(), key=lambda row: -row[0][1])
+    named = []
+    for name, items in scene.device_items(robot).items():
+        first = _shown(items)[0]
+        named.append((_named_place(first), f"{name}, {first.says}" if first.says else name))
+    rows = sorted(named, key=lambda row: -row[0][1])
     step, right = NAME_ROW_IN / scale, axes.get_xlim()[1]
     x = right + NAME_IN / scale
     wanted = [place[1] for place, _ in rows]

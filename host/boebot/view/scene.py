@@ -1,21 +1,24 @@
-"""What the pictures of a run show: the arena, the paths, and where something was touched."""
+"""What pictures of a run show: the arena, the paths, where something was touched; and what arena and robots look like,
+as display lists (boebot.devices.drawing)."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.arenas.floor_plan import FloorPlan
+from boebot.arenas.floor_plan import FloorPlan, Solid
+from boebot.devices.drawing import BODY, PARTS, Item, circle
 from boebot.record.truth import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from boebot.description.robots import RobotDescription
-    from boebot.devices.drawing import Shape, Sweeps
+    from boebot.devices.drawing import Sweeps
     from boebot.record.columns import Columns
     from boebot.record.run import Run
     from boebot.record.shown import Layer
@@ -122,11 +125,6 @@ def swept(series: Columns, path: Pose) -> list[Swept]:
     return found
 
 
-def shapes(robot: RobotDescription) -> list[tuple[str, Shape]]:
-    """What the robot's devices look like, each with the device's name: those that are on."""
-    return [(name, shape) for name, device in robot.device.items() if device.on for shape in device.drawing()]
-
-
 def bounds(*views: View) -> tuple[Floats, Floats]:
     """Lower left and upper right corner of what there is to see, with a margin (m): the arena within its outlines; in
     an open field what the robots went through."""
@@ -164,3 +162,142 @@ def _stout(low: Floats, high: Floats) -> tuple[Floats, Floats]:
     size = high - low
     more = np.maximum(0.0, SLIMMEST * float(size.max()) - size) / 2
     return low - more, high + more
+
+
+# ---- display lists ---------------------------------------------------------------------------------------------------
+
+WHEEL_M = 0.012  # width of a wheel
+BODY_HEIGHT_M = 0.08  # as drawn: descriptions do not say it
+HIGH_M = 0.2  # what has no height is drawn this high
+LAMP_M = 0.05  # of a lamp's star
+ROOMY_SHARE = 0.09  # of the arena's width: what is as large has its label inside
+TOP_SHARE = 0.07  # what reaches higher within the outline has its label below
+WORDS = 5.5  # layer of labels: above the arena, below robots
+MOVES = 4.0  # layer of what moves
+
+
+def robot_items(robot: RobotDescription) -> list[Item]:
+    """The robot, from the lowest layer on: what its sensors see, body, wheels, front, devices that are on."""
+    body = robot.body
+    edge = body.outline_m or circle((0.0, 0.0), body.radius_m)
+    nose = [(share * body.front_m, side * body.front_m) for share, side in ((0.9, 0.0), (0.35, 0.32), (0.35, -0.32))]
+    whole = Item(edge, ink="robot", fill="body", closed=True, width=1.8, layer=BODY, height=BODY_HEIGHT_M)
+    front = Item(nose, fill="robot", closed=True, layer=PARTS + 1, height=BODY_HEIGHT_M)
+    touching = [
+        whole._replace(fill="", ink="contact", when="contact"),
+        front._replace(fill="contact", when="contact"),
+    ]
+    items = [whole, front, *touching]
+    wheel, half = body.wheel_radius_m, WHEEL_M / 2
+    for y in (-body.track_width_m / 2, body.track_width_m / 2):
+        corners = [(-wheel, y - half), (wheel, y - half), (wheel, y + half), (-wheel, y + half)]
+        items.append(Item(corners, fill="ink", closed=True, layer=PARTS, height=2 * wheel))
+    items += [item for one in device_items(robot).values() for item in one]
+    return sorted(items, key=_layer)
+
+
+def device_items(robot: RobotDescription) -> dict[str, list[Item]]:
+    """What the robot's devices look like, by their names: those that are on and can be seen."""
+    found = {name: device.drawing(name) for name, device in robot.device.items() if device.on}
+    return {name: items for name, items in found.items() if items}
+
+
+def pivot(robot: RobotDescription) -> tuple[float, float] | None:
+    """About where that turns which sits on the robot's turret."""
+    turret = robot.device.get("turret")
+    return getattr(turret, "position_m", None) if turret is not None and turret.on else None
+
+
+def ghost_items(robot: RobotDescription) -> list[Item]:
+    """The robot where it believes to be."""
+    body = robot.body
+    edge = body.outline_m or circle((0.0, 0.0), body.radius_m)
+    look: dict[str, Any] = {"ink": "estimate", "width": 1.1, "dashes": (3.0, 2.0), "layer": 8.0}
+    return [Item(edge, closed=True, **look), Item([(0.0, 0.0), (body.front_m, 0.0)], **look)]
+
+
+def arena_items(plan: FloorPlan) -> list[Item]:
+    """All that stands still in an arena, from the lowest layer on, and labels: what cannot be seen from above (grip, a
+    low height, reflectances) is written beside it."""
+    items = []
+    for outline in plan.outlines:
+        items.append(Item(outline.points.tolist(), fill="floor", closed=True, layer=0.2))
+        edge = Item(outline.points.tolist(), ink="edge", closed=True, width=2.8, layer=2.0, height=_height(outline))
+        items.append(edge._replace(dashes=(4.0, 1.5)) if outline.is_low else edge)
+    for patch in plan.patches:
+        corners = patch.corners.tolist()
+        colour = "rough" if patch.grip > plan.grip else "smooth"
+        items.append(Item(corners, ink="faint", fill=colour, closed=True, width=0.5, dashes=(1.0, 1.65), layer=0.6))
+        middle = ((patch.corners.min(axis=0) + patch.corners.max(axis=0)) / 2).tolist()
+        items.append(Item([middle], text=f"grip {patch.grip:g}", layer=WORDS))
+    for line in plan.lines:
+        colour = "paint-dark" if line.is_dark else "paint-bright"
+        items.append(Item(line.points.tolist(), ink=colour, wide_m=line.width, layer=0.65))
+    if (charger := plan.charger) is not None:
+        there = (charger.x_m, charger.y_m)
+        disc = circle(there, charger.radius_m)
+        items.append(Item(disc, ink="charger", fill="charger", closed=True, width=1.2, alpha=0.35, layer=0.7))
+        items.append(Item([(there[0], there[1] - charger.radius_m)], text="charger", side=-1, layer=WORDS))
+    for solid in plan.obstacles:
+        items.append(solid_item(solid))
+        items += _remarks(solid, plan)
+    for lamp in plan.lamps:
+        star = _star((lamp.x_m, lamp.y_m))
+        items.append(
+            Item(star, ink="edge", fill="lamp", closed=True, width=0.8, layer=4.5, height=lamp.height_m, says="lamp")
+        )
+    return sorted(items, key=_layer)
+
+
+def solid_item(solid: Solid) -> Item:
+    """What keeps robots out."""
+    if solid.kind == "wall":
+        look: dict[str, Any] = {"width": 1.4, "dashes": (3.0, 1.2)} if solid.is_low else {"width": 2.2}
+        ink = "dull" if solid.is_dull else "edge"
+        return Item(solid.points.tolist(), ink=ink, layer=3.0, height=_height(solid), **look)
+    points = circle(solid.points[0].tolist(), solid.radius) if solid.kind == "disc" else solid.points.tolist()
+    look = {"fill": "dull", "says": "throws back less"} if solid.is_dull else {"fill": "solid"}
+    if solid.is_low:
+        look = {"fill": "low", "hatch": True, "width": 0.9, "says": "low: some sensors look over it"}
+    return Item(points, ink="edge", closed=True, layer=3.0, height=_height(solid), **({"width": 1.3} | look))
+
+
+def moving_item(solid: Solid) -> Item:
+    """A shape that moves, in the frame that it is given in."""
+    return solid_item(solid)._replace(fill="moving", layer=MOVES, says="moves, shown at the start")
+
+
+def moving_remarks(plan: FloorPlan) -> list[Item]:
+    """Labels of the moving shapes, where they begin."""
+    return [item for moving in plan.moving for item in _remarks(moving.at(float(moving.time[0])), plan)]
+
+
+def _layer(item: Item) -> float:
+    return item.layer
+
+
+def _height(solid: Solid) -> float:
+    return solid.height if math.isfinite(solid.height) else HIGH_M
+
+
+def _star(centre: tuple[float, float]) -> list[tuple[float, float]]:
+    points = []
+    for corner in range(10):
+        radius, angle = (0.4 * LAMP_M if corner % 2 else LAMP_M), math.pi / 2 + corner * math.pi / 5
+        points.append((centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle)))
+    return points
+
+
+def _remarks(solid: Solid, plan: FloorPlan) -> list[Item]:
+    """Its label: inside it where there is room, else above it, and near the arena's upper edge below it."""
+    if not (said := solid.remarks):
+        return []
+    walls = [outline.box for outline in plan.outlines]
+    width = max((float(high[0] - low[0]) for low, high in walls), default=4.0)
+    top = max((high[1] - TOP_SHARE * (high[1] - low[1]) for low, high in walls), default=np.inf)
+    low, high = solid.box
+    x, y = ((low + high) / 2).tolist()
+    if not solid.is_low and (high - low).min() > ROOMY_SHARE * width:
+        return [Item([(x, y)], text="\n".join(said), layer=WORDS)]
+    side = -1 if high[1] > top else 1
+    return [Item([(x, float(low[1] if side < 0 else high[1]))], text=", ".join(said), side=side, layer=WORDS)]

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from boebot.view import style
-from boebot.view.arena_drawing import frame
-from boebot.view.notebook_figure import NotebookFigure
+from boebot.view.painter import frame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +31,19 @@ PANEL_IN, PANEL_BELOW_IN = 1.5, 0.5  # of the panel below the field, and for the
 ENTRY_IN, LETTER_IN = 0.5, 0.062  # of the legend: handle and gaps, one letter
 POINTS_AT_ONCE = 500  # of a line: the dashes of a long one at once take 100 MB
 PARTING = "   ·   "
+PIXELS_PER_INCH = 96  # of a page
+
+
+class NotebookFigure(Figure):
+    """A figure that a notebook shows where it is the last line of a cell. Those of pyplot are shown because pyplot asks
+    for it; the kit draws without pyplot."""
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """The figure as PNG, and how large a notebook shows it, in pixels."""
+        png = io.BytesIO()
+        self.savefig(png, format="png", dpi=self.dpi)
+        width, height = (round(PIXELS_PER_INCH * float(inches)) for inches in self.get_size_inches())
+        return png.getvalue(), {"width": width, "height": height}
 
 
 class Sheet:
@@ -106,7 +119,7 @@ class Sheet:
     @property
     def width(self) -> int:
         """Of the picture, in pixels of a page."""
-        return round(float(self.figure.get_figwidth()) * 96)
+        return round(float(self.figure.get_figwidth()) * PIXELS_PER_INCH)
 
     def save(self, path: Path) -> Path:
         """Writes it as PNG, with title and caption in its text."""

@@ -98,6 +98,13 @@ PLOTS: dict[Any, Any] = {
 """Settings of matplotlib for the figures of experiments, so that all look alike."""
 
 
+def paint(name: str, robot: str = END) -> str:
+    """The colour that an item of a display list names: of the palette above, "robot" for that one, or "#rrggbb"."""
+    if name.startswith("#"):
+        return name
+    return robot if name == "robot" else str(globals()[name.upper().replace("-", "_")])
+
+
 def colour(number: int) -> str:
     """Of the robot of that number, from 1."""
     return ROBOTS[(number - 1) % len(ROBOTS)]

@@ -10,11 +10,9 @@ from matplotlib.lines import Line2D
 from boebot.errors import brief
 from boebot.record.figures import counted
 from boebot.view import scene, style
-from boebot.view.arena_drawing import draw_arena, legend_entries
+from boebot.view.painter import draw_arena, draw_layers, draw_robot, draw_swept, legend_entries
 from boebot.view.picture import draw_marks
-from boebot.view.robot_drawing import draw_robot, draw_swept
 from boebot.view.sheet import Sheet
-from boebot.view.sketch_drawing import draw_layers
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from boebot.view import style
+from boebot.view.painter import quiet
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,14 +49,8 @@ def draw(axes: Axes, record: BrainRecord, end: float) -> None:
     axes.set_xlim(0.0, max(end, 1e-3))
     axes.set_ylim(LOW, HIGH)
     axes.set_yticks((sum(BAND) / 2, -1.0, -0.5, 0.0, 0.5, 1.0), ("active", "−1", "−0.5", "0", "0.5", "1"))
-    axes.set_xlabel("time (s)", color=style.INK, fontsize=9)
-    axes.set_ylabel("utility (1)", color=style.INK, fontsize=9)
-    axes.tick_params(labelsize=8.5, colors=style.FAINT, labelcolor=style.INK, length=3)
-    axes.grid(color=style.GRID, lw=0.7)
-    axes.set_axisbelow(True)
+    quiet(axes, "time (s)", "utility (1)")
     axes.set_facecolor(style.FLOOR)
-    for side in axes.spines.values():
-        side.set_visible(False)
     axes.legend(
         handles=_legend(record, end), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=LEGEND_COLUMNS, frameon=False,
         fontsize=8.5, labelcolor=style.INK, handletextpad=0.5, columnspacing=1.6, borderaxespad=0.1,

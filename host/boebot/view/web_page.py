@@ -15,43 +15,34 @@ SCRIPTS = (
     "base.js",  # elements, numbers, colours
     "model.js",  # a robot's run, which grows
     "camera.js",  # which part of the arena is seen
-    "arena.js",  # what stands and moves in the arena
-    "robot.js",  # robots, what their sensors see, their paths
-    "tracks.js",  # signals over time: which time, its axis, the cursor
-    "lanes.js",  # a lane for each signal
-    "panels.js",  # signals at a moment
-    "hover.js",  # values under the pointer
-    "time.js",  # the moment that is shown: playing, scrubbing
-    "main.js",  # puts them together and begins
-)
-LIVE_SCRIPTS = (
-    "live.js",  # the connection, and the newest moment
-    "controls.js",  # pause, speed, restart, parameters, what is told of the run
-    "drive.js",  # by hand
-    "drag.js",  # robots and shapes to other places
+    "arena.js",  # the painter; arena, robots, paths from above
+    "lanes.js",  # signals over time
+    "panels.js",  # signals at a moment, values under the pointer
+    "live.js",  # of a run that goes on: the connection, the newest moment, controls
+    "hand.js",  # driving it, moving what is in it
+    "time.js",  # the moment that is shown: playing, scrubbing; the beginning
 )
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 
 
 def replay(content: dict[str, Any]) -> str:
     """The page of a run that is over."""
-    return _joined(content, SCRIPTS, POLICY)
+    return _joined(content, POLICY)
 
 
 def live(server: str) -> str:
     """The page of a run that goes on, which asks for its data. `server`: as in ws://127.0.0.1:8080."""
-    scripts = (*SCRIPTS[:-1], *LIVE_SCRIPTS, SCRIPTS[-1])
-    return _joined(None, scripts, f"{POLICY}; connect-src 'self' {server}")
+    return _joined(None, f"{POLICY}; connect-src 'self' {server}")
 
 
-def _joined(content: dict[str, Any] | None, scripts: tuple[str, ...], policy: str) -> str:
+def _joined(content: dict[str, Any] | None, policy: str) -> str:
     """All of it; the data may hold any text."""
     data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     parts = {
         "POLICY": policy,
         "COLOURS": colours(),
         "STYLE": _read("style.css"),
-        "SCRIPT": "\n".join(map(_read, scripts)),
+        "SCRIPT": "\n".join(map(_read, SCRIPTS)),
         "DATA": data,
         "LAYERS": json.dumps(style.LAYERS),
     }
@@ -62,7 +53,7 @@ def _joined(content: dict[str, Any] | None, scripts: tuple[str, ...], policy: st
 
 def colours() -> str:
     """The palette as CSS variables; the page's scripts read these, too."""
-    light = {name: getattr(style, name.upper().replace("-", "_")) for name in style.DARK}
+    light = {name: style.paint(name) for name in style.DARK}
     dark = f"@media (prefers-color-scheme: dark) {{ :root {{ {_variables(style.DARK)} }} }}"
     return f":root {{ {_variables(light)} }}\n{dark}"
 

@@ -161,7 +161,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     from matplotlib.patches import Circle, Rectangle
 
     from boebot.view import style
-    from boebot.view.arena_drawing import HATCH, frame
+    from boebot.view.painter import HATCH, frame
 
     low, high = np.array(ROOM)
     frame(axes, low - 0.1, high + 0.1)
@@ -246,7 +246,7 @@ def _draw_scan(axes: Axes, angles: Floats, distances: Floats, *, faint: bool = F
     from matplotlib.patches import Circle, Polygon
 
     from boebot.view import style
-    from boebot.view.arena_drawing import frame
+    from boebot.view.painter import frame
 
     frame(axes, np.array((-2.1, -0.3)), np.array((2.1, 1.9)))
     corners = np.column_stack((-distances * np.sin(angles), distances * np.cos(angles)))

@@ -494,7 +494,7 @@ def _draw_grid(axes: Axes, plan: LineMap, lattice: Lattice, cells: Cells | None)
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Rectangle
 
-    from boebot.view.arena_drawing import frame
+    from boebot.view.painter import frame
 
     low, high = plan.bounds
     frame(axes, low, high)

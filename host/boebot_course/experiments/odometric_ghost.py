@@ -59,10 +59,8 @@ def error(trial: Straight) -> float:
 
 def _draw(figure: Figure, trials: Sequence[Straight]) -> None:
     """Ways of robots and ghosts from above, with robot and ghost where the first ones end."""
-    from matplotlib.transforms import Affine2D
-
-    from boebot.view import style
-    from boebot.view.robot_drawing import body_patch, draw_robot
+    from boebot.view import scene, style
+    from boebot.view.painter import draw_robot, paint
 
     axes = figure.subplots()
     first = trials[0]
@@ -77,12 +75,7 @@ def _draw(figure: Figure, trials: Sequence[Straight]) -> None:
         )  # fmt: skip
     draw_robot(axes, first.result.robot, first.start, style.START)
     draw_robot(axes, first.result.robot, first.end, style.END)
-    x, y, heading = ghost(first)
-    place = Affine2D().rotate(heading).translate(x, y) + axes.transData
-    body = first.result.robot.body
-    look = {"facecolor": "none", "edgecolor": style.ESTIMATE, "lw": 1.4, "ls": (0, (3, 2)), "zorder": 14}
-    axes.add_patch(body_patch(body.radius_m, body.outline_m, transform=place, **look))
-    axes.plot((0, body.front_m), (0, 0), color=style.ESTIMATE, lw=1.4, transform=place, zorder=14)
+    paint(axes, scene.ghost_items(first.result.robot), pose=ghost(first))
     axes.legend(fontsize="small", ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 

@@ -205,7 +205,7 @@ def _draw_goal(axes: Axes, behavior: FollowField) -> None:
 
 def _draw_way(axes: Axes, trial: Trial, number: int, line: str = "-", width: float = 1.6) -> None:
     from boebot.view import style
-    from boebot.view.robot_drawing import draw_robot
+    from boebot.view.painter import draw_robot
 
     axes.plot(*trial.path.T, line, color=style.colour(number), lw=width, zorder=6)
     draw_robot(axes, trial.result.robot, trial.start, style.colour(number))

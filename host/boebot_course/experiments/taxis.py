@@ -124,7 +124,7 @@ def _draw(figure: Figure, done: Sequence[Trial], times: Sequence[float], straigh
     from matplotlib.patches import Circle
 
     from boebot.view import style
-    from boebot.view.robot_drawing import draw_robot
+    from boebot.view.painter import draw_robot
 
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     floor(left, done[0].plan, np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))

@@ -245,7 +245,7 @@ def _avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
 def _draw_activity(axes: Axes, trial: Trial) -> None:
     """One path, with the behavior that drove."""
     from boebot.view import style
-    from boebot.view.robot_drawing import draw_robot
+    from boebot.view.painter import draw_robot
 
     floor(axes, trial.plan)
     avoids: NDArray[np.bool_] = trial.when_active("avoid")

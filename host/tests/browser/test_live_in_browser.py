@@ -279,7 +279,7 @@ def test_finger_drags_the_robot_on_a_phone(url: str, open_page: OpenPage) -> Non
     touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
     for step in range(1, 8):
         touch.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x, "y": y - 4 * step}]})
-    assert page.evaluate("hooks.dragging()") and page.evaluate("scrollY") == 0
+    assert page.evaluate("isDragging()") and page.evaluate("scrollY") == 0
     touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     wait_for(page, f"state.touched > {touched} || !$('notice').hidden")
 

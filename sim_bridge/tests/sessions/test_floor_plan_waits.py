@@ -175,7 +175,7 @@ def test_view_and_recorder_have_the_vehicles_own() -> None:
         log.append()
         if step % 50 == 0:
             view.update()
-            drawn = shapely.Polygon(view._moving[0].get_xy())  # type: ignore[attr-defined]
+            drawn = shapely.Polygon(view._moving[0].get_xy())
             body = shapely.Point(vehicle.true_pose[:2]).buffer(radius, 64)
             assert drawn.intersection(body).area < 1e-8
             (mover,) = vehicle.movers

@@ -1,27 +1,69 @@
-// The arena from above: what stands there (the canvas "floor", drawn when the view changes), what moves, what the brain
-// sketched and what lasers measured (the canvas "stage", drawn anew for each moment).
+// The arena from above. It paints display lists (boebot.devices.drawing), whatever they stand for, and what a run adds to
+// them. Canvas "floor": what stands there, drawn when the view changes; "trail": paths; "stage": all that is different at
+// another moment.
 
 const FONT = "system-ui, sans-serif";
 const font = (c, size) => {
   c.font = size * ratio + "px " + FONT;
 };
-// Adds it to the path; in metres.
-function line(c, points, closed = false) {
-  points.forEach(([x, y], i) => (i ? c.lineTo(X(x), Y(y)) : c.moveTo(X(x), Y(y))));
-  if (closed) c.closePath();
-}
-function polygon(c, points) {
-  c.beginPath();
-  line(c, points, true);
-}
-const outlines = () => plan.solids.filter(solid => solid.kind === "outline");
 
-// Fills the path with lines: low things.
-function hatch(c) {
-  const { width, height } = c.canvas ?? $("floor");
+// ---- the painter ----
+// From here on c draws in the frame of a pose: metres, x ahead, y left.
+function into(c, [x, y, heading]) {
+  c.translate(X(x), Y(y));
+  c.scale(scale, -scale);
+  c.rotate(heading);
+}
+const CONTACT_BIT = 1; // of the flags, see page_data.py
+const [DEAD_MAN, MOTORS_OFF, FALLBACK] = [2, 4, 8];
+const ofPoints = width => ((width * 4) / 3) * (ratio / scale); // a width in points, where c draws metres
+const colourOf = (name, own) => (name === "robot" ? own : (colours[name] ?? readable(name)));
+// One item, in the frame that c draws in. `own`: the colour of its robot; `one`, `i`: the robot and the tick whose signs
+// and measurements it shows; without them it is as without any.
+function paint(c, item, own, one, i) {
+  const reach = item.reach_by ? (one?.[item.reach_by]?.values[i] ?? 0) : 1;
+  if (!(reach > 0) || (item.when && !one?.isOn(item.when, i))) return;
+  const points = item.points,
+    [u, v] = points[0];
   c.save();
+  if (item.text) writeWords(c, item);
+  if (item.turns && one?.robot.pivot) {
+    const [x, y] = one.robot.pivot;
+    c.translate(x, y);
+    c.rotate(one.turret.values[i]);
+    c.translate(-x, -y);
+  }
+  c.beginPath();
+  for (const [x, y] of points) c.lineTo(u + reach * (x - u), v + reach * (y - v));
+  if (item.closed) c.closePath();
+  if (item.fill) {
+    c.fillStyle = colourOf(item.fill, own);
+    c.globalAlpha = item.alpha ?? 1;
+    c.fill();
+    c.globalAlpha = 1;
+  }
+  if (item.ink) {
+    c.strokeStyle = colourOf(item.ink, own);
+    c.lineWidth = item.wide_m || ofPoints(item.width ?? 1);
+    c.setLineDash((item.dashes ?? []).map(length => length * c.lineWidth));
+    c.stroke();
+  }
+  if (item.hatch) hatch(c);
+  c.restore();
+}
+function paintAt(c, items, pose, own, one, i) {
+  c.save();
+  c.lineJoin = c.lineCap = "round";
+  into(c, pose);
+  for (const item of items) paint(c, item, own, one, i);
+  c.restore();
+}
+// Fills the path with lines.
+function hatch(c) {
+  const { width, height } = $("floor");
   c.clip();
-  c.strokeStyle = colours.edge;
+  c.setTransform(1, 0, 0, 1, 0, 0);
+  c.setLineDash([]);
   c.lineWidth = 0.8 * ratio;
   c.beginPath();
   for (let d = -height; d < width; d += 7 * ratio) {
@@ -29,27 +71,24 @@ function hatch(c) {
     c.lineTo(d + height, 0);
   }
   c.stroke();
-  c.restore();
 }
-function drawSolid(c, solid, colour) {
-  c.lineJoin = c.lineCap = "round";
-  c.strokeStyle = colours.edge;
-  c.lineWidth = (solid.kind === "wall" ? 2.4 : 1.8) * ratio;
-  c.beginPath();
-  if (solid.kind === "wall") {
-    line(c, solid.points);
-    if (solid.dull) c.strokeStyle = colours.dull;
-    if (solid.low) c.setLineDash([6 * ratio, 4 * ratio]);
-    c.stroke();
-    c.setLineDash([]);
-    return;
-  }
-  if (solid.kind === "disc") c.arc(X(solid.points[0][0]), Y(solid.points[0][1]), solid.radius * scale, 0, 7);
-  else line(c, solid.points, true);
-  c.fillStyle = colour || (solid.low ? colours.low : solid.dull ? colours.dull : colours.solid);
-  c.fill();
-  c.stroke();
-  if (solid.low) hatch(c); // last: it leaves its own path behind
+// Upright at its place in the arena; it can be read on lines, too.
+function writeWords(c, { points, text, side }) {
+  const [[x, y]] = points,
+    lines = text.split("\n");
+  c.setTransform(1, 0, 0, 1, 0, 0);
+  font(c, 11);
+  c.textAlign = "center";
+  c.textBaseline = "middle";
+  c.strokeStyle = colours.floor;
+  c.lineJoin = "round";
+  c.lineWidth = 3 * ratio;
+  c.fillStyle = colours.ink;
+  lines.forEach((words, k) => {
+    const below = Y(y) + (13 * (k - (lines.length - 1) / 2) - 9 * (side ?? 0)) * ratio;
+    c.strokeText(words, X(x), below);
+    c.fillText(words, X(x), below);
+  });
 }
 
 // ---- grid and numbers ----
@@ -100,63 +139,22 @@ function drawNumbers(c) {
   write("m", width - 5 * ratio, height - 3 * ratio);
   c.textAlign = "left";
 }
-function word(c, text, x, y) {
-  font(c, 11);
-  c.textAlign = "center";
-  c.textBaseline = "middle";
-  c.strokeStyle = colours.floor; // it can be read on lines, too
-  c.lineJoin = "round";
-  c.lineWidth = 3 * ratio;
-  c.strokeText(text, X(x), Y(y));
-  c.fillStyle = colours.ink;
-  c.fillText(text, X(x), Y(y));
-  c.textAlign = "left";
-}
-// A lamp.
-function star(c, x, y) {
-  c.beginPath();
-  for (let k = 0; k < 10; k++) {
-    const r = (k % 2 ? 3.6 : 9) * ratio,
-      a = -Math.PI / 2 + (k * Math.PI) / 5;
-    c.lineTo(X(x) + r * Math.cos(a), Y(y) + r * Math.sin(a));
-  }
-  c.closePath();
-  c.fillStyle = colours.lamp;
-  c.fill();
-  c.strokeStyle = colours.edge;
-  c.lineWidth = 1.2 * ratio;
-  c.stroke();
-}
 
-// ---- what stands ----
+// ---- what stands, what moves ----
+const ORIGIN = [0, 0, 0];
+const GRID_LAYER = 0.5; // the grid lies above the floor and below all else
 function drawFloor() {
-  const c = $("floor").getContext("2d");
+  const c = $("floor").getContext("2d"),
+    isBelow = item => (item.layer ?? 0) < GRID_LAYER;
   c.setTransform(1, 0, 0, 1, 0, 0);
   c.clearRect(0, 0, $("floor").width, $("floor").height);
-  for (const outline of outlines()) {
-    polygon(c, outline.points);
-    c.fillStyle = colours.floor;
-    c.fill();
-  }
+  paintAt(c, plan.items.filter(isBelow), ORIGIN);
   drawGrid(c);
-  plan.lines.forEach(one => drawPaint(c, one));
-  plan.patches.forEach(patch => drawPatch(c, patch));
-  if (plan.charger) drawCharger(c, ...plan.charger);
-  for (const outline of outlines()) {
-    polygon(c, outline.points);
-    c.strokeStyle = colours.edge;
-    c.lineJoin = "round";
-    c.lineWidth = 3.5 * ratio;
-    if (outline.low) c.setLineDash([8 * ratio, 4 * ratio]);
-    c.stroke();
-    c.setLineDash([]);
-  }
-  for (const solid of plan.solids)
-    if (solid.kind !== "outline") {
-      drawSolid(c, solid);
-      if (solid.remarks) word(c, solid.remarks, solid.top[0], solid.top[1] + (8 * ratio) / scale);
-    }
-  for (const [x, y] of plan.lamps) star(c, x, y);
+  paintAt(
+    c,
+    plan.items.filter(item => !isBelow(item)),
+    ORIGIN,
+  );
   c.setLineDash([5 * ratio, 3 * ratio]);
   c.strokeStyle = colours.moving;
   c.lineWidth = 1.2 * ratio;
@@ -164,45 +162,8 @@ function drawFloor() {
   c.setLineDash([]);
   drawNumbers(c);
 }
-function drawPaint(c, paint) {
-  c.beginPath();
-  line(c, paint.points);
-  c.lineCap = c.lineJoin = "round";
-  c.lineWidth = paint.width * scale;
-  c.strokeStyle = colours[paint.dark ? "paint-dark" : "paint-bright"];
-  c.stroke();
-}
-function drawPatch(c, patch) {
-  polygon(c, patch.points);
-  c.fillStyle = patch.rough ? colours.rough : colours.smooth;
-  c.fill();
-  const [x, y] = [0, 1]
-    .map(k => patch.points.map(point => point[k]))
-    .map(values => (Math.min(...values) + Math.max(...values)) / 2);
-  word(c, "grip " + patch.grip, x, y);
-}
-function drawCharger(c, x, y, radius) {
-  c.beginPath();
-  c.arc(X(x), Y(y), radius * scale, 0, 7);
-  c.globalAlpha = 0.35;
-  c.fillStyle = colours.charger;
-  c.fill();
-  c.globalAlpha = 1;
-  c.strokeStyle = colours.charger;
-  c.lineWidth = 1.5 * ratio;
-  c.stroke();
-  word(c, "charger", x, y - radius - (9 * ratio) / scale);
-}
-
-// ---- what moves ----
-const solidAt = (solid, [x, y, turn]) => {
-  const cos = Math.cos(turn),
-    sin = Math.sin(turn);
-  return { ...solid, points: solid.points.map(([a, b]) => [x + cos * a - sin * b, y + sin * a + cos * b]) };
-};
 function drawMoving(c) {
-  for (const one of moving)
-    if (one.time.length) drawSolid(c, solidAt(one.solid, one.at(now + run.begin)), colours.moving);
+  for (const one of moving) if (one.time.length) paintAt(c, [one.item], one.at(now + run.begin));
 }
 
 // ---- what the brain sketched: of each layer the sketch that holds now, in its own frame ----
@@ -284,4 +245,142 @@ function drawSwept(c, one) {
     c.stroke();
     c.globalAlpha = 1;
   }
+}
+
+// ---- robots ----
+const SIGHTS = 2; // below this layer is what sensors see
+const placeOf = one =>
+  one.placed && now >= run.duration ? one.placed : poseAt(one.time.values, one.path, now - later(one));
+const tickOf = one => indexIn(one.time.values, now - later(one));
+function drawRobot(c, one, place, sees) {
+  const i = tickOf(one),
+    own = readable(one.colour),
+    isSight = item => item.layer < SIGHTS;
+  if (sees) {
+    c.save();
+    c.beginPath(); // no sensor sees through walls
+    for (const points of plan.outlines) {
+      points.forEach(([x, y], k) => (k ? c.lineTo(X(x), Y(y)) : c.moveTo(X(x), Y(y))));
+      c.closePath();
+    }
+    if (plan.outlines.length) c.clip();
+    paintAt(c, one.robot.items.filter(isSight), place, own, one, i);
+    c.restore();
+  }
+  paintAt(
+    c,
+    one.robot.items.filter(item => !isSight(item)),
+    place,
+    own,
+    one,
+    i,
+  );
+}
+function drawStage() {
+  const stage = $("stage"),
+    c = stage.getContext("2d"),
+    place = placeOf(run);
+  c.clearRect(0, 0, stage.width, stage.height);
+  c.lineJoin = c.lineCap = "round";
+  drawSwept(c, run);
+  drawSketches(c, false, place);
+  drawMoving(c);
+  for (const other of others()) if (other.time.length) drawRobot(c, other, placeOf(other), false);
+  if (run.estimate) paintAt(c, run.robot.ghost, poseAt(run.time.values, run.estimate, now));
+  drawSketches(c, true, place);
+  drawRobot(c, run, place, true);
+  drawGrabbed(c);
+}
+
+// ---- the canvas "trail": paths so far. While time goes on, only what is new is drawn ----
+const POINTS_AT_MOST = 20000; // of a path that is drawn as a whole
+function trace(c, times, columns, from, to) {
+  const [xs, ys] = columns.map(column => column.values),
+    step = Math.ceil((to - from + 1) / POINTS_AT_MOST);
+  c.beginPath();
+  for (let i = from, before = -1; before !== to; before = i, i = Math.min(to, i + step)) {
+    if (before < 0 || jumps(times, columns, before, i)) c.moveTo(X(xs[i]), Y(ys[i]));
+    else c.lineTo(X(xs[i]), Y(ys[i]));
+  }
+  c.stroke();
+}
+let drawn = new Map(); // of each robot up to which tick its path is drawn
+let dashAt = 0; // how far the dashes of the estimate have come, in pixels
+let marked = [0, 0]; // how many contacts and touches are drawn
+function trailChanged() {
+  drawn = new Map();
+}
+function drawTrail() {
+  const trail = $("trail"),
+    c = trail.getContext("2d");
+  const back = runs.some(one => drawn.has(one) && tickOf(one) < drawn.get(one));
+  if (back || !drawn.has(run)) {
+    c.clearRect(0, 0, trail.width, trail.height);
+    trailChanged();
+    dashAt = 0;
+    marked = [0, 0];
+    if ($("whole").checked) drawWhole(c);
+  }
+  c.lineJoin = c.lineCap = "round";
+  for (const one of runs) if (one.time.length) drawTrailOf(c, one);
+  if ($("whole").checked) drawMarks(c);
+}
+// The whole paths, faint.
+function drawWhole(c) {
+  c.globalAlpha = 0.18;
+  c.lineWidth = 2 * ratio;
+  c.lineJoin = c.lineCap = "round";
+  for (const one of runs) {
+    c.strokeStyle = readable(one.colour);
+    trace(c, one.time.values, one.path, 0, one.last);
+  }
+  c.globalAlpha = 1;
+}
+function drawTrailOf(c, one) {
+  const from = drawn.get(one) ?? 0,
+    to = tickOf(one);
+  if (to > from || !drawn.has(one)) {
+    c.strokeStyle = readable(one.colour);
+    c.lineWidth = 2 * ratio;
+    trace(c, one.time.values, one.path, from, to);
+    if (one === run && one.estimate) traceEstimate(c, one, from, to);
+  }
+  drawn.set(one, to);
+}
+// Dashes go on where the last piece ended.
+function traceEstimate(c, one, from, to) {
+  c.strokeStyle = colours.estimate;
+  c.lineWidth = 1.3 * ratio;
+  c.setLineDash([5 * ratio, 3 * ratio]);
+  c.lineCap = "butt";
+  c.lineDashOffset = dashAt;
+  trace(c, one.time.values, one.estimate, from, to);
+  const [xs, ys] = one.estimate.map(column => column.values);
+  for (let i = from + 1; i <= to; i++) dashAt += Math.hypot(xs[i] - xs[i - 1], ys[i] - ys[i - 1]) * scale;
+  dashAt %= 8 * ratio;
+  c.setLineDash([]);
+  c.lineCap = "round";
+  c.lineDashOffset = 0;
+}
+// Where the body touched something, where a whisker did.
+function drawMarks(c) {
+  c.strokeStyle = colours.touch;
+  c.lineWidth = 1.4 * ratio;
+  for (const [x, y] of run.touches.slice(marked[1])) {
+    c.beginPath();
+    c.arc(X(x), Y(y), 3.5 * ratio, 0, 7);
+    c.stroke();
+  }
+  c.strokeStyle = colours.contact;
+  c.lineWidth = 2 * ratio;
+  for (const [x, y] of run.contacts.slice(marked[0])) {
+    const r = 4 * ratio;
+    c.beginPath();
+    c.moveTo(X(x) - r, Y(y) - r);
+    c.lineTo(X(x) + r, Y(y) + r);
+    c.moveTo(X(x) + r, Y(y) - r);
+    c.lineTo(X(x) - r, Y(y) + r);
+    c.stroke();
+  }
+  marked = [run.contacts.length, run.touches.length];
 }

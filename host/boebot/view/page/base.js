@@ -4,17 +4,6 @@ const page = /*DATA*/null;
 const LAYER_COLOURS = /*LAYERS*/[];
 const pageIsLive = page === null || page.live !== null;
 
-// What a live page adds to the page of a replay; it puts its own functions here.
-const hooks = {
-  dragging: () => false,
-  grab: () => false,
-  turn: () => {},
-  key: () => false,
-  drawOver: () => {},
-  chosen: () => {},
-  sought: () => {},
-};
-
 const $ = id => document.getElementById(id);
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 const floats = text => new Float32Array(bytes(text).buffer);

@@ -107,8 +107,8 @@ function listenToArena() {
     "wheel",
     e => {
       e.preventDefault();
-      if (hooks.dragging()) {
-        hooks.turn(e.deltaY > 0 ? -Math.PI / 12 : Math.PI / 12);
+      if (isDragging()) {
+        turnGrabbed(e.deltaY > 0 ? -Math.PI / 12 : Math.PI / 12);
         return;
       }
       zoom(Math.exp(-e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), e.offsetX * ratio, e.offsetY * ratio);
@@ -117,7 +117,7 @@ function listenToArena() {
   );
   stage.addEventListener("pointerdown", e => {
     stage.setPointerCapture(e.pointerId);
-    if (fingers.size || !hooks.grab(e)) fingers.set(e.pointerId, { x: e.offsetX * ratio, y: e.offsetY * ratio });
+    if (fingers.size || !grab(e)) fingers.set(e.pointerId, { x: e.offsetX * ratio, y: e.offsetY * ratio });
   });
   stage.addEventListener("pointermove", e => {
     if (fingers.has(e.pointerId)) fingersMoved(e);

@@ -1,203 +1,362 @@
-// The lanes: what each signal looks like over time, and its value as text. A lane has a name, a height in pixels, `draw`,
-// `at`, its value at a time as text, and maybe `label`, which writes its scale beside it.
+// Signals over time in lanes under a time axis: the canvas "tracks" (drawn when time goes beyond it, or there is more to
+// show) and above it the canvas "cursor".
+//
+// A lane: name, height (pixels), `at`: its value at a time as text; and what it shows, each where there is any:
+//   curves   {times, value(i), colour, width, holds: the value stands until the next one}, between the ends of `range`
+//   blocks   {times, colour(i): null: none; at, tall: shares of the lane's height}
+//   scale    [value, text, colour] beside the lane; rules: with a line at each value
+//   draw     anything else
 
-const HEIGHTS = { events: 20, utility: 112, signal: 42, ping: 40, curve: 36, flags: 19, pin: 19 }; // pixels
-const CURVES = 4; // of the numbers that the brain shows have a lane; the others are in the list only
+const [GUTTER, AXIS, RIGHT] = [112, 20, 10]; // pixels: of names at the left, of the time above, free at the right
+const SHORTEST = 1e-3; // s, of the time that is shown
+let lanes = [];
+let tracksDirty = true;
+let spanLength = null; // of the time that is shown, in s; null: the whole run
+let spanBegin = 0;
+function tracksChanged() {
+  tracksDirty = true;
+  requestDraw();
+}
+
+// ---- which time is shown ----
+// From, to (s).
+function span() {
+  if (spanLength === null || (spanLength >= run.duration && !pageIsLive)) return [0, Math.max(run.duration, SHORTEST)];
+  return [spanBegin, spanBegin + spanLength];
+}
+// As paper that is turned over: half of what was shown stays.
+function keepCursorInside() {
+  if (spanLength === null) return;
+  const before = spanBegin;
+  if (now > spanBegin + spanLength) spanBegin = now - spanLength / 2;
+  if (now < spanBegin) spanBegin = now - spanLength / 2;
+  const latest = pageIsLive ? Infinity : Math.max(0, run.duration - spanLength);
+  spanBegin = Math.min(latest, Math.max(0, spanBegin));
+  if (spanBegin !== before) tracksDirty = true;
+}
+function zoomTime(factor, about = now) {
+  const [from, to] = span(),
+    length = Math.max(SHORTEST, (to - from) * factor);
+  if (length >= run.duration && !pageIsLive) spanLength = null;
+  else {
+    spanLength = length;
+    spanBegin = Math.max(0, about - ((about - from) / (to - from)) * length);
+    spanBegin = pageIsLive ? spanBegin : Math.min(spanBegin, run.duration - length);
+  }
+  tracksChanged();
+}
+
+// ---- drawing them ----
+// Where each lane is, in pixels of the canvas.
+function laneBoxes() {
+  const [from, to] = span(),
+    left = GUTTER * ratio,
+    right = $("tracks").width - RIGHT * ratio,
+    width = right - left;
+  let top = AXIS * ratio;
+  return lanes.map(lane => {
+    const height = lane.height * ratio,
+      px = t => left + ((t - from) / (to - from)) * width;
+    const box = { lane, top, height, middle: top + height / 2, left, right, width, from, to, px };
+    top += height;
+    return box;
+  });
+}
+const timeOfPixel = offsetX => {
+  // of the pointer
+  const [from, to] = span(),
+    width = $("cursor").clientWidth - GUTTER - RIGHT;
+  return from + ((offsetX - GUTTER) / width) * (to - from);
+};
+function drawTracks() {
+  const canvas = $("tracks"),
+    c = canvas.getContext("2d");
+  c.clearRect(0, 0, canvas.width, canvas.height);
+  drawAxis(c);
+  for (const box of laneBoxes()) {
+    const { name, range, scale = () => [], curves = [], blocks = [], draw } = box.lane,
+      ends = range?.() ?? [0, 1];
+    rule(c, 0, canvas.width, box.top);
+    c.fillStyle = colours.faint;
+    font(c, 11.5);
+    c.textBaseline = "middle";
+    c.textAlign = "left";
+    c.fillText(inGutter(name), 8 * ratio, box.middle);
+    c.textAlign = "right";
+    font(c, 10);
+    for (const [value, text, colour = colours.faint] of scale()) {
+      c.fillStyle = colour;
+      const inside = Math.min(box.top + box.height - 7 * ratio, Math.max(box.top + 7 * ratio, laneY(box, ends, value)));
+      c.fillText(text, box.left - 5 * ratio, inside);
+    }
+    c.save();
+    c.beginPath();
+    c.rect(box.left, box.top, box.width, box.height);
+    c.clip();
+    if (box.lane.rules) for (const [value] of scale()) rule(c, box.left, box.right, laneY(box, ends, value));
+    for (const curve of curves) drawCurve(c, box, ends, curve);
+    for (const one of blocks) drawBlocks(c, box, one);
+    draw?.(c, box);
+    c.restore();
+  }
+  tracksDirty = false;
+}
+function rule(c, from, to, y) {
+  c.strokeStyle = colours.grid;
+  c.lineWidth = ratio;
+  c.beginPath();
+  c.moveTo(from, y);
+  c.lineTo(to, y);
+  c.stroke();
+}
+const laneY = (box, [low, high], value) =>
+  box.top + box.height * (high > low ? 0.92 - (0.84 * (value - low)) / (high - low) : 0.5);
+// Where values are many for a pixel, from the least to the greatest of some; with a gap where none is known.
+function drawCurve(c, box, ends, { times, value, colour, width = 1.2, holds }) {
+  const all = times(),
+    first = indexIn(all, box.from),
+    end = Math.min(all.length - 1, indexIn(all, box.to) + 1),
+    each = Math.max(1, Math.ceil((end - first) / (3 * box.width)));
+  let isDown = false;
+  c.strokeStyle = colour;
+  c.lineWidth = width * ratio;
+  c.beginPath();
+  for (let i = first; i <= end; i += each) {
+    const next = Math.min(end + 1, i + each),
+      [least, most] = extent(i, next, value),
+      x = box.px(all[i]);
+    if (most >= least) {
+      isDown ? c.lineTo(x, laneY(box, ends, least)) : c.moveTo(x, laneY(box, ends, least));
+      if (most > least) c.lineTo(x, laneY(box, ends, most));
+      if (holds) {
+        const last = laneY(box, ends, value(next - 1));
+        c.lineTo(x, last);
+        c.lineTo(box.px(next < all.length ? all[next] : run.duration), last);
+      }
+    }
+    isDown = most >= least;
+  }
+  c.stroke();
+}
+// The least and the greatest of those that are known.
+function extent(from, to, value) {
+  let least = Infinity,
+    most = -Infinity;
+  for (let i = from; i < to; i++) {
+    const v = value(i);
+    if (!Number.isFinite(v)) continue;
+    if (v < least) least = v;
+    if (v > most) most = v;
+  }
+  return [least, most];
+}
+// A bar for each stretch of one colour.
+function drawBlocks(c, box, { times, colour, at, tall }) {
+  const all = times(),
+    end = indexIn(all, box.to);
+  for (let i = indexIn(all, box.from), begun = i; i <= end && all.length; i++) {
+    const fill = colour(begun);
+    if (i < end && colour(i + 1) === fill) continue;
+    if (fill) {
+      const left = Math.max(box.left, box.px(all[begun])),
+        right = Math.min(box.right, box.px(i + 1 < all.length ? all[i + 1] : run.duration));
+      c.fillStyle = fill;
+      c.fillRect(left, box.top + box.height * at, Math.max(1.5 * ratio, right - left), box.height * tall);
+    }
+    begun = i + 1;
+  }
+}
+const inGutter = name => (name.length > 14 ? name.slice(0, 13) + "…" : name);
+const TIME_STEPS = [1, 2, 5]
+  .flatMap(k => [-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5].map(e => k * 10 ** e))
+  .sort((a, b) => a - b);
+function drawAxis(c) {
+  const [from, to] = span(),
+    left = GUTTER * ratio,
+    right = $("tracks").width - RIGHT * ratio,
+    width = right - left;
+  const step = TIME_STEPS.find(one => (one / (to - from)) * width >= 62 * ratio) || 1e6,
+    digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  font(c, 11);
+  c.textBaseline = "middle";
+  c.textAlign = "center";
+  c.lineWidth = ratio;
+  c.fillStyle = colours.faint;
+  c.strokeStyle = colours.grid;
+  for (let k = Math.ceil(from / step - 1e-9); k * step <= to; k++) {
+    const x = left + ((k * step - from) / (to - from)) * width;
+    c.beginPath();
+    c.moveTo(x, AXIS * ratio - 4 * ratio);
+    c.lineTo(x, $("tracks").height);
+    c.stroke();
+    if (x < right - 12 * ratio) c.fillText((k * step).toFixed(digits), x, (AXIS * ratio) / 2);
+  }
+  c.textAlign = "left";
+  c.fillText("time, s", 8 * ratio, (AXIS * ratio) / 2);
+}
+// ---- the cursor, above them ----
+let hoverTime = null;
+function drawCursor() {
+  const canvas = $("cursor"),
+    c = canvas.getContext("2d"),
+    [from, to] = span(),
+    left = GUTTER * ratio,
+    width = canvas.width - (GUTTER + RIGHT) * ratio;
+  c.clearRect(0, 0, canvas.width, canvas.height);
+  const upright = (t, colour, wide) => {
+    const x = left + ((t - from) / (to - from)) * width;
+    if (x < left - 1 || x > left + width + 1) return;
+    c.strokeStyle = colour;
+    c.lineWidth = wide * ratio;
+    c.beginPath();
+    c.moveTo(x, 0);
+    c.lineTo(x, canvas.height);
+    c.stroke();
+  };
+  if (hoverTime !== null) upright(hoverTime, colours.faint, 1);
+  upright(now, colours.ink, 1.6);
+}
+function listenToTracks() {
+  const cursor = $("cursor");
+  cursor.addEventListener("pointerdown", e => {
+    if (e.offsetX > GUTTER - 8) {
+      cursor.setPointerCapture(e.pointerId);
+      seek(timeOfPixel(e.offsetX));
+    }
+  });
+  cursor.addEventListener("pointermove", e => {
+    if (e.buttons && cursor.hasPointerCapture(e.pointerId)) seek(timeOfPixel(e.offsetX));
+  });
+  cursor.addEventListener(
+    "wheel",
+    e => {
+      if (e.offsetX < GUTTER) return; // there it scrolls the lanes
+      e.preventDefault();
+      zoomTime(Math.exp(e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), timeOfPixel(e.offsetX));
+    },
+    { passive: false },
+  );
+  $("shorter").onclick = () => zoomTime(0.5);
+  $("longer").onclick = () => zoomTime(2);
+}
 
 // ---- which lanes there are ----
+const CURVES = 4; // of the numbers that the brain shows have a lane; the others are in the list only
+const tickAt = t => indexIn(run.time.values, t);
+const ticks = () => run.time.values;
 function makeLanes() {
-  lanes = [{ name: "events", height: HEIGHTS.events, draw: drawEvents, at: eventAt }];
-  if (run.mind)
-    lanes.push({ name: "utility", height: HEIGHTS.utility, draw: drawUtilities, label: labelUtilities, at: utilityAt });
-  lanes.push({ name: "motors", height: HEIGHTS.signal, draw: drawSignals, label: labelSignals, at: signalsAt });
+  lanes = [{ name: "events", height: 20, draw: drawEvents, at: eventAt }];
+  if (run.mind) lanes.push(mindLane());
+  lanes.push({
+    name: "motors",
+    height: 42,
+    range: () => [-1.1, 1.1],
+    curves: [
+      { times: ticks, value: i => run.left.values[i], colour: colours.end },
+      { times: ticks, value: i => run.right.values[i], colour: colours.estimate },
+    ],
+    scale: () => [
+      [0.5, "L", colours.end],
+      [-0.5, "R", colours.estimate],
+    ],
+    at: t => "left " + signed(run.left.values[tickAt(t)]) + ", right " + signed(run.right.values[tickAt(t)]),
+  });
   if (run.has("ping"))
-    lanes.push({
-      name: "Ping",
-      height: HEIGHTS.ping,
-      draw: drawPing,
-      label: (c, box) => write(c, box, farthestEcho().toFixed(1) + " m", 0.5),
-      at: t => pingText(tickAt(t)),
-    });
-  if (run.has("infrared_left") || run.has("infrared_right"))
-    lanes.push(flagsLane("IR", 4, 8, "charger", ["left", "right"]));
-  if (run.has("whisker_left") || run.has("whisker_right"))
-    lanes.push(flagsLane("whiskers", 1, 2, "touch", ["left", "right"]));
-  if (run.known) lanes.push(flagsLane("true contact", CONTACT_BIT, 0, "contact", ["contact"]));
+    lanes.push(
+      numberLane("Ping", ticks, i => (run.ping.values[i] > 0 ? run.ping.values[i] : NaN), {
+        colour: colours.end,
+        range: () => [0, Math.max(0.1, extent(0, run.ping.length, i => run.ping.values[i])[1])],
+        scale: ([, far]) => [[far / 2, far.toFixed(1) + " m"]],
+        at: t => pingText(tickAt(t)),
+      }),
+    );
+  for (const group of new Set(run.signs.map(groupOf))) lanes.push(signsLane(group));
+  if (run.known) lanes.push(flagLane("true contact", [["contact", "contact"]]));
   if (run.load)
-    lanes.push({
-      name: "load of tick",
-      height: HEIGHTS.curve,
-      draw: drawLoad,
-      label: (c, box) => write(c, box, "100 %", 0.2),
-      at: t => (100 * run.load.values[tickAt(t)]).toFixed(0) + " %",
-    });
+    lanes.push(
+      numberLane("load of tick", ticks, i => Math.min(1, run.load.values[i]), {
+        colour: colours.end,
+        range: () => [0, 1],
+        scale: () => [[1, "100 %"]],
+        at: t => (100 * run.load.values[tickAt(t)]).toFixed(0) + " %",
+      }),
+    );
   for (const one of run.numbers.slice(0, CURVES))
-    lanes.push({
-      name: one.name,
-      height: HEIGHTS.curve,
-      draw: (c, box) => drawShown(c, box, one.values.values),
-      label: (c, box) => labelShown(c, box, one.values.values),
-      at: t => shownText(one, t),
-    });
+    lanes.push(
+      numberLane(one.name, () => run.shownTime.values, i => one.values.values[i], {
+        colour: colours.charger,
+        range: () => extent(0, one.values.length, i => one.values.values[i]),
+        scale: ([least, most]) => (most > least ? [least, most].map(value => [value, short(value)]) : []),
+        at: t => shownText(one, t),
+      }),
+    );
   for (const pin of run.pins)
     lanes.push({
-      name: pin.name,
-      height: HEIGHTS.pin,
-      draw: (c, box) => drawPin(c, box, pin),
-      at: t => pinText(pin, t),
+      ...numberLane(pin.name, () => pin.time.values, i => PIN_LEVELS[pin.level.values[i]], {
+        colour: colours.ink,
+        range: () => [-0.2, 1.2],
+        scale: () => [],
+        at: t => pinText(pin, t),
+      }),
+      height: 19,
     });
   $("signals").style.setProperty("--height", AXIS + lanes.reduce((sum, lane) => sum + lane.height, 0) + "px");
 }
-const flagsLane = (name, first, second, colour, words) => ({
-  name,
-  height: HEIGHTS.flags,
-  draw(c, box) {
-    drawFlags(c, box, first, second ? 0.16 : 0.22, second ? 0.3 : 0.56, colours[colour]);
-    if (second) drawFlags(c, box, second, 0.56, 0.3, colours[colour]);
-  },
-  at(t) {
-    const bits = run.flags.values[tickAt(t)];
-    return (
-      [first, second]
-        .map((bit, k) => (bits & bit ? words[k] : ""))
-        .filter(Boolean)
-        .join(" and ") || "none"
-    );
-  },
-});
-const tickAt = t => indexIn(run.time.values, t);
-const inGutter = name => (name.length > 14 ? name.slice(0, 13) + "…" : name);
-
-// A line through values; where there are many for a pixel, from the least to the greatest of each pixel.
-function drawCurve(c, box, times, values, y) {
-  const first = indexIn(times, box.from),
-    end = Math.min(values.length - 1, indexIn(times, box.to) + 1);
-  c.beginPath();
-  if (end - first < 3 * box.width) {
-    for (let i = first; i <= end; i++)
-      i === first ? c.moveTo(box.px(times[i]), y(values[i])) : c.lineTo(box.px(times[i]), y(values[i]));
-  } else {
-    const each = Math.ceil((end - first) / box.width);
-    for (let i = first; i <= end; i += each) {
-      let least = values[i],
-        most = values[i];
-      for (let j = i; j < Math.min(end + 1, i + each); j++) {
-        least = Math.min(least, values[j]);
-        most = Math.max(most, values[j]);
-      }
-      const x = box.px(times[i]);
-      i === first ? c.moveTo(x, y(least)) : c.lineTo(x, y(least));
-      c.lineTo(x, y(most));
-    }
-  }
-  c.stroke();
+// Of a number that stands until the next one.
+function numberLane(name, times, value, { colour, range, scale, at }) {
+  return { name, height: 38, at, range, scale: () => scale(range()), curves: [{ times, value, colour, holds: true }] };
 }
-const write = (c, box, text, at) => c.fillText(text, box.left - 5 * ratio, box.top + at * box.height); // of the scale, beside the lane
-const SIGNALS = [
-  ["L", "left", "end"],
-  ["R", "right", "estimate"],
-];
-function drawSignals(c, box) {
-  const y = v => box.middle - v * box.height * 0.42;
-  c.lineWidth = 1.2 * ratio;
-  for (const [, name, colour] of SIGNALS) {
-    c.strokeStyle = colours[colour];
-    drawCurve(c, box, run.time.values, run[name].values, y);
-  }
+// The signs of left and right are in one lane.
+const groupOf = ({ device }) => device.replace(/_(left|right)$/, "");
+function signsLane(group) {
+  const own = run.signs.filter(sign => groupOf(sign) === group);
+  return flagLane(
+    group,
+    own.map(({ device, colour }) => [device, colour]),
+  );
 }
-function labelSignals(c, box) {
-  font(c, 11.5);
-  c.textAlign = "left";
-  SIGNALS.forEach(([sign, , colour], k) => {
-    c.fillStyle = colours[colour];
-    c.fillText(sign, box.left - (30 - 12 * k) * ratio, box.middle);
-  });
+function flagLane(name, flags) {
+  const tall = 0.6 / flags.length;
+  return {
+    name,
+    height: 19,
+    blocks: flags.map(([device, colour], k) => ({
+      times: ticks,
+      colour: i => (run.isOn(device, i) ? colourOf(colour) : null),
+      at: (k + 0.5) / flags.length - tall / 2,
+      tall,
+    })),
+    at: t =>
+      flags
+        .filter(([device]) => run.isOn(device, tickAt(t)))
+        .map(([device]) => device.replace(name + "_", ""))
+        .join(" and ") || "none",
+  };
 }
-const signalsAt = t => "left " + signed(run.left.values[tickAt(t)]) + ", right " + signed(run.right.values[tickAt(t)]);
-function drawLoad(c, box) {
-  c.strokeStyle = colours.end;
-  c.lineWidth = 1.2 * ratio;
-  drawCurve(c, box, run.time.values, run.load.values, v => box.top + box.height * (0.94 - 0.86 * Math.min(1, v)));
+// A line for each process, from -1 to 1, and below them a band in the colour of the active motor behavior.
+function mindLane() {
+  const { mind } = run,
+    times = () => mind.time.values,
+    curve = (process, colour, width) => ({ times, value: i => process.utility.values[i], colour, width });
+  return {
+    name: "utility",
+    height: 112,
+    range: () => [-1.45, 1.1],
+    scale: () => [-1, 0, 1].map(u => [u, minus(String(u))]),
+    rules: true,
+    curves: [
+      ...mind.cognitive.map(process => curve(process, colours.faint, 0.8)),
+      ...mind.behaviors.map(process => curve(process, readable(process.colour), 1.6)),
+    ],
+    blocks: [{ times, colour: i => readable(mind.behaviors[mind.motor.values[i]].colour), at: 0.84, tall: 0.13 }],
+    at: utilityAt,
+  };
 }
-const farthestEcho = () => run.ping.values.reduce((a, b) => Math.max(a, b), 0.1);
-function drawPing(c, box) {
-  const times = run.time.values,
-    far = farthestEcho(),
-    end = Math.min(run.last, indexIn(times, box.to) + 1);
-  c.fillStyle = colours.end;
-  c.globalAlpha = 0.7;
-  for (let i = indexIn(times, box.from); i <= end; i++) {
-    if (run.ping.values[i] <= 0) continue;
-    const x = box.px(times[i]),
-      wide = i < run.last ? box.px(times[i + 1]) - x : ratio;
-    c.fillRect(
-      x,
-      box.top + box.height * (0.94 - (0.86 * run.ping.values[i]) / far),
-      Math.max(ratio, wide),
-      1.6 * ratio,
-    );
-  }
-  c.globalAlpha = 1;
-}
-// A bar while the bit is set.
-function drawFlags(c, box, bit, at, tall, colour) {
-  const times = run.time.values,
-    flags = run.flags.values,
-    end = Math.min(run.last, indexIn(times, box.to) + 1);
-  c.fillStyle = colour;
-  for (let i = indexIn(times, box.from), begun = -1; i <= end + 1; i++) {
-    const on = i <= end && flags[i] & bit;
-    if (on && begun < 0) begun = i;
-    if (!on && begun >= 0) {
-      c.fillRect(
-        box.px(times[begun]),
-        box.top + box.height * at,
-        Math.max(1.5 * ratio, box.px(times[i - 1]) - box.px(times[begun])),
-        box.height * tall,
-      );
-      begun = -1;
-    }
-  }
-}
-// The least and the greatest.
-function extent(values) {
-  let least = Infinity,
-    most = -Infinity;
-  for (const v of values)
-    if (Number.isFinite(v)) {
-      if (v < least) least = v;
-      if (v > most) most = v;
-    }
-  return [least, most];
-}
-// A value that the brain shows, between its least and its greatest; it holds until the next one.
-function drawShown(c, box, values) {
-  const times = run.shownTime.values,
-    [least, most] = extent(values);
-  const y = v => box.top + box.height * (most > least ? 0.92 - (0.84 * (v - least)) / (most - least) : 0.5);
-  c.strokeStyle = colours.charger;
-  c.lineWidth = 1.3 * ratio;
-  c.beginPath();
-  for (let i = indexIn(times, box.from), before = NaN; i < values.length && (times[i] <= box.to || !i); i++) {
-    const v = values[i],
-      from = box.px(times[i]),
-      to = i + 1 < values.length ? box.px(times[i + 1]) : box.px(run.duration);
-    if (!Number.isNaN(v)) {
-      if (Number.isNaN(before)) c.moveTo(from, y(v));
-      else c.lineTo(from, y(v));
-      c.lineTo(to, y(v));
-    }
-    before = v;
-  }
-  c.stroke();
-}
-function labelShown(c, box, values) {
-  const [least, most] = extent(values);
-  if (most > least) {
-    font(c, 9);
-    write(c, box, short(most), 0.22);
-    write(c, box, short(least), 0.8);
-  }
+function utilityAt(t) {
+  const i = indexIn(run.mind.time.values, t + 1e-4),
+    active = run.mind.behaviors[run.mind.motor.values[i]];
+  const values = processes().map(one => one.name + " " + signed(one.utility.values[i] ?? NaN).trim());
+  return (active ? active.name + " is active: " : "") + values.join(", ");
 }
 // Numbers are in a column, texts in a list.
 function shownText(one, t) {
@@ -205,83 +364,8 @@ function shownText(one, t) {
   if (Array.isArray(one.values)) return i < 0 ? "" : (one.values[i] ?? "");
   return i < 0 ? "–" : short(one.values.values[i] ?? NaN);
 }
-
-// A line for each process, from -1 to 1, and below them a band in the colour of the active motor behavior.
-const utilityShare = u => 0.42 - 0.36 * u; // of the lane's height
-function drawUtilities(c, box) {
-  const times = run.mind.time.values,
-    y = u => box.top + box.height * utilityShare(u);
-  c.strokeStyle = colours.grid;
-  c.lineWidth = ratio;
-  for (const u of [-1, 0, 1]) {
-    c.beginPath();
-    c.moveTo(box.left, y(u));
-    c.lineTo(box.right, y(u));
-    c.stroke();
-  }
-  c.lineWidth = 0.8 * ratio;
-  c.strokeStyle = colours.faint;
-  for (const process of run.mind.cognitive) drawCurve(c, box, times, process.utility.values, y);
-  c.lineWidth = 1.6 * ratio;
-  for (const behavior of run.mind.behaviors) {
-    c.strokeStyle = readable(behavior.colour);
-    drawCurve(c, box, times, behavior.utility.values, y);
-  }
-  drawBand(c, box, times, run.mind.motor.values);
-}
-const labelUtilities = (c, box) => {
-  for (const u of [-1, 0, 1]) write(c, box, minus(String(u)), utilityShare(u));
-};
-function drawBand(c, box, times, motor) {
-  const from = indexIn(times, box.from),
-    end = indexIn(times, box.to);
-  if (!times.length) return;
-  for (let i = from, begun = from; i <= end; i++)
-    if (i === end || motor[i + 1] !== motor[begun]) {
-      const left = Math.max(box.left, box.px(times[begun])),
-        right = Math.min(box.right, i + 1 < times.length ? box.px(times[i + 1]) : box.px(run.duration));
-      c.fillStyle = readable(run.mind.behaviors[motor[begun]].colour);
-      c.fillRect(left, box.top + box.height * 0.84, right - left, box.height * 0.13);
-      begun = i + 1;
-    }
-}
-function utilityAt(t) {
-  const i = indexIn(run.mind.time.values, t + 1e-4),
-    active = run.mind.behaviors[run.mind.motor.values[i]];
-  const values = [...run.mind.behaviors, ...run.mind.cognitive].map(
-    one => one.name + " " + signed(one.utility.values[i] ?? NaN).trim(),
-  );
-  return (active ? active.name + " is active: " : "") + values.join(", ");
-}
-
-// ---- pins: a line that is low or high, or in the middle while the pin is released ----
 const PIN_WORDS = ["low", "high", "released", "pulled up"];
-const PIN_SHARES = [0.8, 0.2, 0.55, 0.4]; // of the lane's height
-function drawPin(c, box, pin) {
-  const times = pin.time.values,
-    levels = pin.level.values,
-    y = level => box.top + box.height * PIN_SHARES[level];
-  let i = shownAt(times, box.from);
-  c.strokeStyle = colours.ink;
-  c.lineWidth = ratio;
-  c.beginPath();
-  if (i < 0) c.moveTo(box.px(times[++i]), y(levels[i]));
-  else c.moveTo(box.left, y(levels[i])); // before its first edge nobody knows
-  for (i++; i < times.length && times[i] <= box.to; i++) {
-    const x = box.px(times[i]),
-      pixel = Math.floor(x);
-    c.lineTo(x, y(levels[i - 1]));
-    if (i + 1 < times.length && Math.floor(box.px(times[i + 1])) === pixel) {
-      // several edges in a pixel
-      while (i + 1 < times.length && Math.floor(box.px(times[i + 1])) === pixel) i++;
-      c.lineTo(x, y(0));
-      c.lineTo(x, y(1));
-    }
-    c.lineTo(x, y(levels[i]));
-  }
-  c.lineTo(Math.min(box.right, box.px(i < times.length ? times[i] : run.duration)), y(levels[i - 1]));
-  c.stroke();
-}
+const PIN_LEVELS = [0, 1, 0.4, 0.65];
 function pinText(pin, t) {
   const times = pin.time.values,
     i = indexIn(times, t),

@@ -81,6 +81,7 @@ class Run {
     this.pulses = null;
     this.load = null;
     this.flags = new Column(Uint8Array);
+    this.signs = about.signs.map(sign => ({ ...sign, values: new Column(Uint8Array) })); // of devices that are on or off
     this.readings = about.readings.map(one => ({ ...one, values: new Column(), ages: new Column() }));
     this.shownTime = new Column();
     this.numbers = [];
@@ -116,12 +117,18 @@ class Run {
     return this.time.length ? this.time.last : 0;
   }
   has(device) {
-    return this.robot.shapes.some(shape => shape.device === device);
+    return this.robot.devices.includes(device);
+  }
+  // Whether a sign, or "contact", is on at a tick.
+  isOn(name, i) {
+    if (name === "contact") return (this.flags.values[i] & CONTACT_BIT) > 0;
+    return this.signs.some(sign => sign.device === name && sign.values.values[i] > 0);
   }
 
   append(rows) {
     for (const name of ["time", "turret", "left", "right", "ping"]) this[name].append(floats(rows[name]));
     this.flags.append(bytes(rows.flags));
+    rows.signs.forEach((values, k) => this.signs[k].values.append(bytes(values)));
     appendEach(this.path, rows.path);
     if (this.estimate && rows.estimate) appendEach(this.estimate, rows.estimate);
     if (rows.pulses) this.pulses ??= [new Column(), new Column()];
@@ -220,7 +227,7 @@ function appendSweeps(swept, more) {
 class Moving {
   // a shape of the arena that moves; its times are on the clock of the truth
   constructor(about) {
-    this.solid = about.solid;
+    this.item = about;
     this.time = new Column();
     this.pose = pose();
   }

@@ -1,6 +1,6 @@
 // The panels beside the arena: signals of the chosen robot at the moment that is shown, its figures, the legend.
 
-let cells = { readings: [], shown: [], utilities: [] }; // what is written anew for each moment
+let cells = { lamps: [], readings: [], shown: [], utilities: [] }; // what is written anew for each moment
 let namesShown = -1; // for how many names the panels were made: a live run may show new ones
 
 function hide(id, is) {
@@ -14,14 +14,11 @@ function makePanels() {
   hide("truth", !run.known);
   hide("estimateRow", !run.estimate);
   hide("errorRow", !run.estimate);
-  document.querySelectorAll(".lamp").forEach(lamp => {
-    lamp.hidden = !run.has(lamp.dataset.device);
-  });
+  cells.lamps = run.signs.map(({ device }) => element("div", { className: "lamp", textContent: device.replace("_", " ") }));
+  cells.lamps.forEach(lamp => lamp.setAttribute("role", "img"));
+  $("lamps").replaceChildren(...cells.lamps);
   hide("pingRow", !run.has("ping"));
-  hide(
-    "sensors",
-    !["whisker_left", "whisker_right", "infrared_left", "infrared_right", "ping"].some(name => run.has(name)),
-  );
+  hide("sensors", !run.signs.length && !run.has("ping"));
   hide("mind", !run.mind);
   makeUtilities();
   makeFigures();
@@ -154,7 +151,13 @@ function bar({ style }, value) {
 }
 const pingText = i => (run.ping.values[i] > 0 ? run.ping.values[i].toFixed(2) + " m" : "no echo");
 const stateText = bits =>
-  bits & 128 ? "driven by the board's own brain" : bits & 32 ? "stopped by dead-man" : bits & 64 ? "off" : "driven";
+  bits & FALLBACK
+    ? "driven by the board's own brain"
+    : bits & DEAD_MAN
+      ? "stopped by dead-man"
+      : bits & MOTORS_OFF
+        ? "off"
+        : "driven";
 function tellMoment() {
   const i = tickOf(run),
     bits = run.flags.values[i],
@@ -170,11 +173,12 @@ function tellMoment() {
     say(name + "Text", signed(column.values[i]) + (pulse > 0 ? "   " + pulse.toFixed(0) + " µs" : ""));
   });
   say("state", stateText(bits));
-  document.querySelectorAll(".lamp").forEach(lamp => {
-    const on = !!(bits & Number(lamp.dataset.bit));
+  run.signs.forEach(({ values, colour }, k) => {
+    const lamp = cells.lamps[k],
+      on = values.values[i] > 0;
     lamp.classList.toggle("on", on);
-    lamp.style.background = on ? colours[lamp.dataset.colour] : "";
-    lamp.ariaLabel = lamp.dataset.name + (on ? ": on" : ": off");
+    lamp.style.background = on ? colourOf(colour) : "";
+    lamp.ariaLabel = lamp.textContent + (on ? ": on" : ": off");
   });
   say("ping", pingText(i));
   run.readings.forEach((reading, k) => tellReading(reading, cells.readings[k], i));
@@ -218,4 +222,93 @@ function tellMind() {
     ];
   say("since", "since " + since.toFixed(2) + " s");
   say("reason", reason);
+}
+
+// ---- values under the pointer, in the lanes and on the arena ----
+function tip(event, lines) {
+  const it = $("tip");
+  it.textContent = lines;
+  it.hidden = !lines;
+  if (!lines) return;
+  const x = Math.min(event.clientX + 14, innerWidth - it.offsetWidth - 8),
+    y = event.clientY + 18 + it.offsetHeight > innerHeight ? event.clientY - it.offsetHeight - 12 : event.clientY + 18;
+  it.style.transform = `translate(${Math.max(4, x)}px, ${Math.max(4, y)}px)`;
+}
+function hoverTracks(event) {
+  const t = timeOfPixel(event.offsetX),
+    [from, to] = span();
+  const box = laneBoxes().find(one => event.offsetY * ratio >= one.top && event.offsetY * ratio < one.top + one.height);
+  const inside = event.offsetX >= GUTTER && t >= from && t <= Math.min(to, run.duration);
+  hoverTime = inside ? t : null;
+  tip(
+    event,
+    inside
+      ? (to - from < 0.5 ? t.toFixed(5) : t.toFixed(2)) +
+          " s" +
+          (box ? "\n" + box.lane.name + ": " + box.lane.at(t) : "")
+      : box
+        ? box.lane.name
+        : "",
+  );
+  requestDraw();
+}
+const NEAR = 9; // pixels
+function hoverArena(event) {
+  const x = backX(event.offsetX * ratio),
+    y = backY(event.offsetY * ratio),
+    lines = [];
+  runs.forEach((one, i) => {
+    if (one.time.length) lines.push(...aboutRobot(one, i, x, y));
+  });
+  if (!lines.length) lines.push(...aboutPath(x, y));
+  for (const { points, text } of plan.remarks) if (within(points, x, y)) lines.push(text);
+  lines.push(minus(x.toFixed(2)) + ", " + minus(y.toFixed(2)) + " m");
+  tip(event, lines.join("\n"));
+}
+function aboutRobot(one, i, x, y) {
+  const place = placeOf(one);
+  if (Math.hypot(place[0] - x, place[1] - y) > one.robot.radius) return [];
+  return [(runs.length > 1 ? "robot " + (i + 1) + ": " : "") + one.brain, "at " + asPose(place)];
+}
+// When the robot was there.
+function aboutPath(x, y) {
+  const i = nearestTick(run, x, y);
+  if (i < 0) return [];
+  return ["here at " + run.time.values[i].toFixed(2) + " s"];
+}
+// Of the path so far, or of the whole one where that is shown; -1: none is near.
+function nearestTick(one, x, y) {
+  const [xs, ys] = one.path.map(column => column.values),
+    end = $("whole").checked ? one.last : tickOf(one);
+  let best = ((NEAR * ratio) / scale) ** 2,
+    found = -1;
+  for (let i = 0; i <= end; i++) {
+    const far = (xs[i] - x) ** 2 + (ys[i] - y) ** 2;
+    if (far < best) {
+      best = far;
+      found = i;
+    }
+  }
+  return found;
+}
+function within(points, x, y) {
+  let inside = false;
+  points.forEach(([ax, ay], i) => {
+    const [bx, by] = points[(i + 1) % points.length];
+    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) inside = !inside;
+  });
+  return inside;
+}
+function listenToPointer() {
+  $("cursor").addEventListener("pointermove", hoverTracks);
+  $("stage").addEventListener("pointermove", event => {
+    if (isDragging()) tip(event, ""); // it would say where the thing still is
+    else if (fingers.size < 2) hoverArena(event);
+  });
+  for (const id of ["cursor", "stage"])
+    $(id).addEventListener("pointerleave", event => {
+      hoverTime = null;
+      tip(event, "");
+      requestDraw();
+    });
 }

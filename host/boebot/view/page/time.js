@@ -65,7 +65,7 @@ function advance(stamp) {
   else requestAnimationFrame(advance);
 }
 function seek(t) {
-  hooks.sought();
+  if (pageIsLive) setNewest(false);
   now = Math.max(0, Math.min(run.duration, t));
   draw();
 }
@@ -84,7 +84,8 @@ function chooseRobot(index) {
   $("slider").max = run.last;
   $("cursor").ariaValueMax = run.duration;
   makePanels();
-  hooks.chosen();
+  makeParameters();
+  if (state) tellState();
   resize();
 }
 
@@ -100,7 +101,7 @@ function replayKey(e) {
   } else if (e.key === "ArrowLeft") seek(now - step);
   else if (e.key === "ArrowRight") seek(now + step);
   else if (e.key === "Home") seek(0);
-  else if (e.key === "End") seek(run.duration);
+  else if (e.key === "End") pageIsLive ? setNewest(true) : seek(run.duration);
   else if (e.key === "n" || e.key === "N") goToEvent(true);
   else if (e.key === "p" || e.key === "P") goToEvent(false);
   else return false;
@@ -118,7 +119,7 @@ function onKey(e) {
     zoomTime(e.key === "+" ? 0.5 : 2);
     return;
   }
-  if (hooks.key(e) || arenaKey(e) || replayKey(e)) e.preventDefault();
+  if (dragKey(e) || driveKey(e) || arenaKey(e) || replayKey(e)) e.preventDefault();
 }
 function listenToTime() {
   $("play").onclick = () => setPlaying(!playing);
@@ -132,3 +133,37 @@ function listenToTime() {
   $("robot").onchange = e => chooseRobot(Number(e.target.value) - 1);
   addEventListener("keydown", onKey);
 }
+
+// ---- the beginning: with the run that is in the page, or by asking the server for the one that goes on ----
+function start() {
+  readColours();
+  listenToArena();
+  listenToTracks();
+  listenToPointer();
+  listenToTime();
+  const sizes = new ResizeObserver(() => run && resize()); // of the window, or a lane more
+  for (const id of ["stage", "cursor"]) sizes.observe($(id));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    readColours();
+    if (run) {
+      namesShown = -1;
+      makePanels();
+      viewChanged();
+      tracksChanged();
+    }
+  });
+  if (pageIsLive) {
+    listenToVisibility();
+    connect();
+  } else show(page);
+}
+// #t=12.3 in the address opens the page at that moment, #robot=2&t=12.3 with another robot's signals.
+function show(content) {
+  begin(content);
+  const chosen = Number((/[#&]robot=(\d+)/.exec(location.hash) || [0, 1])[1]),
+    at = /[#&]t=([\d.]+)/.exec(location.hash);
+  run = runs[Math.min(runs.length, Math.max(1, chosen)) - 1];
+  now = at ? Math.min(run.duration, Number(at[1])) : 0;
+  chooseRobot(runs.indexOf(run));
+}
+start();
