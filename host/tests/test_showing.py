@@ -131,7 +131,7 @@ def test_page_shows_values_and_sketches(folder: Path) -> None:
         scale, *shift = moment["scale"]
         paths, dots = (
             [
-                (np.array(row["path"])[:, :2] - shift) / (scale, -scale)
+                (np.array([point[:2] for point in row["path"]]) - shift) / (scale, -scale)
                 for row in moment["drawn"]
                 if row.get(how) == "#7b4fa3"
             ]
