@@ -22,7 +22,7 @@ from hil_tests.bootloader import with_bootloader
 from hil_tests.calibration import board
 from hil_tests.calibration.talk import START, Talk
 from sim_bridge.serve import carry
-from sim_bridge.served_ports.pty_port import PtyPort
+from sim_bridge.served_ports import PtyPort
 from sim_bridge.sessions.with_board import SimSession, open_avr
 
 pytestmark = pytest.mark.emulated

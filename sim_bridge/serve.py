@@ -17,9 +17,7 @@ from collections.abc import Callable
 from boebot.boards import BoardRequest, BoardSession, Visit
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.served_ports.port import Port
-from sim_bridge.served_ports.pty_port import PtyPort
-from sim_bridge.served_ports.tcp_port import TcpPort
+from sim_bridge.served_ports import Port, PtyPort, TcpPort
 from sim_bridge.sessions.opening import Pace
 from sim_bridge.sessions.with_board import SimSession, open_avr, open_native
 
@@ -31,28 +29,6 @@ BITS_PER_BYTE = 10
 LOOK_S = 0.05  # between two looks at where the robot is
 
 Look = Callable[[BoardSession, bytes], None]
-
-
-class LineToBoard:
-    """The serial line towards the board, which carries one byte after the other."""
-
-    def __init__(self, session: SimSession) -> None:
-        self._session = session
-        self._free = 0  # cycle from which on it is idle
-
-    def carry(self, port: Port) -> bool:
-        """Puts on the line what the port has received and the line has time for. Returns whether there was any."""
-        byte = BITS_PER_BYTE * CLOCK_HZ // self._session.transport.baud
-        now = self._session.sim.cycle
-        start = max(now, self._free)
-        data = port.take(max((now + AHEAD_CYCLES - start) // byte, 1 if start == now else 0))
-        self._session.robot.send(data)
-        self._free = start + len(data) * byte
-        return bool(data)
-
-    def run_idle(self) -> None:
-        """Lets time pass until nothing is on it."""
-        self._session.sim.run(max(0, self._free - self._session.sim.cycle))
 
 
 def carry(
@@ -69,7 +45,7 @@ def carry(
     """
     sim = session.sim
     pace = Pace(sim)
-    line = LineToBoard(session)
+    line_free = 0  # cycle from which on the line towards the board is idle
     baud = None
     brisk_until = look_at = 0.0
     noted = 0
@@ -77,7 +53,7 @@ def carry(
     while running():
         for event in port.look():
             if event.what == "came":
-                line.run_idle()
+                sim.run(max(0, line_free - sim.cycle))
                 session.board.reset("external")
             visit(event)
         if (now := port.baud()) is not None and now != baud:
@@ -89,7 +65,11 @@ def carry(
             for sentence in (notes := session.notes())[noted:]:
                 visit(Visit("notes", "the board", sentence))
             noted = len(notes)
-        if line.carry(port):
+        byte = BITS_PER_BYTE * CLOCK_HZ // session.transport.baud
+        start = max(sim.cycle, line_free)
+        if data := port.take(max((sim.cycle + AHEAD_CYCLES - start) // byte, 1 if start == sim.cycle else 0)):
+            session.robot.send(data)
+            line_free = start + len(data) * byte
             brisk_until = time.monotonic() + BRISK_FOR_S
         if data := session.robot.receive():
             port.write(data)

@@ -142,7 +142,7 @@ def test_client_that_does_not_read_stops_nobody() -> None:
 def test_what_cannot_be_served_is_told() -> None:
     with served(0) as url:
         taken = int(url.rpartition(":")[2])
-        with pytest.raises(BoardError, match=f"^TCP port {taken} cannot be opened: it is in use$"):
+        with pytest.raises(BoardError, match=f"^TCP port {taken} cannot be opened: it is in use; expected a free one"):
             serve("native", request(), tcp=taken, announce=print, visit=print, running=lambda: False)
     with pytest.raises(BoardError, match="no emulated board 'toaster'"):
         serve("toaster", request(), tcp=0, announce=print, visit=print, running=lambda: False)
