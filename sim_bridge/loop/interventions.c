@@ -89,16 +89,6 @@ int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t 
   return SIM_OK;
 }
 
-void robot_step_waves(robot *self, uint64_t until) {
-  for (int i = 0; i < self->waves; i++) {
-    wave *w = &self->wave[i];
-    for (; w->next <= until && w->next <= w->end; w->next += w->half) {
-      w->level = !w->level;
-      self->board->op->drive(self->board, w->next, w->pin, w->level);
-    }
-  }
-}
-
 int sim_hold_whisker(sim *self, int number, uint8_t pin, int held) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || held < -1 || held > 1) return SIM_BAD_ARGUMENT;

@@ -5,10 +5,7 @@
 
 #include "state.h"
 
-#define BITS_PER_BYTE 10u
 #define LINE_RATE 500000u /* bit/s, unless set */
-
-uint64_t line_idle_cycles(uint32_t baud) { return 2u * BITS_PER_BYTE * (uint64_t)BOARD_CLOCK_HZ / baud; }
 
 /* ---- simulation ---------------------------------------------------------------------------------------------------- */
 
@@ -52,18 +49,6 @@ void sim_destroy(sim *self) {
 }
 
 /* ---- robots -------------------------------------------------------------------------------------------------------- */
-
-robot *sim_robot(const sim *self, int number) {
-  for (int i = 0; i < self->robot_count; i++) {
-    if (self->robots[i]->number == number) return self->robots[i];
-  }
-  return NULL;
-}
-
-robot *sim_robot_with_board(const sim *self, int number) {
-  robot *r = sim_robot(self, number);
-  return r == NULL || r->board == NULL ? NULL : r;
-}
 
 /* Its place in the order of numbers. */
 static void insert(sim *self, robot *r) {
@@ -218,14 +203,6 @@ int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parame
   const int status = join(r, &b->part);
   if (status == SIM_OK) r->battery = b;
   return status;
-}
-
-turret *robot_turret(const robot *self, uint8_t pin) {
-  for (int i = 0; i < self->part_count; i++) {
-    turret *t = turret_of(self->parts[i]);
-    if (t != NULL && t->part.pins[0].pin == pin) return t;
-  }
-  return NULL;
 }
 
 int sim_mount(sim *self, int number, uint8_t turret_pin, uint8_t pin) {

@@ -24,14 +24,6 @@ double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
 
 /* ---- the world's step ---------------------------------------------------------------------------------------------- */
 
-void robot_update_supply(robot *self) {
-  chassis *c = &self->chassis;
-  const int held = self->held_supply > 0.0;
-  const supply *s = self->battery == NULL || held ? NULL : &self->battery->supply;
-  c->supply = s == NULL ? (held ? self->held_supply : 1.0) : s->board_v / BOARD_NOMINAL_VOLTS;
-  c->servo_supply = s == NULL ? c->supply : s->servo_v / BOARD_NOMINAL_VOLTS;
-}
-
 /* What the LEDs of all robots sent in the last step reaches the receivers of the others one step later. */
 static void exchange_light(sim *self) {
   for (int i = 0; i < self->robot_count; i++) {

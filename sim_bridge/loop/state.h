@@ -1,5 +1,6 @@
-/* state.h: what the files of the loop know of a simulation: run.c runs it, join.c builds it, truth.c reads
- * it, interventions.c lays a test's hands on it, vehicle.c has the robots without boards.
+/* state.h: what the files of the loop know of a simulation: robots.c finds its robots, truth.c reads it, run.c runs it, join.c
+ * builds it, vehicle.c has the robots without boards, interventions.c lays a test's hands on it. Each calls only those before
+ * it.
  */
 #ifndef LOOP_STATE_H
 #define LOOP_STATE_H
@@ -77,6 +78,8 @@ struct sim {
   buffer shifts; /* rows of sim_shift */
 };
 
+/* ---- robots.c, which the others build on */
+
 /* The robot of that number, or NULL. */
 robot *sim_robot(const sim *self, int number);
 
@@ -86,42 +89,47 @@ robot *sim_robot_with_board(const sim *self, int number);
 /* The turret on that pin, or NULL. */
 turret *robot_turret(const robot *self, uint8_t pin);
 
-/* A new robot with a board or without; the caller fills in its body. NULL without memory. */
-robot *sim_new_robot(sim *self, int number, board *b);
+/* The voltage of the rail as it is now goes to all that runs on it. */
+void robot_update_supply(robot *self);
 
-/* It stands at that pose, and is among the others from now on. */
-void sim_insert(sim *self, robot *r, double x, double y, double heading);
-
-/* SIM_OK where there can be one more robot of that number and radius at a place. */
-int sim_has_room(const sim *self, int number, double radius, double x, double y, double heading);
-
-/* vehicle.c: sensors of robots without a board begin anew, when another robot has come: they may meet another thing
- * now. */
+/* Sensors of robots without a board begin anew, when another robot has come: they may meet another thing now. */
 void sim_sense_anew(sim *self);
 
-/* run.c: what a robot does in a step of the world, with a board or without. */
+/* Queues the edges of a test's square waves up to `until`. */
+void robot_step_waves(robot *self, uint64_t until);
+
+/* The id of a robot among the movers; never 0. */
+static inline uint32_t robot_mover_id(int number) { return (uint32_t)number + 1u; }
+
+/* Cycles without a byte after which a line of that bit rate is idle: the time of two bytes of ten bits. */
+static inline uint64_t line_idle_cycles(uint32_t baud) { return 20u * (uint64_t)BOARD_CLOCK_HZ / baud; }
+
+/* ---- truth.c */
+
+/* A row of the truth, unless there is one of that cycle or a later one. */
+void robot_record(robot *r, uint64_t cycle);
+
+/* How long movers waited in the world's step that began at `begin`. */
+void sim_record_waits(sim *self, uint64_t begin);
+
+/* ---- run.c */
+
+/* What a robot does in a step of the world, with a board or without. */
 extern const world_robot_operations ROBOT_OPERATIONS;
 
 /* Sinks of the board: context is the robot. */
 void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
 double robot_on_analog(void *context, uint64_t cycle, uint8_t channel);
 
-/* Cycles without a byte after which a line of that bit rate is idle. */
-uint64_t line_idle_cycles(uint32_t baud);
+/* ---- join.c */
 
-/* The voltage of the rail as it is now goes to all that runs on it. */
-void robot_update_supply(robot *self);
+/* SIM_OK where there can be one more robot of that number and radius at a place. */
+int sim_has_room(const sim *self, int number, double radius, double x, double y, double heading);
 
-/* truth.c: a row of the truth, unless there is one of that cycle or a later one. */
-void robot_record(robot *r, uint64_t cycle);
+/* A new robot with a board or without; the caller fills in its body. NULL without memory. */
+robot *sim_new_robot(sim *self, int number, board *b);
 
-/* truth.c: how long movers waited in the world's step that began at `begin`. */
-void sim_record_waits(sim *self, uint64_t begin);
-
-/* The id of a robot among the movers; never 0. */
-static inline uint32_t robot_mover_id(int number) { return (uint32_t)number + 1u; }
-
-/* Queues the edges of a test's square waves up to `until`. */
-void robot_step_waves(robot *self, uint64_t until);
+/* It stands at that pose, and is among the others from now on. */
+void sim_insert(sim *self, robot *r, double x, double y, double heading);
 
 #endif

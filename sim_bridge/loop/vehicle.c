@@ -4,16 +4,6 @@
 #include <math.h>
 
 #include "state.h"
-#include "vehicles/sense.h"
-
-void sim_sense_anew(sim *self) {
-  for (int i = 0; i < self->robot_count; i++) {
-    vehicles *v = self->robots[i]->vehicle;
-    if (v == NULL) continue;
-    v->worlds[0].state.sensed = 0;
-    vehicle_sensors_start(v, 0);
-  }
-}
 
 int sim_add_vehicle(sim *self, int number, const vehicle_model *model, double x, double y, double heading) {
   if (fabs(model->dt - self->world.dt) > 1e-12) return SIM_BAD_ARGUMENT;

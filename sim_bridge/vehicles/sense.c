@@ -37,6 +37,20 @@ void vehicle_sensors_free_room(vehicles *self) {
 
 /* ---- sensing ------------------------------------------------------------------------------------------------------ */
 
+void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
+  const vehicle_model *m = self->model;
+  const vehicle *w = &self->worlds[i];
+  const double rims[2] = {body_axis_left(&w->body), body_axis_right(&w->body)};
+  for (int side = 0; side < 2; side++) {
+    currents[side] = 0.0;
+    if (m->drive != DRIVE_DC) continue;
+    const motor_dc_parameters *motor = &m->dc[side];
+    const double volts = motor_dc_voltage(motor, w->state.signals[side]);
+    currents[side] =
+        m->full ? w->state.currents[side] : motor_dc_current(motor, volts, rims[side] / m->body.wheel_radius);
+  }
+}
+
 /* Current of both motors, A. */
 static double motor_current(const void *robot) {
   const vehicle *w = robot;
@@ -93,7 +107,7 @@ static void read_one(vehicles *self, size_t i, size_t number, const sensing *s) 
   if (sensor->period > 0.0) sample_hold_take(&slot->hold, s->time, *readings);
 }
 
-void vehicle_sense(vehicles *self, size_t i) {
+void vehicles_sense(vehicles *self, size_t i) {
   vehicle *w = &self->worlds[i];
   if (w->state.sensed == w->state.step + 1) return;
   const viewpoint from = vehicle_viewpoint(w);

@@ -4,9 +4,6 @@
 
 #include "vehicle.h"
 
-/* Readings of world `i` after its present step; does nothing when they are there already. */
-void vehicle_sense(vehicles *self, size_t i);
-
 /* Each sensor's place for the numbers that it keeps. */
 void vehicle_sensors_give_numbers(vehicles *self);
 

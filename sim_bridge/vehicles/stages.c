@@ -7,8 +7,6 @@
 
 #define SERVO_PERIOD_S 0.020
 
-void vehicles_sense(vehicles *self, size_t i) { vehicle_sense(self, i); }
-
 int vehicles_send(vehicles *self, size_t i, double left, double right) {
   if (!isfinite(left) || !isfinite(right)) return VEHICLE_BAD_NUMBER;
   self->worlds[i].state.signals[0] = number_limited(left, 1.0);
@@ -56,7 +54,7 @@ static size_t index_of(const vehicle *w) { return (size_t)(w - w->all->worlds); 
 
 static void begin_step(void *owner, double out[2]) {
   vehicle *w = owner;
-  vehicle_sense(w->all, index_of(w)); /* in a world of several nobody may have asked yet */
+  vehicles_sense(w->all, index_of(w)); /* in a world of several nobody may have asked yet */
   if (w->state.flag != VEHICLE_RUNS) (void)vehicles_send(w->all, index_of(w), 0.0, 0.0);
   w->speed_before = w->body.state.speed;
   torques(w->all->model, w, out);
@@ -71,7 +69,7 @@ static void has_moved(void *owner) {
 static void end_step(void *owner) {
   vehicle *w = owner;
   (void)vehicles_check(w->all, index_of(w));
-  vehicle_sense(w->all, index_of(w));
+  vehicles_sense(w->all, index_of(w));
 }
 
 const world_robot_operations VEHICLE_OPERATIONS = {.torques = begin_step, .moved = has_moved, .sense = end_step};

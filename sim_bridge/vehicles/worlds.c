@@ -93,7 +93,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   for (int side = 0; side < 2 && m->drive == DRIVE_SERVO; side++)
     servo_motor_init(&m->servo[side], &w->state.servos[side], m->dt);
   vehicle_sensors_start(self, i);
-  vehicle_sense(self, i);
+  vehicles_sense(self, i);
   return VEHICLE_OK;
 }
 
@@ -142,20 +142,6 @@ const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count) {
 uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
 
 double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }
-
-void vehicles_currents(const vehicles *self, size_t i, double currents[2]) {
-  const vehicle_model *m = self->model;
-  const vehicle *w = &self->worlds[i];
-  const double rims[2] = {body_axis_left(&w->body), body_axis_right(&w->body)};
-  for (int side = 0; side < 2; side++) {
-    currents[side] = 0.0;
-    if (m->drive != DRIVE_DC) continue;
-    const motor_dc_parameters *motor = &m->dc[side];
-    const double volts = motor_dc_voltage(motor, w->state.signals[side]);
-    currents[side] =
-        m->full ? w->state.currents[side] : motor_dc_current(motor, volts, rims[side] / m->body.wheel_radius);
-  }
-}
 
 size_t vehicles_memory(const vehicles *self) {
   const vehicle_model *m = self->model;

@@ -10,13 +10,11 @@
 
 static uint8_t carrier_side, carrier_pin, carrier_half_period, toggles_left;
 static uint8_t receiver_high[SIDES]; /* at the end of its last burst */
-static enum { CAPTURE_OFF, CAPTURE_RISING, CAPTURE_FALLING } capture;
 static uint32_t tone_half_period;
 static uint8_t analog_channel;
 static uint16_t analog_result;
 
 void native_devices_reset(void) {
-  capture = CAPTURE_OFF;
   analog_channel = 0;
   analog_result = 0;
 }
@@ -62,25 +60,6 @@ void hal_ping_release(void) {
   HAL_PIN_INPUT(PING);
 #endif
 }
-
-void native_capture_edge(bool rising) {
-  if (capture == (rising ? CAPTURE_RISING : CAPTURE_FALLING)) {
-    native->interrupts++;
-#ifdef LIGHT_LEFT_IS_CAPTURED
-    light_on_left_fall(hal_time());
-#else
-    ping_on_edge(hal_time());
-#endif
-  }
-}
-
-void hal_capture_start(void) { capture = CAPTURE_RISING; }
-
-void hal_capture_start_falling(void) { capture = CAPTURE_FALLING; }
-
-void hal_capture_falling(void) { capture = CAPTURE_FALLING; }
-
-void hal_capture_stop(void) { capture = CAPTURE_OFF; }
 
 /* ---- buzzer ---- */
 

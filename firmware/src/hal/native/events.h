@@ -1,4 +1,5 @@
-/* events.h: the event queue of hal/native, shared by its files: each source of events has the cycle of its next one. */
+/* events.h: the event queue of hal/native, shared by its files: each source of events has the cycle of its next one. A file
+ * calls only those that stand before it here. */
 #ifndef NATIVE_EVENTS_H
 #define NATIVE_EVENTS_H
 
@@ -22,12 +23,25 @@ typedef enum {
   EVENTS
 } native_event;
 
+/* ---- clock_native.c */
 extern native_machine *native;
 extern uint64_t native_next[EVENTS]; /* NATIVE_NEVER: none */
 
-/* chip.c: pins as the two-wire unit has them, its lines low or let go with the pull-up, and their level. */
+/* The edge of the capture's pin has come. */
+void native_capture_edge(bool rising);
+void native_capture_reset(void);
+
+/* ---- pins_native.c */
+
+/* Works out the level on a pin; interrupts if it has changed. */
+void native_settle(uint8_t pin);
+void native_pins_reset(void); /* releases every pin */
+
+/* Pins as the two-wire unit has them, its lines low or let go with the pull-up, and their level. */
 void native_pull(uint8_t pin, bool low);
 bool native_level(uint8_t pin);
+
+/* ---- the devices, which build on clock and pins; chip.c calls all */
 
 /* What each event does, and what a reset does to its source. */
 void native_byte_arrived(void);
@@ -40,8 +54,5 @@ void native_serial_reset(void);
 void native_memory_reset(void);
 void native_devices_reset(void);
 void native_two_wire_reset(void);
-
-/* devices_native.c: an edge of the Ping pin. */
-void native_capture_edge(bool rising);
 
 #endif

@@ -1,0 +1,50 @@
+/* robots.c: what the other files of the loop ask of its robots; see state.h. */
+#include "state.h"
+#include "vehicles/sense.h"
+
+robot *sim_robot(const sim *self, int number) {
+  for (int i = 0; i < self->robot_count; i++) {
+    if (self->robots[i]->number == number) return self->robots[i];
+  }
+  return NULL;
+}
+
+robot *sim_robot_with_board(const sim *self, int number) {
+  robot *r = sim_robot(self, number);
+  return r == NULL || r->board == NULL ? NULL : r;
+}
+
+turret *robot_turret(const robot *self, uint8_t pin) {
+  for (int i = 0; i < self->part_count; i++) {
+    turret *t = turret_of(self->parts[i]);
+    if (t != NULL && t->part.pins[0].pin == pin) return t;
+  }
+  return NULL;
+}
+
+void robot_update_supply(robot *self) {
+  chassis *c = &self->chassis;
+  const int held = self->held_supply > 0.0;
+  const supply *s = self->battery == NULL || held ? NULL : &self->battery->supply;
+  c->supply = s == NULL ? (held ? self->held_supply : 1.0) : s->board_v / BOARD_NOMINAL_VOLTS;
+  c->servo_supply = s == NULL ? c->supply : s->servo_v / BOARD_NOMINAL_VOLTS;
+}
+
+void sim_sense_anew(sim *self) {
+  for (int i = 0; i < self->robot_count; i++) {
+    vehicles *v = self->robots[i]->vehicle;
+    if (v == NULL) continue;
+    v->worlds[0].state.sensed = 0;
+    vehicle_sensors_start(v, 0);
+  }
+}
+
+void robot_step_waves(robot *self, uint64_t until) {
+  for (int i = 0; i < self->waves; i++) {
+    wave *w = &self->wave[i];
+    for (; w->next <= until && w->next <= w->end; w->next += w->half) {
+      w->level = !w->level;
+      self->board->op->drive(self->board, w->next, w->pin, w->level);
+    }
+  }
+}
