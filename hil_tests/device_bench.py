@@ -7,21 +7,20 @@ It has the face of a board session, so that a Rig speaks with the board as with 
 
 from __future__ import annotations
 
-from boebot.description.robots import load_robot
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import BoardAccess, Level
-from sim_bridge.boards.emulated import avr_image, native_board, native_library
+from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library
 
 SLICE = 32  # cycles: 2 us
 SDA, SCL = 18, 19
 
 
-def open_board(url: str, pin_map: str) -> BoardAccess:
-    """A board, native or avr, with the image of that pin map."""
-    if url == "avr":
-        return avr.create(avr_image(pin_map)).access()
+def power_on(kind: str, pin_map: str = "shieldbot", image: str | None = None) -> BoardAccess:
+    """A board, native or avr, with the image of that pin map or another one, and with nothing around it."""
+    if kind == "avr":
+        return avr.create(image_file(image) if image else avr_image(pin_map)).access()
     board = native_board(native_library(pin_map))
     return BoardAccess(lib, ffi, ffi.cast("board *", board.address), owner=board)
 
@@ -154,18 +153,16 @@ class _Line:
 class DeviceBench:
     """A board session whose devices are ours."""
 
-    def __init__(self, url: str, pin_map: str) -> None:
-        self.access = open_board(url, pin_map)
-        self.robot = load_robot(pin_map)
+    def __init__(self, access: BoardAccess) -> None:
+        self.access = self.board = access
         self.transport = _Line(self)
-        self.board = self.access
         self.devices: list[TwoWireDevice | Capacitor | Receiver] = []
 
     def run(self, seconds: float) -> None:
         """Lets time pass."""
         end = self.access.now + round(seconds * CYCLES_PER_S)
         while self.access.now < end:
-            self.access.advance(min(self.access.now + (SLICE if self.devices else 16_000), end))
+            self.access.advance(min(self.access.now + SLICE, end) if self.devices else end)
             for device in self.devices:
                 device.step()
 
@@ -175,10 +172,10 @@ class DeviceBench:
 
 
 class DeviceRig(Rig):
-    """A rig around a board whose devices are ours."""
+    """A rig around a board by itself, whose devices are ours."""
 
-    def __init__(self, url: str, pin_map: str = "boebot", bench: DeviceBench | None = None) -> None:
-        self.bench = bench or DeviceBench(url, pin_map)
+    def __init__(self, access: BoardAccess) -> None:
+        self.bench = DeviceBench(access)
         super().__init__(self.bench)  # type: ignore[arg-type]
 
     def __enter__(self) -> DeviceRig:

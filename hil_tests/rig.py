@@ -41,6 +41,7 @@ class Rig:
         self.answers: list[Any] = []
         self.received = bytearray()
         self.events: list[messages.Event] = []
+        self.heard: list[Any] = []  # all messages
         self.hello: messages.Hello | None = None
         self.seed = 0
         self.alive = self.acknowledges = True
@@ -104,6 +105,7 @@ class Rig:
         self.received += data
         for message_id, _, payload in self.decoder.feed(data):
             message = messages.MESSAGES[message_id].unpack(payload)
+            self.heard.append(message)
             if isinstance(message, messages.Telemetry):
                 self.telemetry.append(message)
             elif isinstance(message, messages.Event):
@@ -125,6 +127,21 @@ class Rig:
         """The next message of that kind, or one that has come since the last question."""
         found: _M = self.wait_for(
             lambda: next((a for a in reversed(self.answers) if isinstance(a, kind)), None), within_s, kind.__name__
+        )
+        return found
+
+    def next_hello(self, within_s: float = 1.0) -> messages.Hello:
+        """The board's next hello."""
+        self.answers.clear()
+        return self.next(messages.Hello, within_s)
+
+    def first(self, kind: type[_M], such: Callable[[_M], bool], within_s: float, what: str) -> _M:
+        """The first message of that kind from now on that is such a one."""
+        begin = len(self.heard)
+        found: _M = self.wait_for(
+            lambda: next((heard for heard in self.heard[begin:] if isinstance(heard, kind) and such(heard)), None),
+            within_s,
+            what,
         )
         return found
 
@@ -231,10 +248,10 @@ class Rig:
         self.decoder.seed = frame.NO_SESSION
         hello = self.wait_for(free, 4.0, "a hello without a session")
         seed = hello.board_nonce ^ HOST_NONCE
-        for _ in range(5):
+        for attempt in range(5):
             self.send(messages.Open(messages.PROTOCOL_VERSION, hello.board_nonce, HOST_NONCE))
             self.decoder.seed = self.seed = seed
-            self.listen(2 * TICK_S)
+            self.listen((2 + 4 * attempt) * TICK_S)  # a slow line takes longer
             if self.hello is not None and self.hello.session == seed:
                 self._number = 0
                 return self.hello

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.messages import CompassStatus, Devices
-from hil_tests.device_bench import Capacitor, DeviceRig, Receiver, TwoWireDevice
+from hil_tests.device_bench import Capacitor, DeviceRig, Receiver, TwoWireDevice, power_on
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S
 from sim_bridge.boards.board import Level
 
@@ -23,7 +24,7 @@ STAMP_LATE_US = 3530 / CYCLES_PER_US  # at most, of port D's changes in overload
 
 @pytest.fixture
 def bench(board_url: str) -> Iterator[DeviceRig]:
-    with DeviceRig(board_url) as rig:
+    with DeviceRig(power_on(board_url, "boebot")) as rig:
         rig.start()
         rig.bench.access.log()
         yield rig
@@ -87,7 +88,7 @@ def test_light_is_the_decay_time(bench: DeviceRig, us: int) -> None:
 @pytest.mark.parametrize("us", [7, 400, 2_500, 13_000, 20_000])
 def test_light_sensors_of_the_basic_shieldbot(board_url: str, us: int) -> None:
     """The left one on Timer1's capture pin, where others have the Ping."""
-    with DeviceRig(board_url, "shieldbot-basic") as rig:
+    with DeviceRig(power_on(board_url, "shieldbot-basic")) as rig:
         rig.start()
         rig.bench.devices += [Capacitor(rig.bench.access, 8, us), Capacitor(rig.bench.access, LIGHT_RIGHT, us + 500)]
         reported = rig.devices(after_s=0.08)
@@ -174,12 +175,12 @@ def saturate(rig: DeviceRig, seconds: float) -> None:
 def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, pin_map: str) -> None:
     """Every device of the map at work, encoders at 1.5 kHz, the UART saturated both ways: ±4 cycles, no tick missed,
     no byte lost."""
-    with DeviceRig(board_url, pin_map) as rig:
+    with DeviceRig(power_on(board_url, pin_map)) as rig:
         rig.start()
         access = rig.bench.access
         device = compass(rig)
         rig.bench.devices += [Capacitor(access, LIGHT_LEFT, 1300.0), Capacitor(access, LIGHT_RIGHT, 2100.0)]
-        on = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in rig.bench.robot.device)
+        on = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in load_robot(pin_map).device)
         rig.set("devices", on)
         rig.set("encoder_gap", 0)
         rig.set("infrared_sweep", 1)

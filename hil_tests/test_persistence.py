@@ -12,7 +12,8 @@ from elftools.elf.elffile import ELFFile
 from boebot import resources
 from boebot.link import messages
 from hil_tests.bootloader import with_bootloader
-from hil_tests.minimal_host import CYCLES_PER_S, TICK_S, MinimalHost, power_on
+from hil_tests.device_bench import DeviceRig, power_on
+from hil_tests.rig import CYCLES_PER_S, TICK_S
 from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
 from sim_bridge.tests.boards.symbols import DATA_BASE, entry_of
 from tools.avr_program import IMAGES
@@ -41,26 +42,26 @@ def board(board_url: str) -> Iterator[BoardAccess]:
     board.close()
 
 
-def choose(host: MinimalHost, values: dict[int, int]) -> None:
+def choose(host: DeviceRig, values: dict[int, int]) -> None:
     for parameter, value in values.items():
-        assert host.ask(messages.SetParameter, parameter, value).status == OK
+        assert host.request(messages.SetParameter, parameter, value).status == OK
 
 
-def in_force(host: MinimalHost) -> dict[int, int]:
-    return {parameter: host.ask(messages.GetParameter, parameter).value for parameter in VALUES[0]}
+def in_force(host: DeviceRig) -> dict[int, int]:
+    return {parameter: host.request(messages.GetParameter, parameter).value for parameter in VALUES[0]}
 
 
-def restart(host: MinimalHost, cause: ResetCause) -> messages.Hello:
+def restart(host: DeviceRig, cause: ResetCause) -> messages.Hello:
     """Resets the board and opens a session with it; returns what it says of itself."""
     host.board.reset(cause)
-    return host.open()
+    return host.open_session()
 
 
 def test_saved_parameters_outlive_the_power(board: BoardAccess) -> None:
-    host = MinimalHost(board)
-    assert host.open().parameters_saved == 0
+    host = DeviceRig(board)
+    assert host.open_session().parameters_saved == 0
     choose(host, VALUES[0])
-    assert host.ask(messages.SaveParameters).status == OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     choose(host, VALUES[1])  # and does not save
     for cause in ResetCause:
         assert restart(host, cause).parameters_saved == 1
@@ -68,12 +69,12 @@ def test_saved_parameters_outlive_the_power(board: BoardAccess) -> None:
 
 
 def test_a_save_is_answered_when_it_is_written_and_no_tick_is_missed(board: BoardAccess) -> None:
-    host = MinimalHost(board)
-    host.open()
+    host = DeviceRig(board)
+    host.open_session()
     begin = board.now
-    assert host.ask(messages.SaveParameters).status == OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     assert SAVED_BYTES * CELL_S < (board.now - begin) / CYCLES_PER_S < SAVED_BYTES * WRITE_S + STEPS_S
-    telemetry = [message for message in host.messages if isinstance(message, messages.Telemetry)]
+    telemetry = [message for message in host.heard if isinstance(message, messages.Telemetry)]
     ticks = [message.tick for message in telemetry]
     assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
     assert telemetry[-1].overruns == 0
@@ -84,25 +85,25 @@ def test_a_save_is_answered_when_it_is_written_and_no_tick_is_missed(board: Boar
 @pytest.mark.parametrize("damage", list(Damage))
 def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -> None:
     """Cuts 3 ms apart meet each write of 3.4 ms; after each one the values are all old or all new."""
-    host = MinimalHost(board)
+    host = DeviceRig(board)
     board.eeprom_damage(damage, garbage=0x33)
-    host.open()
+    host.open_session()
     choose(host, VALUES[0])
-    assert host.ask(messages.SaveParameters).status == OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     now = 0
     hit: set[int] = set()
     outcomes = []
     for cut in range(round((SAVED_BYTES * WRITE_S + STEPS_S) / 0.003)):
         choose(host, VALUES[1 - now])
         before = board.read_eeprom()
-        host.begin(messages.SaveParameters)
+        host.send(host.numbered(messages.SaveParameters))
         host.listen(cut * 0.003)
         written = board.read_eeprom()
         board.reset(ResetCause.POWER)
         board.run(100)
         after = board.read_eeprom()
         hit |= {i for i in range(len(after)) if after[i] != written[i]}
-        assert host.open().parameters_saved == 1
+        assert host.open_session().parameters_saved == 1
         found = in_force(host)
         assert found in VALUES, f"after a cut {cut * 3} ms into a save: neither old nor new, {found}"
         outcomes.append(found == VALUES[1 - now])
@@ -120,8 +121,8 @@ def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -
 def test_power_cut_in_the_boot_counter(board: BoardAccess) -> None:
     """Started again and again, cut in mid-write: it goes up by one or stays, and never anything else."""
     board.eeprom_damage(Damage.GARBAGE, garbage=0xA5)
-    host = MinimalHost(board)
-    counter = host.hello().boot_counter
+    host = DeviceRig(board)
+    counter = host.next_hello().boot_counter
     assert counter == 1
     went_up = 0
     for cut in range(18):
@@ -137,8 +138,8 @@ def test_power_cut_in_the_boot_counter(board: BoardAccess) -> None:
         board.reset(ResetCause.POWER)
         board.run(100)
         assert {i for i, cell in enumerate(board.read_eeprom()) if cell != before[i]} <= set(BOOT_RING)
-        host.messages.clear()
-        found = host.hello().boot_counter
+        host.heard.clear()
+        found = host.next_hello().boot_counter
         assert found in (counter, counter + 1)
         went_up += found - counter
         counter = found
@@ -146,25 +147,26 @@ def test_power_cut_in_the_boot_counter(board: BoardAccess) -> None:
     for _ in range(2):
         board.run(10_300 * CYCLES_PER_MS)
         board.reset(ResetCause.EXTERNAL)
-        host.messages.clear()
+        host.heard.clear()
         counter += 1
-        assert host.hello().boot_counter == counter
+        assert host.next_hello().boot_counter == counter
 
 
 def test_nothing_is_written_while_the_supply_is_low(board: BoardAccess) -> None:
-    host = MinimalHost(board)
-    host.open()
+    host = DeviceRig(board)
+    host.open_session()
     choose(host, VALUES[0])
-    assert host.ask(messages.SaveParameters).status == OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     choose(host, VALUES[1])
-    number = host.begin(messages.SaveParameters)
+    request = host.numbered(messages.SaveParameters)
+    host.send(request)
     host.listen(0.05)
     board.supply(3.9)
-    answer = host.wait_for(messages.Answer, lambda answer: answer.number == number, 0.1, "the end of the save")
+    answer = host.first(messages.Answer, lambda answer: answer.number == request.number, 0.1, "the end of the save")
     assert answer.status == SUPPLY_LOW
     host.listen(0.01)  # the cell under way
     before = board.read_eeprom()
-    assert host.ask(messages.SaveParameters).status == SUPPLY_LOW
+    assert host.request(messages.SaveParameters, within_s=1.0).status == SUPPLY_LOW
     host.listen(0.3)
     assert board.read_eeprom() == before
     board.supply(5.0)
@@ -173,34 +175,34 @@ def test_nothing_is_written_while_the_supply_is_low(board: BoardAccess) -> None:
 
 
 def test_supply_is_told_in_millivolts(board: BoardAccess) -> None:
-    host = MinimalHost(board)
-    host.open()
+    host = DeviceRig(board)
+    host.open_session()
     for volts in (4.4, 5.0, 5.5):
         board.supply(volts)
         host.listen(0.05)
-        telemetry = [m for m in host.messages if isinstance(m, messages.Telemetry)][-1]
+        telemetry = [m for m in host.heard if isinstance(m, messages.Telemetry)][-1]
         assert telemetry.supply == 1100 * 1024 // int(1.1 * 1024 / volts)
 
 
 @pytest.mark.parametrize("hundreds", [96, 192, 384, 576, 1152, 2500, 5000, 10000])
 def test_line_has_the_saved_rate_after_the_next_reset(board: BoardAccess, hundreds: int) -> None:
-    host = MinimalHost(board)
-    host.open()
-    assert host.ask(messages.SetParameter, 18, hundreds).status == OK
-    assert host.ask(messages.SaveParameters).status == OK
+    host = DeviceRig(board)
+    host.open_session()
+    assert host.request(messages.SetParameter, 18, hundreds).status == OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     board.reset(ResetCause.EXTERNAL)
     board.line_rate(100 * hundreds)
-    host.messages.clear()
-    assert host.open().session != 0
-    assert host.ask(messages.GetParameter, 18, within_s=2.0).value == hundreds
+    host.heard.clear()
+    assert host.open_session().session != 0
+    assert host.request(messages.GetParameter, 18, within_s=2.0).value == hundreds
 
 
 # ---- resets ----------------------------------------------------------------------------------------------------------
 
 
 def test_each_cause_of_a_reset_is_told(board: BoardAccess) -> None:
-    host = MinimalHost(board)
-    assert host.hello().reset_cause == messages.ResetCause.POWER
+    host = DeviceRig(board)
+    assert host.next_hello().reset_cause == messages.ResetCause.POWER
     for cause, reported in (
         (ResetCause.EXTERNAL, messages.ResetCause.EXTERNAL),
         (ResetCause.BROWN_OUT, messages.ResetCause.BROWN_OUT),
@@ -209,15 +211,15 @@ def test_each_cause_of_a_reset_is_told(board: BoardAccess) -> None:
     ):
         board.reset(cause)
         # the watchdog's may have come while a task was running, which is then reported, too
-        assert messages.ResetCause(host.hello().reset_cause).name.partition("_IN_")[0] == reported.name
+        assert messages.ResetCause(host.next_hello().reset_cause).name.partition("_IN_")[0] == reported.name
 
 
 def test_nonce_is_another_one_after_each_reset(board: BoardAccess) -> None:
-    host = MinimalHost(board)
-    nonces = [host.hello().board_nonce]
+    host = DeviceRig(board)
+    nonces = [host.next_hello().board_nonce]
     for i in range(40):
         board.reset(ResetCause.EXTERNAL if i % 2 else ResetCause.WATCHDOG)
-        nonces.append(host.hello().board_nonce)
+        nonces.append(host.next_hello().board_nonce)
     assert len(set(nonces)) == len(nonces)
     assert all(0 < nonce < 1 << 21 for nonce in nonces)
 
@@ -261,16 +263,16 @@ def test_a_hang_is_told(
     marks the record, either, by which a program behind a bootloader knows it."""
     image = patched(tmp_path, HANG_AT, code)
     board = power_on("avr", image=str(with_bootloader(image, tmp_path) if bootloader else image))
-    host = MinimalHost(board)
-    host.hello()
+    host = DeviceRig(board)
+    host.next_hello()
     host.send(messages.Identify())
     host.listen(reset_s - 0.003)
     assert board.counters()["resets"] == 0
-    cause = messages.ResetCause(host.hello().reset_cause)
+    cause = messages.ResetCause(host.next_hello().reset_cause)
     assert cause.name.partition("_IN_")[0] == reported.name  # it may say in which task
     assert board.counters()["resets"] == 1
     board.reset(ResetCause.EXTERNAL)
-    assert host.hello(2.0).reset_cause == EXTERNAL
+    assert host.next_hello(2.0).reset_cause == EXTERNAL
 
 
 @pytest.mark.parametrize("pin_map", IMAGES)
@@ -278,8 +280,8 @@ def test_behind_a_bootloader_the_memory_tells_the_cause(tmp_path: Path, pin_map:
     """It leaves nothing of the chip's own answer. RAM holds something else whenever the power comes; a brown-out that
     leaves it whole looks like an external reset."""
     image = with_bootloader(resources.folder("images") / f"{pin_map}.elf", tmp_path)
-    host = MinimalHost(power_on("avr", image=str(image)))
-    assert host.hello().reset_cause == POWER
+    host = DeviceRig(power_on("avr", image=str(image)))
+    assert host.next_hello().reset_cause == POWER
     for cause, reported in [
         (ResetCause.EXTERNAL, EXTERNAL),
         (ResetCause.EXTERNAL, EXTERNAL),
@@ -289,7 +291,7 @@ def test_behind_a_bootloader_the_memory_tells_the_cause(tmp_path: Path, pin_map:
         (ResetCause.POWER, POWER),
     ]:
         host.board.reset(cause)
-        assert host.hello(2.0).reset_cause == reported
+        assert host.next_hello(2.0).reset_cause == reported
 
 
 @pytest.mark.parametrize("pin_map", IMAGES)
@@ -325,11 +327,11 @@ def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(board:
     entry = b"\xa5" + boots + crc16(boots).to_bytes(2, "little")
     for address, data in ((0, record), (128, record), (256, entry)):
         board.write_eeprom(address, data)
-    host = MinimalHost(board)
-    hello = host.open()
+    host = DeviceRig(board)
+    hello = host.open_session()
     assert (hello.parameters_saved, hello.boot_counter) == (0, 42)
     choose(host, VALUES[0])
-    assert host.ask(messages.SaveParameters).status == OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     assert restart(host, ResetCause.POWER).parameters_saved == 1
     assert in_force(host) == VALUES[0]
     assert board.read_eeprom()[: len(record)] == record
@@ -337,10 +339,10 @@ def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(board:
 
 def test_what_becomes_of_the_first_cell_does_not_matter(board: BoardAccess) -> None:
     """When the supply fails it is address 0 that is written (data sheet, 8.4.2)."""
-    host = MinimalHost(board)
-    host.open()
+    host = DeviceRig(board)
+    host.open_session()
     choose(host, VALUES[0])
-    assert host.ask(messages.SaveParameters).status == OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     for byte in (0x00, 0xA5, 0xFF):
         board.write_eeprom(0, [byte])
         assert restart(host, ResetCause.POWER).parameters_saved == 1

@@ -13,7 +13,8 @@ from boebot.devices.servo import ContinuousServo
 from boebot.devices.uart import Uart
 from boebot.link import messages
 from hil_tests.bootloader import with_bootloader
-from hil_tests.minimal_host import CYCLES_PER_S, MinimalHost, power_on
+from hil_tests.device_bench import DeviceRig, power_on
+from hil_tests.rig import CYCLES_PER_S
 from sim_bridge.boards.board import Level, ResetCause
 from tools.avr_program import IMAGES
 
@@ -29,7 +30,7 @@ def device_pins(pin_map: str) -> dict[str, list[int]]:
     return {name: sorted(d.pins().values()) for name, d in devices if not isinstance(d, ContinuousServo | Uart)}
 
 
-def levels(host: MinimalHost, seconds: float) -> dict[int, set[Level]]:
+def levels(host: DeviceRig, seconds: float) -> dict[int, set[Level]]:
     """What the board does to each pin within that time."""
     host.board.edges()
     seen = {pin: {host.board.output(pin)} for pin in range(20)}
@@ -42,9 +43,9 @@ def levels(host: MinimalHost, seconds: float) -> dict[int, set[Level]]:
 @pytest.mark.parametrize("kind", ["native", "avr"])
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: str) -> None:
-    host = MinimalHost(power_on(kind, pin_map))
-    host.open()
-    assert host.ask(messages.SetParameter, messages.PARAMETERS["devices"].id, 0).status == messages.AnswerStatus.OK
+    host = DeviceRig(power_on(kind, pin_map))
+    host.open_session()
+    assert host.request(messages.SetParameter, messages.PARAMETERS["devices"].id, 0).status == messages.AnswerStatus.OK
     host.listen(0.1)
     seen = levels(host, 0.5)
     for device, pins in device_pins(pin_map).items():
@@ -56,10 +57,10 @@ def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: s
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) -> None:
     """All devices on: an echo is awaited for 20 ms, a decay for 14 ms; what an analog sensor gives is not pulled at."""
-    host = MinimalHost(power_on(kind, pin_map))
-    host.open()
+    host = DeviceRig(power_on(kind, pin_map))
+    host.open_session()
     built = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in load_robot(pin_map).device)
-    host.ask(messages.SetParameter, messages.PARAMETERS["devices"].id, built)
+    host.request(messages.SetParameter, messages.PARAMETERS["devices"].id, built)
     host.listen(0.1)
     measured = {"ping", "light_left", "light_right", "battery", "analog_infrared"}
     measured |= {"line_left", "line_middle", "line_right"}
@@ -73,7 +74,7 @@ def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) ->
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> None:
     """Who knows what is wired to the board before anyone says so?"""
-    host = MinimalHost(power_on(kind, pin_map))
+    host = DeviceRig(power_on(kind, pin_map))
     seen = levels(host, 1.5)
     for device, pins in device_pins(pin_map).items():
         for pin in pins:

@@ -14,8 +14,8 @@ from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.link import Link
 from boebot_timing.board import measure
-from hil_tests.minimal_host import TICK_S, MinimalHost, power_on
-from hil_tests.rig import CYCLES_PER_US
+from hil_tests.device_bench import DeviceRig, power_on
+from hil_tests.rig import CYCLES_PER_US, HOST_NONCE, TICK_S
 from hil_tests.test_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted
 from sim_bridge.boards.board import ResetCause
 
@@ -30,16 +30,16 @@ READING_CYCLES = 160  # from the first reading of the timer to the call, and fro
 LONGEST = 0xFFFF
 
 
-def session(image: str | None = None) -> MinimalHost:
-    host = MinimalHost(power_on("avr", image=image))
-    host.open()
+def session(image: str | None = None) -> DeviceRig:
+    host = DeviceRig(power_on("avr", image=image))
+    host.open_session()
     return host
 
 
-def next_time(host: MinimalHost, task: messages.Task) -> int:
+def next_time(host: DeviceRig, task: messages.Task) -> int:
     """The next time that the board sends of a task; meanwhile the session is kept open."""
     host.send(messages.ClockProbe(0))
-    return host.wait_for(
+    return host.first(
         messages.TaskTime, lambda time: time.task == task, ROUND_S + TICK_S, f"the time of {task}"
     ).longest
 
@@ -69,7 +69,9 @@ def test_each_task_is_told_within_a_round_and_its_time_never_falls() -> None:
     longest = dict.fromkeys(messages.Task, 0)
     for _ in range(3):
         host.send(messages.ClockProbe(0))
-        heard = [message for message in host.listen(ROUND_S) if isinstance(message, messages.TaskTime)]
+        host.answers.clear()
+        host.listen(ROUND_S)
+        heard = [message for message in host.answers if isinstance(message, messages.TaskTime)]
         assert sorted(time.task for time in heard) == list(messages.Task)
         for time in heard:
             if time.task == messages.Task.LINE:  # this image has none
@@ -87,15 +89,18 @@ def test_the_longest_times_start_anew_with_each_session(closes: bool) -> None:
     """Storing the parameters takes the task `storage` longer than anything else that it does."""
     host = session()
     idle = next_time(host, messages.Task.STORAGE)
-    assert host.ask(messages.SaveParameters).status == messages.AnswerStatus.OK
+    assert host.request(messages.SaveParameters, within_s=1.0).status == messages.AnswerStatus.OK
     stored = next_time(host, messages.Task.STORAGE)
     assert stored > 1.5 * idle
     assert next_time(host, messages.Task.STORAGE) == stored
     if closes:
         host.send(messages.Close(host.seed))
-        host.open()
+        host.open_session()
     else:
-        host.take_over()
+        nonce = host.next_hello().board_nonce
+        host.send(messages.Open(messages.PROTOCOL_VERSION, nonce, HOST_NONCE))
+        host.decoder.seed = host.seed = nonce ^ HOST_NONCE
+        assert host.next_hello().session == host.seed
     assert next_time(host, messages.Task.STORAGE) < stored / 1.5
 
 
@@ -104,18 +109,18 @@ def test_the_longest_times_start_anew_with_each_session(closes: bool) -> None:
 def test_the_task_that_hung_is_told_by_the_next_hello(tmp_path: Path, task: str, deaf: bool) -> None:
     """The first hello comes before these have run, the next one after the reset."""
     board = power_on("avr", image=planted(tmp_path, f"{task}_task", (CLI if deaf else b"") + JUMP_TO_ITSELF))
-    host = MinimalHost(board)
-    assert host.hello().reset_cause == messages.ResetCause.POWER
-    assert host.hello().reset_cause == messages.ResetCause[f"WATCHDOG_IN_{task.upper()}"]
+    host = DeviceRig(board)
+    assert host.next_hello().reset_cause == messages.ResetCause.POWER
+    assert host.next_hello().reset_cause == messages.ResetCause[f"WATCHDOG_IN_{task.upper()}"]
     assert board.counters()["resets"] == 1
     board.reset(ResetCause.EXTERNAL)
     host.listen(0.001)
-    assert host.hello().reset_cause == messages.ResetCause.EXTERNAL, "reported once"
+    assert host.next_hello().reset_cause == messages.ResetCause.EXTERNAL, "reported once"
 
 
-def after_reset(host: MinimalHost) -> int:
+def after_reset(host: DeviceRig) -> int:
     """The cause in the first hello after a reset."""
-    return host.wait_for(
+    return host.first(
         messages.Hello, lambda hello: hello.reset_cause != messages.ResetCause.POWER, 1.0, "a hello after a reset"
     ).reset_cause
 
@@ -131,8 +136,8 @@ def test_a_link_that_hung_is_told_as_outside_of_the_tasks(tmp_path: Path, deaf: 
 
 def test_an_interrupt_that_hung_is_told_as_what_it_interrupted(tmp_path: Path) -> None:
     """Of a byte."""
-    host = MinimalHost(power_on("avr", image=planted(tmp_path, "__vector_18", JUMP_TO_ITSELF)))
-    assert host.hello().reset_cause == messages.ResetCause.POWER
+    host = DeviceRig(power_on("avr", image=planted(tmp_path, "__vector_18", JUMP_TO_ITSELF)))
+    assert host.next_hello().reset_cause == messages.ResetCause.POWER
     host.send(messages.Identify())
     assert after_reset(host) >= messages.ResetCause.WATCHDOG
 
@@ -193,14 +198,13 @@ def test_on_a_slow_line_telemetry_is_not_left_out_for_the_times_of_tasks() -> No
     host = session()
     baud = messages.PARAMETERS["baud_rate"]
     for request in ((messages.SetParameter, baud.id, 96), (messages.SaveParameters,)):
-        assert host.ask(*request).status == messages.AnswerStatus.OK
+        assert host.request(*request, within_s=1.0).status == messages.AnswerStatus.OK
     host.board.reset(ResetCause.EXTERNAL)
     host.board.line_rate(9600)
-    assert host.open().telemetry_period == 10
-    heard = []
-    for _ in range(round(10 * ROUND_S / 0.4)):
-        heard += host.listen(0.4)
-        host.send(messages.ClockProbe(0))
+    assert host.open_session().telemetry_period == 10
+    before = len(host.heard)
+    host.listen(10 * ROUND_S)
+    heard = host.heard[before:]
     ticks = [message.tick for message in heard if isinstance(message, messages.Telemetry)]
     assert ticks == list(range(ticks[0], ticks[0] + 10 * len(ticks), 10))
     assert len(ticks) >= 75

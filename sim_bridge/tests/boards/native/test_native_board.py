@@ -11,7 +11,7 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from hil_tests.minimal_host import MinimalHost
+from hil_tests.device_bench import DeviceRig
 from sim_bridge import _core
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
@@ -42,13 +42,13 @@ def make() -> Iterator[Maker]:
         board.close()
 
 
-def drive(board: BoardAccess, left: int, right: int) -> MinimalHost:
+def drive(board: BoardAccess, left: int, right: int) -> DeviceRig:
     """Opens a session, arms the motors and sends one set-point that lives for 2 s."""
-    host = MinimalHost(board)
-    host.open()
-    known = host.wait_for(messages.Telemetry, lambda now: now.supply > 0, 0.2, "a measured supply")
-    assert host.ask(messages.Arm, known.latches).status == messages.AnswerStatus.OK
-    now = host.wait_for(messages.Telemetry, lambda now: now.latch == 0, 0.2, "the end of the latch")
+    host = DeviceRig(board)
+    host.open_session()
+    known = host.first(messages.Telemetry, lambda now: now.supply > 0, 0.2, "a measured supply")
+    assert host.request(messages.Arm, known.latches).status == messages.AnswerStatus.OK
+    now = host.first(messages.Telemetry, lambda now: now.latch == 0, 0.2, "the end of the latch")
     host.send(messages.SetpointSignal(left, right, 2000, now.tick & 0xFFFF))
     return host
 
@@ -58,15 +58,15 @@ def said(sent: list[SentByte]) -> list[tuple[int, int, bytes]]:
     return frame.Decoder().feed(b"\0" + bytes(byte.byte for byte in sent))
 
 
-def telemetry(host: MinimalHost, seconds: float) -> messages.Telemetry:
+def telemetry(host: DeviceRig, seconds: float) -> messages.Telemetry:
     """The last telemetry of the seconds to come."""
-    return [m for m in host.listen(seconds) if isinstance(m, messages.Telemetry)][-1]
+    return host.listen(seconds)[-1]
 
 
 def test_boards_do_not_share_state(make: Maker) -> None:
     one, other = make(), make()
-    moving, still = drive(one, 5000, 5000), MinimalHost(other)
-    still.open()
+    moving, still = drive(one, 5000, 5000), DeviceRig(other)
+    still.open_session()
     assert telemetry(moving, 0.1).pulse_left == 1600 * 16
     assert telemetry(still, 0.1).pulse_left == 0
 
@@ -99,7 +99,7 @@ def test_reset_starts_the_program_anew_and_time_goes_on(make: Maker, cause: Rese
     hello = messages.Hello.unpack(said(sent)[0][2])
     assert messages.ResetCause(hello.reset_cause).name == cause.name
     assert hello.session == 0, "nor does the session outlive it"
-    host.open()
+    host.open_session()
     now = telemetry(host, 0.05)
     assert now.tick < 20
     assert now.pulse_left == 0, "a set-point does not outlive a reset"
@@ -158,9 +158,9 @@ def test_wrong_line_rate_is_framing_errors_and_garbage(make: Maker) -> None:
 
 def test_drive_replaces_what_was_queued_later(make: Maker) -> None:
     board = make()
-    host = MinimalHost(board)
-    host.open()
-    host.ask(messages.SetParameter, messages.PARAMETERS["encoder_gap"].id, 0)
+    host = DeviceRig(board)
+    host.open_session()
+    host.request(messages.SetParameter, messages.PARAMETERS["encoder_gap"].id, 0)
     board.drive(ENCODER_LEFT, Level.LOW)
     before = telemetry(host, 0.06).encoder_left
     start = board.now
