@@ -27,9 +27,9 @@ _HELP = """Run experiments of the notes: figures, measured against expected.
 
   boebot experiment E29 E59       two of them
 
-  boebot experiment "E22*"        E22 and all its variants
+  boebot experiment E22 --on avr  on another robot or board; --on "*" on all that it knows
 
-  boebot experiment --all         all of them, beside each other
+  boebot experiment --all         all of them on all robots, beside each other
 
 Each leaves NAME.png and NAME.svg, its figure; NAME.csv, the data; NAME.json, the verdict. Several leave index.html too,
 a page of all of them. The exit code is 1 when one is outside its criterion."""
@@ -39,14 +39,20 @@ def listed() -> list[dict[str, Any]]:
     """Rows of `boebot list experiments`."""
     from boebot_course.experiments import all_experiments
 
+    known = all_experiments().values()
     fields = ("name", "slow", "title", "robot", "section", "source")
-    return [{field: getattr(one, field) for field in fields} for one in all_experiments().values()]
+    return [
+        {field: getattr(one, field) for field in fields}
+        | {"on": ", ".join(other.on for other in known if other.bare_name == one.name and other.on)}
+        for one in known
+        if one.name == one.bare_name
+    ]
 
 
 def _complete(incomplete: str) -> list[str]:
     from boebot_course.experiments import all_experiments
 
-    return completion.beginning(incomplete, all_experiments())
+    return completion.beginning(incomplete, dict.fromkeys(one.bare_name for one in all_experiments().values()))
 
 
 def experiment(
@@ -59,7 +65,11 @@ def experiment(
             show_default=False,
         ),
     ] = None,
-    every: Annotated[bool, typer.Option("--all", help="Run all of them.")] = False,
+    every: Annotated[bool, typer.Option("--all", help="Run all of them, on all their robots.")] = False,
+    on: Annotated[
+        str | None,
+        typer.Option("--on", metavar="ROBOT", help="On which of its robots or boards, or a pattern. Else the first."),
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of all that is left to chance.")] = 1,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where to write the files.")] = FOLDER,
     jobs: Annotated[
@@ -72,10 +82,9 @@ def experiment(
     # here, as it takes a while: no other sub-command should wait for it
     from boebot_course.experiments import all_experiments
 
-    known = all_experiments()
     if every == bool(names):
         raise _usage("give either NAME or --all")
-    chosen = list(known.values()) if every else _chosen(names or [], known)
+    chosen = _chosen(names or ["*"], on or ("*" if every else None), all_experiments())
     _run(chosen, seed, out, jobs or os.cpu_count() or 1, json)
 
 
@@ -88,18 +97,23 @@ def _usage(sentence: str) -> Exception:
     return UsageError(sentence)
 
 
-def _chosen(wanted: Sequence[str], known: Mapping[str, Experiment]) -> list[Experiment]:
-    """Those that are meant, each once, in the order of all."""
+def _chosen(wanted: Sequence[str], on: str | None, known: Mapping[str, Experiment]) -> list[Experiment]:
+    """Those that are meant, each once, in the order of all; `on`: None for the first robot of each, else a pattern."""
     names: set[str] = set()
     for text in wanted:
-        found = {name for name in known if fnmatchcase(name.lower(), text.lower())}
+        found = {one.bare_name for one in known.values() if fnmatchcase(one.bare_name.lower(), text.lower())}
         if not found:
-            lower = {name.lower(): name for name in known}
+            lower = {one.bare_name.lower(): one.bare_name for one in known.values()}
             near = [lower[name] for name in get_close_matches(text.lower(), lower, n=3, cutoff=0.5)]
             hint = f"did you mean {' or '.join(near)}?" if near else "`boebot list experiments` names all"
             raise _usage(f"there is no experiment {text!r}; {hint}")
         names |= found
-    return [known[name] for name in known if name in names]
+    meant = [one for one in known.values() if one.bare_name in names]
+    chosen = [one for one in meant if (one.name == one.bare_name if on is None else fnmatchcase(one.on, on))]
+    if not chosen:
+        robots = ", ".join(dict.fromkeys(one.on for one in meant if one.on)) or "one robot alone"
+        raise _usage(f"no such experiment runs on {on!r}; expected {robots}")
+    return chosen
 
 
 def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_json: bool) -> None:

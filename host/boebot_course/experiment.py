@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -102,16 +104,14 @@ class Outcome:
         return columns
 
 
-Run = Callable[[int, Progress], Outcome]
-"""Runs an experiment with a seed."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """One experiment, to be run by `boebot experiment NAME`."""
+    """One experiment on one robot, to be run by `boebot experiment NAME`; with another one too by `--on`."""
 
     name: str
-    """as in `boebot list experiments`, such as "E22\""""
+    """such as "E22"; on another robot or board than the first one "E22-avr\""""
+    on: str = ""
+    """what `--on` calls the robot or board, where there are several"""
     title: str
     source: str
     """where in the notes"""
@@ -123,7 +123,13 @@ class Experiment:
     """where the expected values come from, in sentences"""
     slow: bool = False
     """takes more than some two seconds"""
-    run: Run
+    run: Callable[[int, Progress], Outcome]
+    """runs it with a seed"""
+
+    @property
+    def bare_name(self) -> str:
+        """Without the robot, as `boebot experiment` takes it."""
+        return self.name.removesuffix(f"-{self.on}")
 
     @property
     def section(self) -> str:
@@ -132,16 +138,44 @@ class Experiment:
         return found[1] if found else ""
 
 
+class Variant:
+    """A robot on which an experiment runs: in words, what its function is given before seed and progress, and whether
+    it is slow there."""
+
+    def __init__(self, robot: str, *given: Any, slow: bool = False) -> None:
+        self.robot, self.given, self.slow = robot, given, slow
+
+
 EXPERIMENTS: dict[str, Experiment] = {}
 
 
-def experiment(name: str, **description: Any) -> Callable[[Run], Run]:
-    """Marks a function as an experiment; `description` holds the other fields of `Experiment`."""
+def experiment(
+    name: str, *, robot: str = "none", slow: bool = False, on: Mapping[str, Variant] | None = None
+) -> Callable[[Callable[..., Outcome]], Callable[..., Outcome]]:
+    """Marks a function as an experiment: on one robot, or on several by the names that `--on` takes.
 
-    def register(run: Run) -> Run:
+    Its docstring says what it is, in paragraphs: the title; "In the notes: ..."; "Figure: ...", the caption;
+    "Expected: ...", where the criterion comes from, or "Expected on NAME: ..." where it differs on that robot.
+    """
+
+    def register(run: Callable[..., Outcome]) -> Callable[..., Outcome]:
         if name in EXPERIMENTS:
             raise ValueError(f"there are two experiments {name}")
-        EXPERIMENTS[name] = Experiment(name=name, run=run, **description)
+        title, *paragraphs = (" ".join(part.split()) for part in (inspect.getdoc(run) or "").split("\n\n"))
+        texts = {head: text for head, _, text in (part.partition(": ") for part in paragraphs)}
+        for number, (key, variant) in enumerate((on or {"": Variant(robot, slow=slow)}).items()):
+            label = f"{name}-{key}" if number else name
+            EXPERIMENTS[label] = Experiment(
+                name=label,
+                on=key,
+                title=title,
+                source=texts["In the notes"],
+                caption=texts["Figure"],
+                robot=variant.robot,
+                criterion=texts[f"Expected on {key}" if f"Expected on {key}" in texts else "Expected"],
+                slow=variant.slow,
+                run=partial(run, *variant.given),
+            )
         return run
 
     return register

@@ -1,19 +1,18 @@
-"""Writes docs/experiments: a page with a picture for each experiment, and the list of them.
+"""Writes docs/experiments: a page for each chapter of the notes with its experiments' pictures, and the list of all.
 
-    python -m boebot_course.pages [NAME ...]
+    python -m boebot_course.pages [CHAPTER ...]
 
-Without names it renews all, and removes what belongs to no experiment any more. The exit code is 1 when an experiment
-is outside its criterion; its page says so.
+Without chapters it renews all, and removes what belongs to no experiment any more. The exit code is 1 when an
+experiment is outside its criterion; its page says so.
 """
 
 from __future__ import annotations
 
-import inspect
 import io
 import os
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -22,40 +21,46 @@ from PIL import Image
 from boebot.cli.output import share_bars
 from boebot_course import output_files, running
 from boebot_course.experiments import Experiment, Measured, Outcome, all_experiments
-from boebot_course.output_files import stem
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "experiments"
-LIST = "README.md"
 SEED = 1
 LARGEST_BYTES = 60_000  # of a picture
 LOOKS = ((100, 256), (100, 64), (100, 24), (80, 24), (60, 16))  # dots per inch and colours, until it is small enough
 
 
-def page(experiment: Experiment, measured: Iterable[Measured]) -> str:
-    """The page of one, with what was measured with the seed `SEED`."""
-    parts = [f"# {experiment.name}: {plain(experiment.title)}"]
-    if said := inspect.getdoc(experiment.run):
-        parts.append(said)
-    parts += [
-        f"* In the notes: {plain(experiment.source)}.\n* Robot: {robot(experiment)}.\n"
-        f"* Again: `boebot experiment {experiment.name} --seed {SEED}`"
-        + (", which takes a while." if experiment.slow else "."),
-        f"![{experiment.caption}]({stem(experiment.name)}.png)",
-        f"*{plain(experiment.caption)}*",
-        "| figure | measured | expected | unit | |\n|---|--:|---|---|---|\n" + "\n".join(map(_row, measured)),
-    ]
-    parts.append(f"**Criterion.** {plain(experiment.criterion)}")
+def chapter_of(experiment: Experiment) -> str:
+    """Of the notes."""
+    return experiment.section.partition(".")[0]
+
+
+def page(chapter: str, experiments: Iterable[Experiment], measured: Mapping[str, Iterable[Measured]]) -> str:
+    """The page of a chapter, with what was measured with the seed `SEED`, by name."""
+    parts = [f"# Experiments of chapter {chapter}"]
+    last = ""
+    for one in (one for one in experiments if chapter_of(one) == chapter):
+        if one.bare_name != last:
+            last = one.bare_name
+            parts += [f"## {last}: {plain(one.title)}", f"{capital(plain(one.source))}. {plain(one.caption)}"]
+        if one.on:
+            parts.append(f"### On {one.on}")
+        parts += [
+            f"{capital('computed' if one.robot == 'none' else one.robot)}. {plain(one.criterion)}",
+            f"![{one.name}]({one.name}.png)",
+            "\n".join(["figure | measured (expected)", "---|---", *map(row, measured.get(one.name, ()))]),
+        ]
     return "\n\n".join(parts) + "\n"
 
 
-def robot(experiment: Experiment) -> str:
-    """The robot in words."""
-    return "none, it is computed" if experiment.robot == "none" else experiment.robot
+def row(one: Measured) -> str:
+    """Of the table of figures."""
+    expected = "" if one.expected == "no criterion" else f" ({one.expected})"
+    value = f"{one.text} {one.unit}".strip() + expected
+    return f"{plain(one.name)} | {value if one.is_met else f'**{value}, missed**'}"
 
 
-def _row(one: Measured) -> str:
-    cells = (one.name, one.text, one.expected, one.unit, "met" if one.is_met else "missed")
-    return f"| {' | '.join(map(plain, cells))} |"
+def capital(text: str) -> str:
+    """As a sentence begins."""
+    return text[0].upper() + text[1:]
 
 
 def plain(text: str) -> str:
@@ -64,69 +69,60 @@ def plain(text: str) -> str:
 
 
 def listing(experiments: Iterable[Experiment]) -> str:
-    """The list of all pages."""
+    """The list of all."""
+    chapters: dict[str, list[str]] = {}
+    for one in experiments:
+        if one.name == one.bare_name:
+            chapters.setdefault(chapter_of(one), []).append(one.name)
     rows = "\n".join(
-        f"| [{one.name}]({stem(one.name)}.md) | {' | '.join(map(plain, (one.title, one.robot, one.source)))} |"
-        for one in experiments
+        f"* [Chapter {chapter}](chapter-{chapter}.md): {', '.join(chapters[chapter])}" for chapter in sorted(chapters)
     )
     return (
         "# Experiments\n\n"
-        "Each shows something that the lecture notes say, and is run by one command: `boebot experiment NAME` prints\n"
-        "what was measured against what was expected, and writes the figure and its data; `make experiments` runs all\n"
-        "and leaves one page of them, build/experiments/index.html. `make pictures` renews these pages. Seed is 1\n"
-        "here; `make soak` runs all at seeds 1 to 10. One that misses at some seeds states its rate on its page.\n\n"
-        "A run leaves, in the folder experiments or where `--out` says, NAME.png and NAME.svg, the figure; NAME.csv,\n"
-        "its data, with units in the columns' names and an empty cell where there is no number; NAME.json, the\n"
-        "verdict. The same seed gives the same bytes, however many processes `--jobs` allows. The exit code is 0 when\n"
-        "everything is met.\n\n"
-        f"| name | what it shows | robot | in the notes |\n|---|---|---|---|\n{rows}\n"
+        "Each shows something that the lecture notes say. `boebot experiment NAME` runs one, with `--on ROBOT` on\n"
+        "another robot or board. It prints what was measured against what was expected, and leaves NAME.png and\n"
+        "NAME.svg, the figure; NAME.csv, its data, with units in the columns' names and an empty cell where there is\n"
+        "no number; and NAME.json, the verdict. The same seed gives the same bytes. The exit code is 0 when all is\n"
+        "met.\n\n"
+        "There is a page for each chapter of the notes, at seed 1; `make pictures` renews them. `make soak` runs all\n"
+        "experiments at seeds 1 to 10. One that misses at some seeds states its rate.\n\n"
+        f"{rows}\n"
     )
 
 
-def files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:
-    """Page and picture of one that has run."""
-    name = stem(experiment.name)
-    text = page(experiment, outcome.measured)
-    return {f"{name}.md": text.encode(), f"{name}.png": _small(experiment, outcome)}
-
-
-def _small(experiment: Experiment, outcome: Outcome) -> bytes:
-    """The figure with few enough dots and colours."""
+def picture(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:
+    """The figure of one that has run, with few enough dots and colours."""
     for dpi, colours in LOOKS:
         (drawn,) = output_files.pictures(experiment, outcome, {"png": dpi})
         target = io.BytesIO()
         few = Image.open(io.BytesIO(drawn)).convert("RGB").quantize(colours, dither=Image.Dither.NONE)
         few.save(target, "PNG", optimize=True)
         if len(target.getvalue()) <= LARGEST_BYTES:
-            return target.getvalue()
+            return {f"{experiment.name}.png": target.getvalue()}
     raise ValueError(f"its picture does not fit into {LARGEST_BYTES} bytes")
 
 
-def main(names: list[str]) -> int:
-    """Renews the pages of those experiments, or all; the exit code."""
-    known = all_experiments()
-    if unknown := [name for name in names if name not in known]:
-        print(f"there is no experiment {unknown[0]!r}", file=sys.stderr)
-        return 2
-    chosen = [known[name] for name in names] or list(known.values())
-    FOLDER.mkdir(exist_ok=True)
-    outside = []
+def main(chapters: list[str]) -> int:
+    """Renews the pages of those chapters, or all; the exit code."""
+    known = all_experiments().values()
+    chosen = [one for one in known if not chapters or chapter_of(one) in chapters]
     with (
         share_bars([one.name for one in chosen]) as watch,
-        closing(running.run(chosen, SEED, os.cpu_count() or 1, watch, files)) as verdicts,
+        closing(running.run(chosen, SEED, os.cpu_count() or 1, watch, picture)) as coming,
     ):
-        for verdict in verdicts:
-            output_files.write(FOLDER, verdict.files)
-            watch({verdict.name: 1.0})
-            if not verdict.is_met:
-                outside.append(f"{verdict.name} {verdict.word}{verdict.error and ': '}{verdict.error}")
-    if not names:
-        wanted = {f"{stem(name)}{ending}" for name in known for ending in (".md", ".png")} | {LIST}
+        verdicts = {verdict.name: verdict for verdict in coming}
+    for verdict in verdicts.values():
+        output_files.write(FOLDER, verdict.files)
+    measured = {name: verdict.measured for name, verdict in verdicts.items()}
+    pages = {f"chapter-{chapter}.md": page(chapter, known, measured) for chapter in set(map(chapter_of, chosen))}
+    pages["README.md"] = listing(known)
+    output_files.write(FOLDER, {name: text.encode() for name, text in pages.items()})
+    if not chapters:
         for path in FOLDER.iterdir():
-            if path.name not in wanted:
+            if path.name not in pages.keys() | {f"{one.name}.png" for one in known}:
                 path.unlink()
-    (FOLDER / LIST).write_text(listing(known.values()), encoding="utf-8")
-    print(f"{len(chosen)} pages in {FOLDER}", *sorted(outside), sep="\n")
+    outside = [f"{one.name} {one.word}{one.error and ': '}{one.error}" for one in verdicts.values() if not one.is_met]
+    print(f"{len(pages)} pages in {FOLDER}", *sorted(outside), sep="\n")
     return 1 if outside else 0
 
 

@@ -96,18 +96,20 @@ STARTS = ((0.9, 0.35), (0.35, 0.6), (0.55, 0.3), (0.3, 0.45))
 CUES = (1.0, 0.6)  # of water and nutrients
 
 
-@experiment(
-    "isocline",
-    title="An animal with two needs keeps away from the lethal boundary",
-    source="section 7.2, Fig. 7.2",
-    caption="Water availability and nutrient level: the motivational isocline (dashed), the lethal boundary (grey "
-    "beyond it), and animals that do what the larger tendency asks for. Red: one that only ever drinks.",
-    criterion="Derived from the rule: beside the isocline the animal does one thing until it is there, after a time "
-    "that follows from its rates; from then on it flips at each crossing, and stays within two steps' gain of it. "
-    "On the isocline it must take in as much as it uses: it holds since 0.02 / 0.1 + 0.02 / 0.06 < 1. Only drinking "
-    "it starves after nutrients / 0.02 per s at the latest.",
-)
+@experiment("isocline")
 def isocline(seed: int, progress: Progress) -> Outcome:
+    """An animal with two needs keeps away from the lethal boundary
+
+    In the notes: section 7.2, Fig. 7.2
+
+    Figure: Water availability and nutrient level: the motivational isocline (dashed), the lethal boundary (grey
+    beyond it), and animals that do what the larger tendency asks for. Red: one that only ever drinks.
+
+    Expected: Derived from the rule: beside the isocline the animal does one thing until it is there, after a time
+    that follows from its rates; from then on it flips at each crossing, and stays within two steps' gain of it. On
+    the isocline it must take in as much as it uses: it holds since 0.02 / 0.1 + 0.02 / 0.06 < 1. Only drinking it
+    starves after nutrients / 0.02 per s at the latest.
+    """
     lives = [live(start, CUES) for start in STARTS]
     single = live(STARTS[0], CUES, rule="water")
     cues = np.array(CUES)

@@ -58,15 +58,17 @@ def utility_of(stimulus: Floats, a: float, b: float, step: float) -> Floats:
     return np.array(values)
 
 
-@experiment(
-    "E29",
-    title="E. coli's utility follows a rise and a fall",
-    source="section 4.4.2, equation (4.1), Fig. 4.1",
-    caption="Left: concentration X of the attractant, a triangle. Right: utility U of running (B1), which is active "
-    "while U > 0: between 1 s and 3 s (shaded).",
-    criterion="Fig. 4.1 by (4.1): U > 0 from 1.00 s to 3.00 s, ± 0.01 s; at most 0.213, at least -0.162, ± 0.005.",
-)
+@experiment("E29")
 def triangle(seed: int, progress: Progress) -> Outcome:
+    """E. coli's utility follows a rise and a fall
+
+    In the notes: section 4.4.2, equation (4.1), Fig. 4.1
+
+    Figure: Left: concentration X of the attractant, a triangle. Right: utility U of running (B1), which is active
+    while U > 0: between 1 s and 3 s (shaded).
+
+    Expected: Fig. 4.1 by (4.1): U > 0 from 1.00 s to 3.00 s, ± 0.01 s; at most 0.213, at least -0.162, ± 0.005.
+    """
     step, peak, top = 0.001, 2.433, 0.4
     times = np.arange(0, 5, step)
     slope = top / (peak - 1)
@@ -94,14 +96,16 @@ def triangle(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, {"time_s": times[::10], "x": stimulus[::10], "u": values[::10]}, draw)
 
 
-@experiment(
-    "E30",
-    title="With b > a a constant attractant ends in tumbling",
-    source="section 4.4.2, equation (4.1)",
-    caption="Utility after a step of the attractant to 0.4 with a = 1, b = 1.5; dashed: its limit X (1 - b/a).",
-    criterion="(4.1) solved: X (1 - b/a (1 - exp(-t))) is zero at ln 3 = 1.099 s, -0.189 at 4 s, tends to -0.2.",
-)
+@experiment("E30")
 def sign(seed: int, progress: Progress) -> Outcome:
+    """With b > a a constant attractant ends in tumbling
+
+    In the notes: section 4.4.2, equation (4.1)
+
+    Figure: Utility after a step of the attractant to 0.4 with a = 1, b = 1.5; dashed: its limit X (1 - b/a).
+
+    Expected: (4.1) solved: X (1 - b/a (1 - exp(-t))) is zero at ln 3 = 1.099 s, -0.189 at 4 s, tends to -0.2.
+    """
     step = 0.001
     times = np.arange(-0.5, 8, step)
     stimulus = np.where(times >= 0, 0.4, 0.0)
@@ -247,16 +251,16 @@ def _draw_swarm(figure: Figure, group: Swarm, title: str) -> None:
     axes.legend(loc="upper right", fontsize=9)
 
 
-@experiment(
-    "E31",
-    title="A hundred bacteria find the attractant",
-    source="section 4.4.2, Fig. 4.2",
-    caption="100 bacteria in a Gaussian of attractant at the beginning and after 10 s; dashed: its width.",
-    robot="arsim, as narrow as a bacterium",
-    criterion="As Fig. 4.2: mean distance below 0.3 of the first, 85 % within the width; without, it stays (± 5 %).",
-    slow=True,
-)
+@experiment("E31", robot="arsim, as narrow as a bacterium", slow=True)
 def accumulation(seed: int, progress: Progress) -> Outcome:
+    """A hundred bacteria find the attractant
+
+    In the notes: section 4.4.2, Fig. 4.2
+
+    Figure: 100 bacteria in a Gaussian of attractant at the beginning and after 10 s; dashed: its width.
+
+    Expected: As Fig. 4.2: mean distance below 0.3 of the first, 85 % within the width; without, it stays (± 5 %).
+    """
     first = trial_seeds(seed, COUNT)[0]
     group = swarm(first, gaussian, lambda share: progress(share / 2))
     control = swarm(first + COUNT, uniform, lambda share: progress(0.5 + share / 2))
@@ -268,17 +272,17 @@ def accumulation(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, positions(group), lambda figure: _draw_swarm(figure, group, "attractant"))
 
 
-@experiment(
-    "E32",
-    title="Bacteria that tumble on the spot do not gather",
-    source="section 4.4.2, Fig. 4.2",
-    caption="The same bacteria, but they do not run after a tumble unless U > 0: those whose utility has fallen to "
-    "zero stay for ever.",
-    robot="arsim, as narrow as a bacterium",
-    criterion="With T = 0 a tumble never ends: at most 1 % of the steps are runs, the mean distance stays (± 5 %).",
-    slow=True,
-)
+@experiment("E32", robot="arsim, as narrow as a bacterium", slow=True)
 def trap(seed: int, progress: Progress) -> Outcome:
+    """Bacteria that tumble on the spot do not gather
+
+    In the notes: section 4.4.2, Fig. 4.2
+
+    Figure: The same bacteria, but they do not run after a tumble unless U > 0: those whose utility has fallen to
+    zero stay for ever.
+
+    Expected: With T = 0 a tumble never ends: at most 1 % of the steps are runs, the mean distance stays (± 5 %).
+    """
     group = swarm(trial_seeds(seed, COUNT)[0] + 2 * COUNT, gaussian, progress, run_on=0.0)
     measured = [
         Measured("share of steps that were runs", group.running, most=0.01),

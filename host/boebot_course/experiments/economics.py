@@ -119,24 +119,24 @@ def live(charge: Utility, seed: int, seconds: float = SECONDS) -> Life:
     )
 
 
-@experiment(
-    "robot-economics",
-    title="Charging earns nothing, and yet who charges earns most",
-    source="chapter 8, opening",
-    caption="Performance (way driven) of three robots: one that never charges, until its board switches its motors "
-    "off, one that always does, and one that schedules it by utility; grey: when that one stands and charges. Below: "
-    "battery level E.",
-    robot="shieldbot-charging (native)",
-    criterion="At motor signal 0.5, 0.152 m/s, board and servos draw 0.08 A + 2 (0.015 A + 0.74 A s/m · 0.152 m/s) = "
-    "0.335 A; from 6.68 V to 4.73 V, where the regulator gives 4.2 V, 25/3 F last for 48.5 s, within a "
-    "tenth for turns and unlike servos. Who always charges drives to the station once, 1.77 m away, and by "
-    "arcs less than half as far again. By utility: standing, it gains 2.4 A - 0.08 A, so that by the "
-    "balance of charge it stands 0.335 / (2.32 + 0.335) = 0.126 of the time, of which its brain notices all "
-    "but the first second of some 7.5 s, 0.109, within 0.02 for what is left in the end. The other 262 s it "
-    "works, 5.4 times 48.5 s: with a quarter off for turns and searches at the station 4 times. Nothing is "
-    "earned while it stands but some millimetres of stopping.",
-)
+@experiment("robot-economics", robot="shieldbot-charging (native)")
 def economics(seed: int, progress: Progress) -> Outcome:
+    """Charging earns nothing, and yet who charges earns most
+
+    In the notes: chapter 8, opening
+
+    Figure: Performance (way driven) of three robots: one that never charges, until its board switches its motors
+    off, one that always does, and one that schedules it by utility; grey: when that one stands and charges. Below:
+    battery level E.
+
+    Expected: At motor signal 0.5, 0.152 m/s, board and servos draw 0.08 A + 2 (0.015 A + 0.74 A s/m · 0.152 m/s) =
+    0.335 A; from 6.68 V to 4.73 V, where the regulator gives 4.2 V, 25/3 F last for 48.5 s, within a tenth for
+    turns and unlike servos. Who always charges drives to the station once, 1.77 m away, and by arcs less than half
+    as far again. By utility: standing, it gains 2.4 A - 0.08 A, so that by the balance of charge it stands 0.335 /
+    (2.32 + 0.335) = 0.126 of the time, of which its brain notices all but the first second of some 7.5 s, 0.109,
+    within 0.02 for what is left in the end. The other 262 s it works, 5.4 times 48.5 s: with a quarter off for
+    turns and searches at the station 4 times. Nothing is earned while it stands but some millimetres of stopping.
+    """
     never, always, utility = (live(charge, seed) for charge in with_progress(list(NAMES.values()), progress))
     stands = utility.stands
     earned = float(np.diff(utility.work, prepend=0.0)[stands].sum())

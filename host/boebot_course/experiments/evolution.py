@@ -159,20 +159,21 @@ def evolve(
     return Evolved(np.array(best), winner)
 
 
-@experiment(
-    "E65",
-    title="Evolution finds when to charge",
-    source="section 8.2 and Wahde (2003)",
-    caption="Left: performance of the best individual over the generations of three restarts; dashed: never "
-    "charging. Right: utilities of the best of all over time, its battery, and where it is.",
-    criterion="A toy, whose figures are chosen: patrol counts only in its place, 5 s from the charger, where the "
-    "robot starts; going there and back costs energy; a charging robot loses none. Of the 30 restarts of "
-    "the seeds 1 to 10, 17 came to 190 s (39 to 73 %), the others stayed mostly at never charging, 50 s: "
-    "all of three do so at one seed in twelve, not at 1 to 10. Without selection, or without mutation, the "
-    "best gets worse or stays where chance put it.",
-    slow=True,
-)
+@experiment("E65", slow=True)
 def evolution(seed: int, progress: Progress) -> Outcome:
+    """Evolution finds when to charge
+
+    In the notes: section 8.2 and Wahde (2003)
+
+    Figure: Left: performance of the best individual over the generations of three restarts; dashed: never charging.
+    Right: utilities of the best of all over time, its battery, and where it is.
+
+    Expected: A toy, whose figures are chosen: patrol counts only in its place, 5 s from the charger, where the
+    robot starts; going there and back costs energy; a charging robot loses none. Of the 30 restarts of the seeds 1
+    to 10, 17 came to 190 s (39 to 73 %), the others stayed mostly at never charging, 50 s: all of three do so at
+    one seed in twelve, not at 1 to 10. Without selection, or without mutation, the best gets worse or stays where
+    chance put it.
+    """
     evolved = evolve(seed, progress)
     known = live(np.array([NEVER, ALWAYS, THRESHOLD, BY_HAND]))
     best = live(evolved.genes[None], traced=True)

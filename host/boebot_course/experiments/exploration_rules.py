@@ -118,16 +118,18 @@ def _wrong_paths(panel: Panel) -> int:
     return sum(panel.paths.get(node) != expected.get(node) for node in panel.paths | expected)
 
 
-@experiment(
-    "E36",
-    title="Paths to pending nodes when the robot moves on",
-    source="section 6.1, Fig. 6.2",
-    caption="Thin circle: the robot. Double circle: target; circle: pending; disc: completed; square: unreachable. "
-    "Hatched: a low block that the laser does not see. Lines: paths from the robot's node.",
-    criterion="The paths are worked out by hand by the rule of the notes' examples: from the new node back to the one "
-    "where both paths part, and on from there.",
-)
+@experiment("E36")
 def moving_on(seed: int, progress: Progress) -> Outcome:
+    """Paths to pending nodes when the robot moves on
+
+    In the notes: section 6.1, Fig. 6.2
+
+    Figure: Thin circle: the robot. Double circle: target; circle: pending; disc: completed; square: unreachable.
+    Hatched: a low block that the laser does not see. Lines: paths from the robot's node.
+
+    Expected: The paths are worked out by hand by the rule of the notes' examples: from the new node back to the one
+    where both paths part, and on from there.
+    """
     panels = walked()
     first, *later = panels
     after = {panel.active: panel for panel in later}
@@ -204,16 +206,18 @@ def scan_of(wide: float = FREE[1][2]) -> Scan:
     return Scan(distances, (-math.pi / 2, math.pi / 2), 4.0)
 
 
-@experiment(
-    "E37",
-    title="Nodes where the way is free",
-    source="section 6.1, Fig. 6.1",
-    caption="Left: distances of a scan over half a turn, with circles of D and D + Δ. Right: intervals that are free "
-    "up to D + Δ and wide enough, with their nodes; the wide one has two, the narrow one at 88 degrees none.",
-    criterion="The nodes' directions are the middles of the intervals, or of their halves. Nodes of one interval are "
-    "at least d_min apart. Where the wide interval is free for 1.2 m only, less than D + Δ, it has none.",
-)
+@experiment("E37")
 def placed(seed: int, progress: Progress) -> Outcome:
+    """Nodes where the way is free
+
+    In the notes: section 6.1, Fig. 6.1
+
+    Figure: Left: distances of a scan over half a turn, with circles of D and D + Δ. Right: intervals that are free
+    up to D + Δ and wide enough, with their nodes; the wide one has two, the narrow one at 88 degrees none.
+
+    Expected: The nodes' directions are the middles of the intervals, or of their halves. Nodes of one interval are
+    at least d_min apart. Where the wide interval is free for 1.2 m only, less than D + Δ, it has none.
+    """
     scan = scan_of()
     bearings = sorted(np.degrees(PLACEMENT.bearings(scan)).tolist())
     found = (*bearings, math.nan, math.nan, math.nan)

@@ -132,18 +132,18 @@ height_m = 0.06
 LOW_START = (1.0, 1.5, 0.0)  # m, m, rad: its second node is then at 22.5 degrees, in the block
 
 
-@experiment(
-    "E38",
-    title="A node that cannot be reached",
-    source="section 6.1, Fig. 6.2",
-    caption="Exploration of a room with a block that lies below the laser's plane. Left: nodes, legs along which they "
-    "were placed, path. Right: nodes of each status over time.",
-    robot="roller, with odometry that does not drift",
-    criterion="The block takes up the place of one node (4 nodes in half a turn at 1 m: at ±22.5 and ±67.5 degrees), "
-    "and no other node is nearer than d_min / 3 to it: one node is unreachable, all others are completed.",
-    slow=True,
-)
+@experiment("E38", robot="roller, with odometry that does not drift", slow=True)
 def low_obstacle(seed: int, progress: Progress) -> Outcome:
+    """A node that cannot be reached
+
+    In the notes: section 6.1, Fig. 6.2
+
+    Figure: Exploration of a room with a block that lies below the laser's plane. Left: nodes, legs along which they
+    were placed, path. Right: nodes of each status over time.
+
+    Expected: The block takes up the place of one node (4 nodes in half a turn at 1 m: at ±22.5 and ±67.5 degrees),
+    and no other node is nearer than d_min / 3 to it: one node is unreachable, all others are completed.
+    """
     explore = explorer(second_pass=False)
     watch = Watch(explore=explore)
     with arena_file("low", LOW) as arena:
@@ -208,17 +208,17 @@ def data_of(runs: list[Exploration]) -> dict[str, list[float]]:
     }
 
 
-@experiment(
-    "E39",
-    title="Sensory area coverage",
-    source="section 6.1, Fig. 6.4",
-    caption="Exploration of three rooms. Left: the first start, nodes, legs along which they were placed, path. Right: "
-    "coverage and way of each of twelve starts.",
-    robot="roller, with odometry that does not drift",
-    criterion="Fig. 6.4 says better than 99.5 %; the way is at most 45 m.",
-    slow=True,
-)
+@experiment("E39", robot="roller, with odometry that does not drift", slow=True)
 def coverage(seed: int, progress: Progress) -> Outcome:
+    """Sensory area coverage
+
+    In the notes: section 6.1, Fig. 6.4
+
+    Figure: Exploration of three rooms. Left: the first start, nodes, legs along which they were placed, path.
+    Right: coverage and way of each of twelve starts.
+
+    Expected: Fig. 6.4 says better than 99.5 %; the way is at most 45 m.
+    """
     runs = all_explored("exploration", seed, STARTS, progress)
     measured = [
         exactly("starts with a coverage of 99.5 %", sum(run.share >= LEAST for run in runs), STARTS),
@@ -235,18 +235,18 @@ def coverage(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, data_of(runs), draw)
 
 
-@experiment(
-    "E40",
-    title="A block that the laser does not see",
-    source="section 6.1, Fig. 6.3",
-    caption="Exploration of the same rooms with a low block behind a door. Left: the first start. Right: coverage and "
-    "way of each of 24 starts, with the rules for deadlocks and without.",
-    robot="roller, with odometry that does not drift",
-    criterion="The notes have a method for deadlocks but do not say which; with R14, the kit's, all starts come to "
-    "99.5 %, without it some do not.",
-    slow=True,
-)
+@experiment("E40", robot="roller, with odometry that does not drift", slow=True)
 def deadlocks(seed: int, progress: Progress) -> Outcome:
+    """A block that the laser does not see
+
+    In the notes: section 6.1, Fig. 6.3
+
+    Figure: Exploration of the same rooms with a low block behind a door. Left: the first start. Right: coverage and
+    way of each of 24 starts, with the rules for deadlocks and without.
+
+    Expected: The notes have a method for deadlocks but do not say which; with R14, the kit's, all starts come to
+    99.5 %, without it some do not.
+    """
     runs = all_explored("exploration-block", seed, BLOCK_STARTS, lambda share: progress(share / 2))
     plain = all_explored(
         "exploration-block", seed, BLOCK_STARTS, lambda share: progress(0.5 + share / 2), second_pass=False

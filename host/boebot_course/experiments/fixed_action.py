@@ -18,7 +18,7 @@ from boebot import run
 from boebot.behaviors import Stop
 from boebot.brain import Action, Brain, FixedActionPattern
 from boebot.description.robots import load_robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, about, exactly, experiment
 from boebot_course.trials import decisions, true_pose
 from boebot_course.variants import arena_file
 
@@ -128,45 +128,38 @@ def compare(stays: Escape, gone: Escape, duration: float) -> list[Measured]:
 
 @experiment(
     "E34",
-    title="A fixed action pattern runs to its end without its stimulus",
-    source="section 4.4.3, fixed action patterns",
-    caption="Stimulus as a sensor sees it and motor signals asked for, with a stimulus that stays and with one that "
-    "has gone before the pattern is through.",
-    robot="arsim",
-    criterion="Commands are the same without the stimulus; the pattern lasts as long as its parts, ± 3 steps.",
+    on={
+        "arsim": Variant("arsim", "arsim", (0.7854, 2.0, 0.5)),
+        "shieldbot": Variant("shieldbot (native)", "shieldbot", (0.5, 1.0, 0.25)),
+    },
 )
-def pattern(seed: int, progress: Progress) -> Outcome:
-    at = (0.7854, 2.0, 0.5)
-    stays, gone = (run_escape("arsim", at, one, seed) for one in (True, False))
-    return _outcome(stays, gone, compare(stays, gone, escape("arsim").duration))
+def pattern(robot: str, at: tuple[float, float, float], seed: int, progress: Progress) -> Outcome:
+    """A fixed action pattern runs to its end without its stimulus
 
+    In the notes: section 4.4.3, fixed action patterns
 
-@experiment(
-    "E34-shieldbot",
-    title="A fixed action pattern on shieldbot's servos",
-    source="section 4.4.3, fixed action patterns",
-    caption="The same on shieldbot: what its infra-red pairs see, and the signals with which its servos are driven.",
-    robot="shieldbot (native)",
-    criterion="The turn lasts as long as 120 degrees take on shieldbot, at 3.20 rad/s by its servos' curve. "
-    "Commands and pulses follow from the brain's steps alone: none may differ. Each of three actions ends"
-    " at the first step of the brain, every 0.02 s, after its time. The wheels' lag is the same as the "
-    "turn begins and ends; servos differ by 2.5 % of top speed and 3 % by direction, the mean of two by "
-    "2.8 %: three times that, and up to two steps more of 0.02 s, 7 degrees: 120 degrees ± 17.",
-)
-def pattern_shieldbot(seed: int, progress: Progress) -> Outcome:
-    at = (0.5, 1.0, 0.25)
-    stays, gone = (run_escape("shieldbot", at, one, seed) for one in (True, False))
-    measured = compare(stays, gone, escape("shieldbot").duration)
-    pulses = [
-        np.column_stack([one.span(one.result.series.number(name, "pulse")) for name in ("servo_left", "servo_right")])
-        for one in (stays, gone)
-    ]
-    measured.append(exactly("ticks whose servo pulses differ", differing(*pulses), 0))
-    measured.append(about("turned", gone.turned, math.degrees(ANGLE), 17.0, "degrees"))
-    return _outcome(stays, gone, measured)
+    Figure: Stimulus as a sensor sees it and motor signals asked for, with a stimulus that stays and with one that has
+    gone before the pattern is through.
 
+    Expected: Commands are the same without the stimulus; the pattern lasts as long as its parts, ± 3 steps.
 
-def _outcome(stays: Escape, gone: Escape, measured: list[Measured]) -> Outcome:
+    Expected on shieldbot: The turn lasts as long as 120 degrees take on shieldbot, at 3.20 rad/s by its servos' curve.
+    Commands and pulses follow from the brain's steps alone: none may differ. Each of three actions ends at the first
+    step of the brain, every 0.02 s, after its time. The wheels' lag is the same as the turn begins and ends; servos
+    differ by 2.5 % of top speed and 3 % by direction, the mean of two by 2.8 %: three times that, and up to two steps
+    more of 0.02 s, 7 degrees: 120 degrees ± 17.
+    """
+    both = stays, gone = [run_escape(robot, at, one, seed) for one in (True, False)]
+    measured = compare(stays, gone, escape(robot).duration)
+    if robot == "shieldbot":
+        pulses = [
+            np.column_stack(
+                [one.span(one.result.series.number(name, "pulse")) for name in ("servo_left", "servo_right")]
+            )
+            for one in both
+        ]
+        measured.append(exactly("ticks whose servo pulses differ", differing(*pulses), 0))
+        measured.append(about("turned", gone.turned, math.degrees(ANGLE), 17.0, "degrees"))
     series = [one.result.series for one in (stays, gone)]
     ticks = min(len(one) for one in series)
     data: dict[str, Any] = {"time_s": series[0].time[:ticks]}

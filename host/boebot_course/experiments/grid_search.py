@@ -127,15 +127,18 @@ def _legend(figure: Figure, *, with_wall: bool) -> None:
 BY_HAND = "By hand: the target lies 14 columns and one row from the start"
 
 
-@experiment(
-    "E41",
-    title="Greedy search in the open",
-    source="section 6.2, Figs. 6.7 and 6.8 (left)",
-    caption="Paths from start to target on an open map: above greedy (the notes' best-first search), below Dijkstra's.",
-    criterion=f"{BY_HAND}: 15 with 4 neighbours, 13 + √2 with 8. Greedy expands at most 1/8 as many cells as "
-    "Dijkstra's.",
-)
+@experiment("E41")
 def in_the_open(seed: int, progress: Progress) -> Outcome:
+    """Greedy search in the open
+
+    In the notes: section 6.2, Figs. 6.7 and 6.8 (left)
+
+    Figure: Paths from start to target on an open map: above greedy (the notes' best-first search), below
+    Dijkstra's.
+
+    Expected: By hand: the target lies 14 columns and one row from the start: 15 with 4 neighbours, 13 + √2 with 8.
+    Greedy expands at most 1/8 as many cells as Dijkstra's.
+    """
     found = searched(open_map(), "greedy", "dijkstra")
     measured = []
     for neighbours, best in ((4, 15.0), (8, 13 + DIAGONAL)):
@@ -157,16 +160,19 @@ ROUND_THE_C = (
 )
 
 
-@experiment(
-    "E42",
-    title="Greedy search makes a detour round an extended obstacle",
-    source="section 6.2, Figs. 6.7 and 6.8 (right)",
-    caption="Paths past a wall like a C: above greedy, which runs into it first, below the notes' box word for word "
-    "(walk).",
-    criterion=f"{ROUND_THE_C} The greedy path is at least 1.4 times as long with 4 neighbours, 1.05 times with 8, "
-    "and it does arrive.",
-)
+@experiment("E42")
 def detour(seed: int, progress: Progress) -> Outcome:
+    """Greedy search makes a detour round an extended obstacle
+
+    In the notes: section 6.2, Figs. 6.7 and 6.8 (right)
+
+    Figure: Paths past a wall like a C: above greedy, which runs into it first, below the notes' box word for word
+    (walk).
+
+    Expected: By hand: the target lies 14 columns and one row from the start, and the way round the C-shaped wall is
+    6 rows longer: 21 with 4 neighbours; with 8 neighbours six of its steps are diagonal, 9 + 6 √2. The greedy path
+    is at least 1.4 times as long with 4 neighbours, 1.05 times with 8, and it does arrive.
+    """
     found = searched(c_wall(), "greedy", "walk")
     least = {4: 1.4, 8: 1.05}
     measured = [
@@ -179,14 +185,18 @@ def detour(seed: int, progress: Progress) -> Outcome:
     return _outcome(measured, c_wall(), found, ("greedy", "walk"))
 
 
-@experiment(
-    "E43",
-    title="Dijkstra's search finds the shortest path and looks everywhere",
-    source="section 6.2, Figs. 6.9 and 6.10",
-    caption="Paths past a wall like a C by Dijkstra's algorithm.",
-    criterion=f"{ROUND_THE_C} It expands at least 85 % of the free cells.",
-)
+@experiment("E43")
 def everywhere(seed: int, progress: Progress) -> Outcome:
+    """Dijkstra's search finds the shortest path and looks everywhere
+
+    In the notes: section 6.2, Figs. 6.9 and 6.10
+
+    Figure: Paths past a wall like a C by Dijkstra's algorithm.
+
+    Expected: By hand: the target lies 14 columns and one row from the start, and the way round the C-shaped wall is
+    6 rows longer: 21 with 4 neighbours; with 8 neighbours six of its steps are diagonal, 9 + 6 √2. It expands at
+    least 85 % of the free cells.
+    """
     free = c_wall()
     found = searched(free, "dijkstra")
     measured = []
@@ -216,18 +226,20 @@ def random_maps(seed: int) -> Iterator[NDArray[np.bool_]]:
             yield free
 
 
-@experiment(
-    "E44",
-    title="A* finds the shortest path, and looks at fewer cells",
-    source="section 6.2, Dijkstra's algorithm",
-    caption="200 random maps, 28 % of the cells blocked. Left: cells that A* and Dijkstra's expand; right: cost of the "
-    "greedy path against the shortest one.",
-    criterion="That A*'s path is as long as Dijkstra's, and that it is more efficient, is what the notes say of it. An "
-    "earlier computation, with other maps and other code, had 0.61 of the cells and greedy paths 1.072 times as long. "
-    "Single maps differ by 0.20 and 0.10 (1 σ); the difference of two means of 200 maps is known to 0.02 and 0.01, and "
-    "three times that is allowed: at most 0.67, and 1.072 ± 0.03.",
-)
+@experiment("E44")
 def star(seed: int, progress: Progress) -> Outcome:
+    """A* finds the shortest path, and looks at fewer cells
+
+    In the notes: section 6.2, Dijkstra's algorithm
+
+    Figure: 200 random maps, 28 % of the cells blocked. Left: cells that A* and Dijkstra's expand; right: cost of
+    the greedy path against the shortest one.
+
+    Expected: That A*'s path is as long as Dijkstra's, and that it is more efficient, is what the notes say of it.
+    An earlier computation, with other maps and other code, had 0.61 of the cells and greedy paths 1.072 times as
+    long. Single maps differ by 0.20 and 0.10 (1 σ); the difference of two means of 200 maps is known to 0.02 and
+    0.01, and three times that is allowed: at most 0.67, and 1.072 ± 0.03.
+    """
     maps = list(itertools.islice(random_maps(seed), MAPS))
     rows = []
     for free in with_progress(maps, progress):
@@ -341,16 +353,18 @@ def way(nodes: Nodes, path: Sequence[int]) -> float:
     return length([nodes.places[node] for node in path])
 
 
-@experiment(
-    "E45",
-    title="Grids of nodes and of cells",
-    source="section 6.2, Fig. 6.5",
-    caption="Left: nodes that are not equidistant, with the shortest path. Middle: a regular lattice of nodes; right: "
-    "the same as cells, with the same path.",
-    criterion="The middle and the right grid of the figure are equivalent. Where nodes are not equidistant the cost "
-    "varies: the shortest ways between all nodes, by Floyd's algorithm, are what the search has to find.",
-)
+@experiment("E45")
 def representations(seed: int, progress: Progress) -> Outcome:
+    """Grids of nodes and of cells
+
+    In the notes: section 6.2, Fig. 6.5
+
+    Figure: Left: nodes that are not equidistant, with the shortest path. Middle: a regular lattice of nodes; right:
+    the same as cells, with the same path.
+
+    Expected: The middle and the right grid of the figure are equivalent. Where nodes are not equidistant the cost
+    varies: the shortest ways between all nodes, by Floyd's algorithm, are what the search has to find.
+    """
     free = c_wall()
     regular, number = nodes_of(free)
     by_cells = search(Lattice(free), START, TARGET)
@@ -441,17 +455,19 @@ def clearance(plan: LineMap, path: Sequence[Point]) -> float:
     return float(plan.distance(np.vstack(points)).min())
 
 
-@experiment(
-    "E46",
-    title="A grid made from a map, and a path tightened in it",
-    source="section 6.2, Fig. 6.6",
-    caption="Left: forbidden parts (black), where a robot of 0.07 m with a margin of 0.05 m cannot be, and the "
-    "cells into which the rest is merged. Right: a path from cell to cell of a lattice (grey), and tightened (blue).",
-    criterion="On a lattice of 8 neighbours a way is longer than the straight one by |cos| + (√2 - 1) |sin| of its "
-    "direction within 45 degrees, 5.5 % in the mean: a tightened path is at least 2 % shorter in the mean, and keeps "
-    "the robot's radius and margin everywhere.",
-)
+@experiment("E46")
 def tightening(seed: int, progress: Progress) -> Outcome:
+    """A grid made from a map, and a path tightened in it
+
+    In the notes: section 6.2, Fig. 6.6
+
+    Figure: Left: forbidden parts (black), where a robot of 0.07 m with a margin of 0.05 m cannot be, and the cells
+    into which the rest is merged. Right: a path from cell to cell of a lattice (grey), and tightened (blue).
+
+    Expected: On a lattice of 8 neighbours a way is longer than the straight one by |cos| + (√2 - 1) |sin| of its
+    direction within 45 degrees, 5.5 % in the mean: a tightened path is at least 2 % shorter in the mean, and keeps
+    the robot's radius and margin everywhere.
+    """
     plan = LineMap.of(ARENA)
     whole = Lattice.of(plan, RADIUS, MARGIN + DIP, CELL)
     first, _ = next(ways(whole, seed))

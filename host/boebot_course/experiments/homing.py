@@ -17,7 +17,7 @@ from boebot.behaviors import Homing, Wander
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.cognition import Odometry, PathIntegration
 from boebot.devices.compass import TESLA_PER_COUNT
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, experiment, with_progress
 from boebot_course.trials import PER_SEED, decisions, true_pose
 from boebot_course.variants import varied
 
@@ -110,54 +110,6 @@ def ant(compass: float, way: float) -> RobotDescription:
     return varied("arsim", "ant", compass={"sigma_rad": compass}, odometer={"sigma_step_m": step})
 
 
-@experiment(
-    "E33",
-    title="Cataglyphis finds home by path integration",
-    source="section 4.4.4, Cataglyphis",
-    caption="A random way of 200 m out, the way home by the home vector, and the search about the place where it ends.",
-    robot="arsim (compass 0.05 rad, odometer 2 % of each step; and without noise)",
-    criterion="After 200 m the home vector is at most 0.4 m off in the mean, 0.05 m without noise; search: 0.1 m.",
-    slow=True,
-)
-def cataglyphis(seed: int, progress: Progress) -> Outcome:
-    noise = [(0.05, 0.02, number) for number in range(4)] + [(0.0, 0.0, number) for number in range(2)]
-    journeys = [
-        journey(ant(compass, way), 200.0, SECONDS, seed + PER_SEED * number)
-        for compass, way, number in with_progress(noise, progress)
-    ]
-    noisy, exact = journeys[:4], journeys[4:]
-    measured = [
-        Measured("home vector's error, mean of 4", float(np.mean([one.error for one in noisy])), "m", most=0.4),
-        Measured("the same without noise, the greater of 2", max(one.error for one in exact), "m", most=0.05),
-        Measured("the search passes the nest within", max(one.nearest for one in noisy), "m", most=0.1),
-    ]
-    return _outcome(noisy[0], measured)
-
-
-@experiment(
-    "E33-shieldbot",
-    title="A shieldbot finds home by path integration",
-    source="section 4.4.4, Cataglyphis",
-    caption="The same brain on shieldbot with encoders and a magnetic compass, after a random way of 20 m.",
-    robot="shieldbot with its compass (native)",
-    criterion="The way is 20 m, a tenth of the notes' as its speed is. Iron, 0.3 of the earth's field, would bend "
-    "headings by 0.3 rad and lead astray by 0.3 / 2 of the way, 3 m; turning on the spot measures it, by "
-    "120 readings of 0.01 each, to 0.0013 of the field: 0.0013 / 2 × 20 m = 0.013 m is left. Some 400 "
-    "reversals of a wheel miscount an edge of 3.25 mm each, at headings by chance: √400 × 3.25 mm / 2 = "
-    "0.033 m. Compass noise of 0.01 rad each 6 mm: 0.004 m. Together 0.036 m; three times that and the "
-    "0.1 m at which the search begins: 0.21 m.",
-    slow=True,
-)
-def cataglyphis_shieldbot(seed: int, progress: Progress) -> Outcome:
-    seeds = with_progress((seed, seed + PER_SEED), progress)
-    found = [journey(calibrated(trial_seed), 20.0, 210.0, trial_seed) for trial_seed in seeds]
-    measured = [
-        Measured("search begins from the nest, the farther of 2", max(one.distance for one in found), "m", most=0.21),
-        Measured("the search passes the nest within", max(one.nearest for one in found), "m", most=0.1),
-    ]
-    return _outcome(found[0], measured)
-
-
 @dataclass(kw_only=True)
 class Spin(MotorBehavior):
     """Turns on the spot and keeps what the compass says: how its owner calibrates it.
@@ -195,7 +147,47 @@ def middle(points: Floats) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def _outcome(one: Journey, measured: list[Measured]) -> Outcome:
+@experiment(
+    "E33",
+    on={
+        "arsim": Variant("arsim (compass 0.05 rad, odometer 2 % of each step; and without noise)", None, slow=True),
+        "shieldbot": Variant("shieldbot with its compass (native)", "native", slow=True),
+    },
+)
+def cataglyphis(on: str | None, seed: int, progress: Progress) -> Outcome:
+    """Cataglyphis finds home by path integration
+
+    In the notes: section 4.4.4, Cataglyphis
+
+    Figure: A random way out, of 200 m or of shieldbot's 20 m, the way home by the home vector, and the search about the
+    place where it ends.
+
+    Expected: After 200 m the home vector is at most 0.4 m off in the mean, 0.05 m without noise; search: 0.1 m.
+
+    Expected on shieldbot: The way is 20 m, a tenth of the notes' as its speed is. Iron, 0.3 of the earth's field, would
+    bend headings by 0.3 rad and lead astray by 0.3 / 2 of the way, 3 m; turning on the spot measures it, by 120
+    readings of 0.01 each, to 0.0013 of the field: 0.0013 / 2 × 20 m = 0.013 m is left. Some 400 reversals of a wheel
+    miscount an edge of 3.25 mm each, at headings by chance: √400 × 3.25 mm / 2 = 0.033 m. Compass noise of 0.01 rad
+    each 6 mm: 0.004 m. Together 0.036 m; three times that and the 0.1 m at which the search begins: 0.21 m.
+    """
+    if on is None:
+        noise = [(0.05, 0.02, number) for number in range(4)] + [(0.0, 0.0, number) for number in range(2)]
+        journeys = [
+            journey(ant(compass, way), 200.0, SECONDS, seed + PER_SEED * number)
+            for compass, way, number in with_progress(noise, progress)
+        ]
+        found, exact = journeys[:4], journeys[4:]
+        measured = [
+            Measured("home vector's error, mean of 4", float(np.mean([one.error for one in found])), "m", most=0.4),
+            Measured("the same without noise, the greater of 2", max(one.error for one in exact), "m", most=0.05),
+        ]
+    else:
+        seeds = with_progress((seed, seed + PER_SEED), progress)
+        found = [journey(calibrated(trial_seed), 20.0, 210.0, trial_seed) for trial_seed in seeds]
+        farther = max(one.distance for one in found)
+        measured = [Measured("search begins from the nest, the farther of 2", farther, "m", most=0.21)]
+    measured.append(Measured("the search passes the nest within", max(one.nearest for one in found), "m", most=0.1))
+    one = found[0]
     shown = slice(None, None, 5)
     steps = np.arange(len(one.x))
     arrived = len(steps) if one.arrived is None else one.arrived

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boebot.cognition import Odometry
-from boebot_course.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
 from boebot_course.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
@@ -113,21 +113,6 @@ def judge_notes(trial: Straight) -> list[Measured]:
     ]  # fmt: skip
 
 
-@experiment(
-    "E24",
-    title="The odometric ghost",
-    source="section 5.4, code listing 5.4",
-    caption="Robot and ghost on a metre straight ahead by an odometer that takes the left wheel for 2 % larger than it "
-    "is.",
-    robot="arsim",
-    criterion="More than 0.01 m off after a metre, and as the closed form has it. The brain has the estimate alone.",
-)
-def notes_ghost(seed: int, progress: Progress) -> Outcome:
-    robot = varied("arsim", "arsim-1.02", odometer={"factor_left": FACTOR})
-    trial = drive(runner(period=0.01), robot, 6.0, seed)
-    return Outcome(judge_notes(trial), columns(trial), lambda figure: _draw(figure, [trial]))
-
-
 # ---- shieldbots ------------------------------------------------------------------------------------------------------
 
 
@@ -143,20 +128,27 @@ def judge_shieldbots(trials: Sequence[Straight]) -> list[Measured]:
     ]  # fmt: skip
 
 
-@experiment(
-    "E24-shieldbot",
-    title="The odometric ghost of a shieldbot",
-    source="section 5.4, code listing 5.4",
-    caption="Five shieldbots, and their ghosts, on a metre straight ahead with a brain that takes the left wheel for 2 "
-    "% larger than it is; it holds the ghost's heading.",
-    robot="shieldbot (native)",
-    criterion="The brain keeps the ghost straight, so that the right wheel rolls 1.02 times as far as the left: an arc "
-    "of 0.189 / m. After 0.98 m of the ghost it is 8.9 cm to the side and 1.5 cm back, 9.0 cm off. First edges "
-    "anywhere within 3.25 mm make 1.2 cm (1 σ) of it uncertain, 0.6 misses or flickers a run of two edges each 2.4 cm; "
-    "the mean of five is known to 1.2 cm: three of them are allowed. In each run more than the notes' 1 cm. Servos are "
-    "centred.",
-)
-def shieldbot_ghosts(seed: int, progress: Progress) -> Outcome:
+@experiment("E24", on={"arsim": Variant("arsim", False), "shieldbot": Variant("shieldbot (native)", True)})
+def ghosts(on_board: bool, seed: int, progress: Progress) -> Outcome:
+    """The odometric ghost
+
+    In the notes: section 5.4, code listing 5.4
+
+    Figure: Robot and ghost, of shieldbots five, on a metre straight ahead by an odometer that takes the left wheel for
+    2 % larger than it is.
+
+    Expected: More than 0.01 m off after a metre, and as the closed form has it. The brain has the estimate alone.
+
+    Expected on shieldbot: The brain keeps the ghost straight, so that the right wheel rolls 1.02 times as far as the
+    left: an arc of 0.189 / m. After 0.98 m of the ghost it is 8.9 cm to the side and 1.5 cm back, 9.0 cm off. First
+    edges anywhere within 3.25 mm make 1.2 cm (1 σ) of it uncertain, 0.6 misses or flickers a run of two edges each
+    2.4 cm; the mean of five is known to 1.2 cm: three of them are allowed. In each run more than the notes' 1 cm.
+    Servos are centred.
+    """
+    if not on_board:
+        robot = varied("arsim", "arsim-1.02", odometer={"factor_left": FACTOR})
+        trial = drive(runner(period=0.01), robot, 6.0, seed)
+        return Outcome(judge_notes(trial), columns(trial), lambda figure: _draw(figure, [trial]))
     seeds = trial_seeds(seed, RUNS)
     trials = []
     for trial_seed in with_progress(seeds, progress):

@@ -141,21 +141,21 @@ def _reaction(result: RunResult) -> float:
     return float(after[0] * result.tick) if len(after) else math.nan
 
 
-@experiment(
-    "paradigms",
-    title="Sense-model-plan-act against behavior-based control",
-    source="sections 5.1 and 5.2, Fig. 5.1",
-    caption="The same task, sensors and motions: paths to the goal (star) of a robot that plans for 0.5 s before it "
-    "acts, and of a behavior-based one; crosses: collisions. Right: collisions against the time that a plan takes.",
-    robot="arsim (infra-red sensors at ±0.3324 rad)",
-    criterion="Derived from the times: a behavior acts on a reading at its next step, within 0.05 s; a plan on "
-    "which work begins at once is acted on 0.5 s later, one that has to wait for the last up to 1 s later, and a "
-    "period either way. At 0.55 m/s that is 0.27 m to 0.55 m, and what the sensors call near is 0.39 m away: some "
-    "must be hit. Planned in 0.05 s the same decisions arrive everywhere and hit less than half as often: it is the "
-    "time that fails, not they.",
-    slow=True,
-)
+@experiment("paradigms", robot="arsim (infra-red sensors at ±0.3324 rad)", slow=True)
 def paradigms(seed: int, progress: Progress) -> Outcome:
+    """Sense-model-plan-act against behavior-based control
+
+    In the notes: sections 5.1 and 5.2, Fig. 5.1
+
+    Figure: The same task, sensors and motions: paths to the goal (star) of a robot that plans for 0.5 s before it
+    acts, and of a behavior-based one; crosses: collisions. Right: collisions against the time that a plan takes.
+
+    Expected: Derived from the times: a behavior acts on a reading at its next step, within 0.05 s; a plan on which
+    work begins at once is acted on 0.5 s later, one that has to wait for the last up to 1 s later, and a period
+    either way. At 0.55 m/s that is 0.27 m to 0.55 m, and what the sensors call near is 0.39 m away: some must be
+    hit. Planned in 0.05 s the same decisions arrive everywhere and hit less than half as often: it is the time that
+    fails, not they.
+    """
     brains: dict[str, Callable[[], object]] = {"parallel": behavior_based}
     brains |= {f"serial_{planning:g}s".replace(".", "_"): partial(Serial, planning) for planning in PLANNINGS}
     runs: dict[str, list[Crossing]] = {name: [] for name in brains}

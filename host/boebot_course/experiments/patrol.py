@@ -15,8 +15,8 @@ import numpy as np
 from boebot.brain import Brain, CognitiveProcess, Utility
 from boebot.cognition import Odometry
 from boebot.navigation import Estimator, FollowPath, LineMap, Localization, RandomSearch
-from boebot.navigation.frames import composed
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, experiment, with_progress
+from boebot.navigation.frames import Pose, composed
+from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, true_pose, try_once
 
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 ARENA = "blocks"
 ROUND = ((2.8, 1.2), (2.8, 2.7), (4.4, 2.8), (4.4, 4.65), (1.2, 4.65), (0.8, 2.8), (0.8, 0.8))  # m
 START = (0.8, 0.8, 0.0)  # m, m, rad
-SECONDS, SEEDS = 120.0, 12
-EVERY = 5.0  # s from scan to scan
 JUMP = 0.05  # m: from here on a correction is one that can be seen
 WINDOW = 0.4  # m to each side of the correction that is drawn enlarged
 
@@ -117,70 +115,64 @@ def patrolled(
     )
 
 
-FIRST = (
-    "Above: true path of the first run (green) and the path that it believes to take (red), by odometry alone, with "
-    "localization, and enlarged about its largest correction. Below: how far from the truth it believes to be, "
-)
-
-
 @experiment(
     "E55",
-    title="A patrol with localization and without",
-    source="section 6.3, Figs. 6.14 and 6.15",
-    caption=FIRST + "by odometry alone and with localization every five seconds; twelve runs, the first one dark.",
-    robot="roller",
-    criterion="Medians of the greatest error of twelve runs: at least 0.5 m by odometry alone (0.73 m computed from "
-    "its noise), at most 0.2 m with localization, whose corrections can be seen as jumps. In five seconds the heading "
-    "drifts by 0.001 √200 / 0.24 = 0.06 rad (one sigma); the search finds back from 0.15 rad.",
-    slow=True,
+    on={
+        "roller": Variant("roller", "roller", None, 12, 120.0, 5.0, (0.1, 0.1, 0.1), slow=True),
+        "avr": Variant(
+            "shieldbot-turret (avr)", "shieldbot-turret", "avr", 5, 240.0, 10.0, (0.15, 0.15, 0.3), slow=True
+        ),
+    },
 )
-def patrol(seed: int, progress: Progress) -> Outcome:
-    seeds = with_progress(trial_seeds(seed, SEEDS), progress)
-    runs = [patrolled(number, "roller", SECONDS, EVERY, RandomSearch()) for number in seeds]
+def patrol(
+    robot: str,
+    on: str | None,
+    count: int,
+    seconds: float,
+    every: float,
+    box: Pose,
+    seed: int,
+    progress: Progress,
+) -> Outcome:
+    """A patrol with localization and without
+
+    In the notes: section 6.3, Figs. 6.14 and 6.15
+
+    Figure: Above: true path of the first run (green) and the path that it believes to take (red), by odometry alone,
+    with localization, and enlarged about its largest correction. Below: how far from the truth it believes to be, by
+    odometry alone and with localization every five seconds, by a turret every ten; all runs, the first one dark.
+
+    Expected: Medians of the greatest error of twelve runs: at least 0.5 m by odometry alone (0.73 m computed from its
+    noise), at most 0.2 m with localization, whose corrections can be seen as jumps. In five seconds the heading drifts
+    by 0.001 √200 / 0.24 = 0.06 rad (one sigma); the search finds back from 0.15 rad.
+
+    Expected on avr: As the notes' figure shows it: the greatest error of a run with localization is less than half of
+    that by odometry alone; medians.
+    """
+    seeds = with_progress(trial_seeds(seed, count), progress)
+    runs = [patrolled(number, robot, seconds, every, RandomSearch(box=box), on) for number in seeds]
     alone = [float(run.odometry.max()) for run in runs]
     corrected = [float(run.localization.max()) for run in runs]
-    jumps = [int((run.jumps > JUMP).sum()) for run in runs]
-    measured = [
-        Measured("greatest error by odometry alone, median", float(np.median(alone)), "m", least=0.5),
-        Measured("greatest error with localization, median", float(np.median(corrected)), "m", most=0.2),
-        Measured("worst of all runs with localization", max(corrected), "m"),
-        Measured("corrections of more than 0.05 m, fewest in a run", min(jumps), least=1),
-        Measured("scans in a run, mean", float(np.mean([len(run.jumps) for run in runs]))),
-    ]
-    data = {"greatest_error_by_odometry_m": alone, "greatest_error_with_localization_m": corrected, "jumps": jumps}
-
-    return Outcome(measured, data, lambda figure: _draw(figure, runs))
-
-
-AVR_SECONDS, AVR_SEEDS = 240.0, 5
-
-
-@experiment(
-    "E55-avr",
-    title="A patrol of a Shield-Bot with a turret",
-    source="section 6.3, Figs. 6.14 and 6.15",
-    caption=FIRST + "by its encoders alone and with a sweep of the turret every ten seconds; five runs, the first one "
-    "dark.",
-    robot="shieldbot-turret (avr)",
-    criterion="As the notes' figure shows it: the greatest error of a run with localization is less than half of that "
-    "by odometry alone; medians.",
-    slow=True,
-)
-def patrol_avr(seed: int, progress: Progress) -> Outcome:
-    seeds = with_progress(trial_seeds(seed, AVR_SEEDS), progress)
-    runs = [
-        patrolled(number, "shieldbot-turret", AVR_SECONDS, 10.0, RandomSearch(box=(0.15, 0.15, 0.3)), "avr")
-        for number in seeds
-    ]
-    alone = [float(run.odometry.max()) for run in runs]
-    corrected = [float(run.localization.max()) for run in runs]
-    measured = [
-        Measured("greatest error by encoders alone, median", float(np.median(alone)), "m", least=0.2),
-        Measured("greatest error with localization, median", float(np.median(corrected)), "m"),
-        Measured("the one as a share of the other", float(np.median(corrected) / np.median(alone)), most=0.5),
-        Measured("worst of all runs with localization", max(corrected), "m"),
-    ]
-    data = {"greatest_error_by_encoders_m": alone, "greatest_error_with_localization_m": corrected}
+    by, with_it = float(np.median(alone)), float(np.median(corrected))
+    worst = Measured("worst of all runs with localization", max(corrected), "m")
+    if on is None:
+        jumps = [int((run.jumps > JUMP).sum()) for run in runs]
+        measured = [
+            Measured("greatest error by odometry alone, median", by, "m", least=0.5),
+            Measured("greatest error with localization, median", with_it, "m", most=0.2),
+            worst,
+            Measured("corrections of more than 0.05 m, fewest in a run", min(jumps), least=1),
+            Measured("scans in a run, mean", float(np.mean([len(run.jumps) for run in runs]))),
+        ]
+        data = {"greatest_error_by_odometry_m": alone, "greatest_error_with_localization_m": corrected, "jumps": jumps}
+    else:
+        measured = [
+            Measured("greatest error by encoders alone, median", by, "m", least=0.2),
+            Measured("greatest error with localization, median", with_it, "m"),
+            Measured("the one as a share of the other", with_it / by, most=0.5),
+            worst,
+        ]
+        data = {"greatest_error_by_encoders_m": alone, "greatest_error_with_localization_m": corrected}
     return Outcome(measured, data, lambda figure: _draw(figure, runs))
 
 

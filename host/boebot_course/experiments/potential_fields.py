@@ -7,7 +7,7 @@ long, and its encoders count.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +20,17 @@ from boebot.cognition import Odometry
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.navigation import FollowField, Lattice, LineMap, LockDetector, Potential, PotentialField
 from boebot.navigation.potential_field import waypoints
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import (
+    Floats,
+    Measured,
+    Outcome,
+    Progress,
+    Variant,
+    about,
+    exactly,
+    experiment,
+    with_progress,
+)
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, varied
@@ -50,16 +60,18 @@ def difference(field: PotentialField, points: Floats, step: float) -> float:
     return float(np.abs(field.gradient(points) - np.stack(slopes, axis=-1)).max())
 
 
-@experiment(
-    "E47",
-    title="The gradient of a potential field",
-    source="section 6.2, Fig. 6.11, equations (6.1) to (6.3)",
-    caption="Left: the field of one obstacle and a goal. Right: greatest difference of the gradient of nine random "
-    "potentials from central differences, over the differences' step; dashed: in proportion to its square.",
-    criterion="Nine potentials of any place, height, widths and direction, 1000 points. Central differences over ± 1 "
-    "µm are good to 1e-6 / m, by rounding of the field's values.",
-)
+@experiment("E47")
 def gradient(seed: int, progress: Progress) -> Outcome:
+    """The gradient of a potential field
+
+    In the notes: section 6.2, Fig. 6.11, equations (6.1) to (6.3)
+
+    Figure: Left: the field of one obstacle and a goal. Right: greatest difference of the gradient of nine random
+    potentials from central differences, over the differences' step; dashed: in proportion to its square.
+
+    Expected: Nine potentials of any place, height, widths and direction, 1000 points. Central differences over ± 1
+    µm are good to 1e-6 / m, by rounding of the field's values.
+    """
     chance = np.random.default_rng(seed)
     low, high = (-2, -2, -1, 0.3, 0.3, -math.pi), (2, 2, 1, 2, 2, math.pi)
     field = PotentialField.of(Potential(*row) for row in chance.uniform(low, high, (POTENTIALS, 6)))
@@ -185,6 +197,9 @@ def shieldbot() -> World:
     return World(load_robot("shieldbot-quad"), "avr", 0.5, 0.12, 0.06, 0.03, without=exact)
 
 
+BOE_BOT = "shieldbot-quad (avr), its encoders without errors, its servos centred"
+
+
 def _draw_field(axes: Axes, field: PotentialField, trial: Trial, low: float, high: float) -> None:
     """An arena with contours of a field between two heights."""
     floor(axes, trial.plan)
@@ -238,8 +253,29 @@ ROOM = [
 STARTS: list[Pose] = [(1.3, -1.0, 0.0), (1.3, 1.3, 0.0), (-1.3, -1.3, 0.0), (0.0, -1.2, 0.0)]
 
 
-def among_pillars(world: World, seconds: float, seed: int, progress: Progress) -> Outcome:
-    """From four starts."""
+@experiment(
+    "E48",
+    on={
+        "roller": Variant("roller, its odometer without noise", roller, 26.0),
+        "avr": Variant(BOE_BOT, shieldbot, 32.0, slow=True),
+    },
+)
+def among_pillars(make: Callable[[], World], seconds: float, seed: int, progress: Progress) -> Outcome:
+    """Down a potential field past four pillars
+
+    In the notes: section 6.2, Fig. 6.12
+
+    Figure: Left: a field of nine potentials, one of the goal, four of the walls and four of the pillars. Right: its
+    contours, and the robot's paths from four starts to the goal (yellow).
+
+    Expected: It arrives within 0.1 m, and its middle stays farther than its radius and 0.05 m from all lines. The
+    goal's minimum is within half of 0.1 m.
+
+    Expected on avr: All lengths are half of the notes' ones; the robot has its own radius, and arrives within 0.05 m by
+    its odometry. Odometry by encoders may be 0.03 m off at the end: edges are 1.6 mm apart, so that the heading is
+    known to 0.016 rad, on a way of less than 2 m. Its middle stays farther than its radius and 0.05 m from all lines.
+    """
+    world = make()
     followers, trials = [], []
     starts = list(zip(STARTS, trial_seeds(seed, len(STARTS)), strict=True))
     with world.arena("pillars") as arena:
@@ -274,51 +310,6 @@ def among_pillars(world: World, seconds: float, seed: int, progress: Progress) -
     return Outcome(measured, _columns(trials), draw)
 
 
-NINE = (
-    "Left: a field of nine potentials, one of the goal, four of the walls and four of the pillars. Right: its "
-    "contours, and "
-)
-CLEARANCE = (
-    "It arrives within 0.1 m, and its middle stays farther than its radius and 0.05 m from all lines. The goal's "
-    "minimum is within half of 0.1 m."
-)
-
-
-@experiment(
-    "E48",
-    title="Down a potential field past four pillars",
-    source="section 6.2, Fig. 6.12",
-    caption=f"{NINE}the robot's paths from four starts to the goal (yellow).",
-    robot="roller, its odometer without noise",
-    criterion=CLEARANCE,
-)
-def nine_potentials(seed: int, progress: Progress) -> Outcome:
-    return among_pillars(roller(), 26.0, seed, progress)
-
-
-BOE_BOT = "shieldbot-quad (avr), its encoders without errors, its servos centred"
-HALF = (
-    "All lengths are half of the notes' ones; the robot has its own radius, and arrives within 0.05 m by its odometry. "
-)
-DRIFT = (
-    "Odometry by encoders may be 0.03 m off at the end: edges are 1.6 mm apart, so that the heading is known to 0.016 "
-    "rad, on a way of less than 2 m."
-)
-
-
-@experiment(
-    "E48-avr",
-    title="Down a potential field past four pillars, with the firmware's AVR image",
-    source="section 6.2, Fig. 6.12",
-    caption=f"{NINE}a Boe-Bot's paths from four starts to the goal (yellow).",
-    robot=BOE_BOT,
-    criterion=f"{HALF}{DRIFT} Its middle stays farther than its radius and 0.05 m from all lines.",
-    slow=True,
-)
-def nine_potentials_avr(seed: int, progress: Progress) -> Outcome:
-    return among_pillars(shieldbot(), 32.0, seed, progress)
-
-
 # ---- E49: locked -----------------------------------------------------------------------------------------------------
 
 BEHIND = Potential(2.0, 0.0, -1.0, 2.0, 2.0)
@@ -327,17 +318,18 @@ BESIDE = Potential(0.8, 0.35, 0.45, 0.3, 0.2)  # one of them alone
 AHEAD: list[Pose] = [(-1.0, 0.0, 0.0), (-1.0, 0.05, 0.0)]
 
 
-@experiment(
-    "E49",
-    title="Locked in a wedge",
-    source="section 6.2, Fig. 6.13",
-    caption="Left: contours of the field of a goal at (2, 0) and of the three hills of a wedge, and paths from two "
-    "starts (line, dashes). Right: distance from the goal, also without the wedge, and with one of its hills only.",
-    robot="roller, its odometer without noise",
-    criterion="Where the slopes of goal and hills cancel on the axis, at x = 0.57 m, the field has a minimum of "
-    "-0.553. Without hills, and with one of them, the robot arrives.",
-)
+@experiment("E49", robot="roller, its odometer without noise")
 def locked(seed: int, progress: Progress) -> Outcome:
+    """Locked in a wedge
+
+    In the notes: section 6.2, Fig. 6.13
+
+    Figure: Left: contours of the field of a goal at (2, 0) and of the three hills of a wedge, and paths from two
+    starts (line, dashes). Right: distance from the goal, also without the wedge, and with one of its hills only.
+
+    Expected: Where the slopes of goal and hills cancel on the axis, at x = 0.57 m, the field has a minimum of
+    -0.553. Without hills, and with one of them, the robot arrives.
+    """
     world = roller()
     field = PotentialField.of([BEHIND, *WEDGE])
     lowest = field.minimum_near(0.5, 0.05) or (math.nan, math.nan)
@@ -399,8 +391,27 @@ class PutWaypoints(CognitiveProcess):
         """They are put once."""
 
 
-def past_the_wedge(world: World, seconds: float, seed: int, progress: Progress) -> Outcome:
-    """By waypoints from the start, and by those that a lock detector puts."""
+@experiment(
+    "E50",
+    on={
+        "roller": Variant("roller, its odometer without noise", roller),
+        "avr": Variant(BOE_BOT, shieldbot, slow=True),
+    },
+)
+def past_the_wedge(make: Callable[[], World], seed: int, progress: Progress) -> Outcome:
+    """Waypoints lead around a wedge
+
+    In the notes: section 6.2
+
+    Figure: Paths past the wedge to the goal (yellow), with contours of the field. Left: two waypoints (diamonds) from
+    the start; right: valleys at the corners of a path around, put where the robot comes no further.
+
+    Expected: The notes do not say where waypoints are put: (0.3, 0.8) and (1.0, 0.95), valleys of -1.2 and 0.6 m, which
+    go when the robot is within 0.25 m. It arrives within 25 s; with the lock detector, which waits 5 s, within 50 s.
+
+    Expected on avr: The same in half the size, with the drift of E48.
+    """
+    world, seconds = make(), 25.0
     ends = [(0.0, 0.0), *AROUND, (0.0, 0.0)]
     valleys = [world.size(valley) for valley in waypoints(ends)]
     with world.arena("wedge") as arena:
@@ -440,41 +451,6 @@ def past_the_wedge(world: World, seconds: float, seed: int, progress: Progress) 
         left.plot(*np.array([(valley.x, valley.y) for valley in valleys]).T, "D", color="#cc79a7", ms=6, zorder=7)
 
     return Outcome(measured, _columns([first, second]), draw)
-
-
-PAST = (
-    "Paths past the wedge to the goal (yellow), with contours of the field. Left: two waypoints (diamonds) from the "
-    "start; right: valleys at the corners of a path around, put where the robot comes no further."
-)
-WITHIN = (
-    "The notes do not say where waypoints are put: (0.3, 0.8) and (1.0, 0.95), valleys of -1.2 and 0.6 m, which go "
-    "when the robot is within 0.25 m. It arrives within 25 s; with the lock detector, which waits 5 s, within 50 s. "
-)
-
-
-@experiment(
-    "E50",
-    title="Waypoints lead around a wedge",
-    source="section 6.2",
-    caption=PAST,
-    robot="roller, its odometer without noise",
-    criterion=WITHIN.strip(),
-)
-def around(seed: int, progress: Progress) -> Outcome:
-    return past_the_wedge(roller(), 25.0, seed, progress)
-
-
-@experiment(
-    "E50-avr",
-    title="Waypoints lead around a wedge, with the firmware's AVR image",
-    source="section 6.2",
-    caption=PAST,
-    robot=BOE_BOT,
-    criterion=f"{WITHIN}{HALF}{DRIFT}",
-    slow=True,
-)
-def around_avr(seed: int, progress: Progress) -> Outcome:
-    return past_the_wedge(shieldbot(), 25.0, seed, progress)
 
 
 # ---- E51: turning on the spot ----------------------------------------------------------------------------------------
@@ -525,8 +501,39 @@ def turned(world: World, heading: float, seed: int) -> Turn:
     return Turn(heading, trial, error, [(index, left, right) for index, _, left, right in trial.result.record.steps])
 
 
-def facing_away(world: World, least: float, most: float, shift: float, seed: int, progress: Progress) -> Outcome:
-    """`least`, `most`: heading error at which it goes on (rad); `shift`: of its middle while it turns (m)."""
+def _begins_on_spot(one: Turn) -> bool:
+    """Its first command turns it on the spot, and so do all until it goes on."""
+    return bool(one.spot) and one.spot == one.commands[: len(one.spot)]
+
+
+@experiment(
+    "E51",
+    on={
+        "roller": Variant("roller, its odometer without noise", roller, 0.22, BELOW, 1e-3),
+        "avr": Variant(BOE_BOT, shieldbot, 0.02, BELOW + 0.016, 0.0065, slow=True),
+    },
+)
+def facing_away(
+    make: Callable[[], World], least: float, most: float, shift: float, seed: int, progress: Progress
+) -> Outcome:
+    """Facing away from the goal it turns on the spot first
+
+    In the notes: section 6.2, equations (6.5) to (6.7)
+
+    Figure: Left: heading error from seven starts; dots: where the robot stops turning on the spot and goes on. Right:
+    set-points of the wheels from the start with the largest error.
+
+    Expected: It turns on the spot where the error is beyond π/3, by the shorter way, until it is within π/12. It turns
+    by 0.042 rad in a step of 0.05 s: it goes on at π/12 less that, 0.22 rad, or more.
+
+    Expected on avr: The heading is known to 0.016 rad, as edges are 1.6 mm apart. By the servos' curve 0.06 m/s are
+    0.125 m/s, 2.4 rad/s: in a step of 0.05 s, with a reading 0.05 s old, it turns by 0.24 rad, and goes on at 0.02 rad
+    or more. Servos differ by 2.9 % each (1 σ), the speeds of two by 4.1 %: a quarter of that of the track width is the
+    distance of its middle from the centre of the turn, with three of them 3.2 mm, and half a turn about it takes the
+    middle 6.5 mm away.
+    """
+    # `least`, `most`: heading error at which it goes on (rad); `shift`: of its middle while it turns (m)
+    world = make()
     turns = [turned(world, heading, seed) for heading in with_progress(HEADINGS, progress)]
     far = [one for one in turns if abs(one.heading) > ABOVE]
     near = [one for one in turns if abs(one.heading) <= ABOVE]
@@ -571,44 +578,3 @@ def facing_away(world: World, least: float, most: float, shift: float, seed: int
         "heading_error_rad": [float(one.error[index]) for one, index in rows],
     }
     return Outcome(measured, data, draw)
-
-
-def _begins_on_spot(one: Turn) -> bool:
-    """Its first command turns it on the spot, and so do all until it goes on."""
-    return bool(one.spot) and one.spot == one.commands[: len(one.spot)]
-
-
-FACING = (
-    "Left: heading error from seven starts; dots: where the robot stops turning on the spot and goes on. Right: "
-    "set-points of the wheels from the start with the largest error."
-)
-RULE = "It turns on the spot where the error is beyond π/3, by the shorter way, until it is within π/12. "
-
-
-@experiment(
-    "E51",
-    title="Facing away from the goal it turns on the spot first",
-    source="section 6.2, equations (6.5) to (6.7)",
-    caption=FACING,
-    robot="roller, its odometer without noise",
-    criterion=f"{RULE}It turns by 0.042 rad in a step of 0.05 s: it goes on at π/12 less that, 0.22 rad, or more.",
-)
-def rotation(seed: int, progress: Progress) -> Outcome:
-    return facing_away(roller(), 0.22, BELOW, 1e-3, seed, progress)
-
-
-@experiment(
-    "E51-avr",
-    title="Facing away from the goal it turns on the spot first, with the firmware's AVR image",
-    source="section 6.2, equations (6.5) to (6.7)",
-    caption=FACING,
-    robot=BOE_BOT,
-    criterion=f"{RULE}The heading is known to 0.016 rad, as edges are 1.6 mm apart. By the servos' curve 0.06 m/s are "
-    "0.125 m/s, 2.4 rad/s: in a step of 0.05 s, with a reading 0.05 s old, it turns by 0.24 rad, and goes on at 0.02 "
-    "rad or more. Servos differ by 2.9 % each (1 σ), the speeds of two by 4.1 %: a quarter of that of the track width "
-    "is the distance of its middle from the centre of the turn, with three of them 3.2 mm, and half a turn about it "
-    "takes the middle 6.5 mm away.",
-    slow=True,
-)
-def rotation_avr(seed: int, progress: Progress) -> Outcome:
-    return facing_away(shieldbot(), 0.02, BELOW + 0.016, 0.0065, seed, progress)

@@ -56,21 +56,20 @@ def density_ratio(group: Swarm) -> float:
     return float((np.hypot(away[..., 0], away[..., 1]) < REACH).mean() * SIZE**2 / (math.pi * REACH**2))
 
 
-@experiment(
-    "predator-prey",
-    title="M. xanthus lures E. coli",
-    source="section 4.4.2",
-    caption="Bacteria before and after 200 s, lured by a predator 200 times slower, which moves by 1 m meanwhile; "
-    "circle: what is near to it.",
-    robot="arsim, as narrow as a bacterium",
-    criterion="Prey around the predator at least three times as dense as if spread evenly, and not so without "
-    "attractant. In the last 50 s the predator is 0.75 m to 1 m from where it began, 0.875 m in the mean, "
-    "and so is the prey's middle. A bacterium is some 0.6 m (1 σ, along x) from the attractant's middle, "
-    "the middle of 40 of them 0.095 m: four of these are allowed. If the predator stood still it would be "
-    "0.",
-    slow=True,
-)
+@experiment("predator-prey", robot="arsim, as narrow as a bacterium", slow=True)
 def luring(seed: int, progress: Progress) -> Outcome:
+    """M. xanthus lures E. coli
+
+    In the notes: section 4.4.2
+
+    Figure: Bacteria before and after 200 s, lured by a predator 200 times slower, which moves by 1 m meanwhile;
+    circle: what is near to it.
+
+    Expected: Prey around the predator at least three times as dense as if spread evenly, and not so without
+    attractant. In the last 50 s the predator is 0.75 m to 1 m from where it began, 0.875 m in the mean, and so is
+    the prey's middle. A bacterium is some 0.6 m (1 σ, along x) from the attractant's middle, the middle of 40 of
+    them 0.095 m: four of these are allowed. If the predator stood still it would be 0.
+    """
     first = trial_seeds(seed, PREY)[0] + 400
     prey = partial(swarm, count=PREY, seconds=LASTS, period=PERIOD)
     group = prey(first, lure, lambda share: progress(share / 2))

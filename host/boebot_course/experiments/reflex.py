@@ -38,14 +38,16 @@ def judge_step(times: Floats, values: Floats) -> list[Measured]:
     ]
 
 
-@experiment(
-    "E25",
-    title="A reflex warms up and tires",
-    source="section 4.4.1, reflexes",
-    caption="Intensity of a reflex under a stimulus that begins at 0 s and lasts; dashed: what is left in the end.",
-    criterion="By its equations: at most 0.73 ± 0.02, at 0.70 s ± 0.05 s; below 0.13 after 9 s, for it tends to 0.1.",
-)
+@experiment("E25")
 def step_response(seed: int, progress: Progress) -> Outcome:
+    """A reflex warms up and tires
+
+    In the notes: section 4.4.1, reflexes
+
+    Figure: Intensity of a reflex under a stimulus that begins at 0 s and lasts; dashed: what is left in the end.
+
+    Expected: By its equations: at most 0.73 ± 0.02, at 0.70 s ± 0.05 s; below 0.13 after 9 s, for it tends to 0.1.
+    """
     times, values = intensity_under_a_step(ReflexIntensity(), 15.0)
     measured = judge_step(times, values)
 
@@ -136,15 +138,17 @@ def judge(one: Larva) -> list[Measured]:
     ]
 
 
-@experiment(
-    "E26",
-    title="A larva that shuns light crawls into it",
-    source="section 4.4.1, reflexes",
-    caption="Place of a fly larva in a dead-end tunnel that is lit at its mouth, and the intensity with which it turns "
-    "away from the light; dashed: the intensity below which forward motion wins.",
-    criterion="By its equations: at the end at 17.9 s ± 1 s, tired at 30.3 s ± 0.5 s, out at 50.6 s ± 2 s.",
-)
+@experiment("E26")
 def tunnel(seed: int, progress: Progress) -> Outcome:
+    """A larva that shuns light crawls into it
+
+    In the notes: section 4.4.1, reflexes
+
+    Figure: Place of a fly larva in a dead-end tunnel that is lit at its mouth, and the intensity with which it
+    turns away from the light; dashed: the intensity below which forward motion wins.
+
+    Expected: By its equations: at the end at 17.9 s ± 1 s, tired at 30.3 s ± 0.5 s, out at 50.6 s ± 2 s.
+    """
     one = larva(ReflexIntensity(0.3, 15.0, 0.98))
 
     def draw(figure: Figure) -> None:

@@ -104,25 +104,24 @@ def judge_walls(runs: list[RunResult]) -> list[Measured]:
     ]
 
 
-@experiment(
-    "E68",
-    title="The same brain and seed command the same on both boards, as long as telemetry agrees",
-    source="section 3.1",
-    caption="Motor signals that three brains commanded on the native board and on the emulated ATmega328P, and where "
-    "first telemetry (grey), then infrared or whiskers (green), then their commands (red) differ; along walls commands "
-    "differ by too little to be seen.",
-    robot="shieldbot (native, avr)",
-    criterion="Along walls, whole runs of 60 s: boards may begin and end a turn on the spot one step of the brain "
-    "apart, so that two steps a turn may differ; else commands differ by what the robots' places do: 8.4 mm "
-    "that it drives in a step, and 4.2 mm by phase, of which follow nearness (1 in 0.40 m) times k = 2.9. A "
-    "brain is a function of its seed and of what it sees: no command may differ before telemetry does, and "
-    "a fresh brain must command the same at each of the 400 steps when it is given the telemetry of either "
-    "run. The first difference is explained by phase: telemetry comes within one tick (10 ms) of the other "
-    "board's, set-points take hold within a servo frame (20 ms): at 0.14 m/s 4.2 mm, less than two of the "
-    "encoder's steps of 3.2 mm.",
-    slow=True,
-)
+@experiment("E68", robot="shieldbot (native, avr)", slow=True)
 def same_commands(seed: int, progress: Progress) -> Outcome:
+    """The same brain and seed command the same on both boards, as long as telemetry agrees
+
+    In the notes: section 3.1
+
+    Figure: Motor signals that three brains commanded on the native board and on the emulated ATmega328P, and where
+    first telemetry (grey), then infrared or whiskers (green), then their commands (red) differ; along walls
+    commands differ by too little to be seen.
+
+    Expected: Along walls, whole runs of 60 s: boards may begin and end a turn on the spot one step of the brain
+    apart, so that two steps a turn may differ; else commands differ by what the robots' places do: 8.4 mm that it
+    drives in a step, and 4.2 mm by phase, of which follow nearness (1 in 0.40 m) times k = 2.9. A brain is a
+    function of its seed and of what it sees: no command may differ before telemetry does, and a fresh brain must
+    command the same at each of the 400 steps when it is given the telemetry of either run. The first difference is
+    explained by phase: telemetry comes within one tick (10 ms) of the other board's, set-points take hold within a
+    servo frame (20 ms): at 0.14 m/s 4.2 mm, less than two of the encoder's steps of 3.2 mm.
+    """
     measured: list[Measured] = []
     data: dict[str, list[float]] = {}
     drawn: list[tuple[str, list[RunResult], list[Difference | None]]] = []

@@ -21,7 +21,7 @@ from boebot.arenas.floor_plan import floor_plan
 from boebot.navigation import Lattice, LineMap, Scan, TurretScan, laser_scan
 from boebot.navigation.frames import Pose
 from boebot.navigation.match import Match, search_pose
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, about, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
 
@@ -77,18 +77,47 @@ def own_scan(pose: Pose, seed: int) -> Scan:
     return taken[0]
 
 
+TURRET_POSES = 8
+TURRET_MOST = 0.03
+
+
+def turret_scan(pose: Pose, seed: int) -> Scan:
+    """A sweep of the Shield-Bot's sonar, through the AVR image and the line."""
+    sweeps: list[Scan] = []
+    scan = TurretScan()
+
+    def step(robot: Robot) -> None:
+        robot.stop()
+        if not sweeps and (sweep := scan(robot)) is not None:
+            sweeps.append(sweep)
+
+    run(step, robot="shieldbot-turret", arena=ARENA, on="avr", pose=pose, seed=seed, seconds=5.0, record=False)
+    return sweeps[0]
+
+
 @experiment(
     "E52",
-    title="A scan fits the map at the true pose",
-    source="section 6.3, equation (6.8)",
-    caption="Left: a scan in its map. Right: the scan error at 40 true poses with 1 % noise (dots), and at five with "
-    "the simulated robot's own laser (squares); line: the share of noise.",
-    robot="roller",
-    criterion="Without noise the error is none. With noise of 1 % it is the root mean square of up to 120 numbers of "
-    "that deviation, known to 0.0006 or a little more; the mean of 40 is known to 0.0001, five of them are allowed. "
-    "At most 0.015 in each.",
+    on={"roller": Variant("roller", False), "avr": Variant("shieldbot-turret (avr)", True, slow=True)},
 )
-def at_the_true_pose(seed: int, progress: Progress) -> Outcome:
+def at_the_true_pose(has_turret: bool, seed: int, progress: Progress) -> Outcome:
+    """A scan fits the map at the true pose
+
+    In the notes: section 6.3, equation (6.8)
+
+    Figure: Left: a scan in its map, by a laser or in 19 directions by a sonar on a turret. Right: the scan error. By
+    laser at 40 true poses with 1 % noise (dots), and at five with the simulated robot's own (squares); line: the share
+    of noise. By turret of each sweep at the true pose, and 0.1 m and 0.2 rad beside it.
+
+    Expected: Without noise the error is none. With noise of 1 % it is the root mean square of up to 120 numbers of that
+    deviation, known to 0.0006 or a little more; the mean of 40 is known to 0.0001, five of them are allowed. At most
+    0.015 in each.
+
+    Expected on avr: A Ping's echo is good to 0.5 %, the turret's centre to some 10 µs, 0.02 rad, which changes little
+    in what a beam hears; a fifth of the directions, beside edges, does not count: 0.03 is allowed. Beside the pose the
+    error is three times as large in the median.
+    """
+    if has_turret:
+        return _by_turret(seed, progress)
     plan, chance = LineMap.of(ARENA), np.random.default_rng(seed)
     poses = poses_in(plan, chance)
     scans = [scan_at(plan, pose, chance) for pose in poses]
@@ -122,40 +151,8 @@ def at_the_true_pose(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, data, draw)
 
 
-# ---- E52 with a sonar on a turret ------------------------------------------------------------------------------------
-
-TURRET_ARENA, TURRET_POSES = "office", 8
-TURRET_MOST = 0.03
-
-
-def turret_scan(pose: Pose, seed: int) -> Scan:
-    """A sweep of the Shield-Bot's sonar, through the AVR image and the line."""
-    sweeps: list[Scan] = []
-    scan = TurretScan()
-
-    def step(robot: Robot) -> None:
-        robot.stop()
-        if not sweeps and (sweep := scan(robot)) is not None:
-            sweeps.append(sweep)
-
-    run(step, robot="shieldbot-turret", arena=TURRET_ARENA, on="avr", pose=pose, seed=seed, seconds=5.0, record=False)
-    return sweeps[0]
-
-
-@experiment(
-    "E52-avr",
-    title="A sweep of a sonar on a turret fits the map at the true pose",
-    source="section 6.3, equation (6.8)",
-    caption="Left: the sweep at the first pose, 19 directions. Right: the scan error of each sweep at the true pose, "
-    "and 0.1 m and 0.2 rad beside it.",
-    robot="shieldbot-turret (avr)",
-    criterion="A Ping's echo is good to 0.5 %, the turret's centre to some 10 µs, 0.02 rad, which changes little in "
-    "what a beam hears; a fifth of the directions, beside edges, does not count: 0.03 is allowed. Beside the pose "
-    "the error is three times as large in the median.",
-    slow=True,
-)
-def at_the_true_pose_by_turret(seed: int, progress: Progress) -> Outcome:
-    plan, chance = LineMap.of(TURRET_ARENA), np.random.default_rng(seed)
+def _by_turret(seed: int, progress: Progress) -> Outcome:
+    plan, chance = LineMap.of(ARENA), np.random.default_rng(seed)
     poses = poses_in(plan, chance, TURRET_POSES, 0.07)
     seeds = list(zip(poses, trial_seeds(seed, TURRET_POSES), strict=True))
     scans = [turret_scan(pose, one) for pose, one in with_progress(seeds, progress)]
@@ -173,7 +170,7 @@ def at_the_true_pose_by_turret(seed: int, progress: Progress) -> Outcome:
     def draw(figure: Figure) -> None:
         figure.set_figheight(4.0)
         left, right = figure.subplots(1, 2)
-        floor(left, floor_plan(load_arena(TURRET_ARENA), 0.0, 0.0))
+        floor(left, floor_plan(load_arena(ARENA), 0.0, 0.0))
         _draw_scan(left, scans[0], poses[0], "#0072b2")
         _draw_pose(left, poses[0], "#0072b2")
         numbers = range(1, TURRET_POSES + 1)
@@ -215,17 +212,19 @@ def _draw_pose(axes: Axes, pose: Pose, colour: str, length: float = 0.45) -> Non
 NEARLY = 0.01  # m, m, rad: of the lower row of the figure
 
 
-@experiment(
-    "E53",
-    title="A scan fits the map badly where the pose is wrong",
-    source="section 6.3, Figs. 6.16 and 6.17",
-    caption="Left: a scan, drawn at the true pose (blue). Middle: what the map lets expect at the pose of the odometry "
-    "(red). Right: where the rays of both end, as the robot compares them. Above: odometry is 0.1 m, 0.1 m and 0.1 "
-    "rad off; below: a tenth of that.",
-    criterion="40 poses: the median error with odometry 0.1 m, 0.1 m and 0.1 rad off is more than ten times that at "
-    "the true poses. With a tenth of the offset it is less than with all of it.",
-)
+@experiment("E53")
 def near_and_far(seed: int, progress: Progress) -> Outcome:
+    """A scan fits the map badly where the pose is wrong
+
+    In the notes: section 6.3, Figs. 6.16 and 6.17
+
+    Figure: Left: a scan, drawn at the true pose (blue). Middle: what the map lets expect at the pose of the
+    odometry (red). Right: where the rays of both end, as the robot compares them. Above: odometry is 0.1 m, 0.1 m
+    and 0.1 rad off; below: a tenth of that.
+
+    Expected: 40 poses: the median error with odometry 0.1 m, 0.1 m and 0.1 rad off is more than ten times that at
+    the true poses. With a tenth of the offset it is less than with all of it.
+    """
     plan, chance = LineMap.of(ARENA), np.random.default_rng(seed)
     poses = poses_in(plan, chance)
     scans = [scan_at(plan, pose, chance) for pose in poses]
@@ -309,18 +308,20 @@ class Search:
         return bool(turned.any()) and (not there.any() or int(turned.argmax()) < int(there.argmax()))
 
 
-@experiment(
-    "E54",
-    title="A random search finds the pose",
-    source="section 6.3, Fig. 6.18",
-    caption="Left and middle: poses that two searches accept one after another, with their numbers: from where the "
-    "robot believes to be (disc) to what is found (open square); filled square: where it is. Right: error of 40 poses "
-    "before (orange) and after the search.",
-    criterion="From 0.1 m, 0.1 m and 0.1 rad off, with 200 tries in a box of 0.1 m, 0.1 m and 0.1 rad, the median "
-    "error is below 0.02 m and 0.01 rad; the scan error falls below 0.02, twice that of 1 % noise. The box goes with "
-    "what is better, and only there.",
-)
+@experiment("E54")
 def found_by_chance(seed: int, progress: Progress) -> Outcome:
+    """A random search finds the pose
+
+    In the notes: section 6.3, Fig. 6.18
+
+    Figure: Left and middle: poses that two searches accept one after another, with their numbers: from where the
+    robot believes to be (disc) to what is found (open square); filled square: where it is. Right: error of 40 poses
+    before (orange) and after the search.
+
+    Expected: From 0.1 m, 0.1 m and 0.1 rad off, with 200 tries in a box of 0.1 m, 0.1 m and 0.1 rad, the median
+    error is below 0.02 m and 0.01 rad; the scan error falls below 0.02, twice that of 1 % noise. The box goes with
+    what is better, and only there.
+    """
     plan, chance = LineMap.of(ARENA), np.random.default_rng(seed)
     poses = poses_in(plan, chance)
     source = random.Random(seed)

@@ -166,18 +166,20 @@ def _data(found: Response) -> dict[str, Any]:
     return columns | {f"u{index + 1}": found.utilities[::4, index] for index in range(5)}
 
 
-@experiment(
-    "E59",
-    title="Stentor avoids in steps",
-    source="section 7.2, equations (7.11)-(7.15), Fig. 7.4",
-    caption="Left: utilities of Stentor's five behaviors under a lasting disturbance, and which of them is active. "
-    "Right: concentration X of the noxious substance.",
-    criterion="The order of Fig. 7.4, with times found by Euler's method with steps of 1 ms, X first: so is it done "
-    "here. Later starts follow from short returns to feeding and feel the step; the last two "
-    "of the exact solution, which come 0.06 s later, stand beside them with the times that an independent "
-    "integrator gives. The kit's chain, by steps of 1 ms too, is compared with the exact solution.",
-)
+@experiment("E59")
 def sequence(seed: int, progress: Progress) -> Outcome:
+    """Stentor avoids in steps
+
+    In the notes: section 7.2, equations (7.11)-(7.15), Fig. 7.4
+
+    Figure: Left: utilities of Stentor's five behaviors under a lasting disturbance, and which of them is active.
+    Right: concentration X of the noxious substance.
+
+    Expected: The order of Fig. 7.4, with times found by Euler's method with steps of 1 ms, X first: so is it done
+    here. Later starts follow from short returns to feeding and feel the step; the last two of the exact solution,
+    which come 0.06 s later, stand beside them with the times that an independent integrator gives. The kit's chain,
+    by steps of 1 ms too, is compared with the exact solution.
+    """
     found, limit, chain = by_euler(), exact(), by_chain()
     expected = [(1, 0.0), (2, 0.24), (3, 0.61), (4, 1.15), (5, 2.07), (1, 2.82), (5, 2.85), (1, 3.62), (5, 3.64)]
     starts = list(zip_longest(found.starts, expected, fillvalue=(0, np.nan)))
@@ -203,17 +205,19 @@ def _farthest(starts: list[tuple[int, float]], others: list[tuple[int, float]]) 
     return max(abs(one - other) for (_, one), (_, other) in zip(starts, others, strict=False))
 
 
-@experiment(
-    "E60",
-    title="Stentor: a weaker disturbance is answered by the costliest behavior only after hesitation",
-    source="section 7.2, equation (7.14)",
-    caption="Utilities of Stentor's behaviors under a disturbance of less than half the strength, and its X: it "
-    "returns to feeding four times before it detaches.",
-    criterion="With X_1 = 1.0 the order 1-2-3-4-1-4-1-4 was expected, and never B5 within 4 s. The equations "
-    "begin with that order, but go on to B5 at 2.64 s, by Euler's method as well as "
-    "exactly: an independent integrator with located switches gives the order and the time that are expected here.",
-)
+@experiment("E60")
 def dose(seed: int, progress: Progress) -> Outcome:
+    """Stentor: a weaker disturbance is answered by the costliest behavior only after hesitation
+
+    In the notes: section 7.2, equation (7.14)
+
+    Figure: Utilities of Stentor's behaviors under a disturbance of less than half the strength, and its X: it
+    returns to feeding four times before it detaches.
+
+    Expected: With X_1 = 1.0 the order 1-2-3-4-1-4-1-4 was expected, and never B5 within 4 s. The equations begin
+    with that order, but go on to B5 at 2.64 s, by Euler's method as well as exactly: an independent integrator with
+    located switches gives the order and the time that are expected here.
+    """
     found, full = exact(1.0), exact()
     measured = [
         exactly("begins with 1, 2, 3, 4, 1, 4, 1, 4 (1: yes)", found.order.startswith("12341414"), 1),
@@ -225,17 +229,19 @@ def dose(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, _data(found), lambda figure: _draw(figure, found))
 
 
-@experiment(
-    "dose-response",
-    title="Stentor's costliest behavior against the strength of the disturbance",
-    source="section 7.2",
-    caption="Costliest behavior reached within 4 s, and time until feeding stops and until B5 begins, against the "
-    "strength X_1 of the disturbance. Dotted: below it Stentor goes on feeding for these 4 s.",
-    criterion="While it feeds, (7.12) and (7.14) are linear in X_1: the strength at which feeding stops within 4 s "
-    "has a closed form, and a stronger one stops it sooner. Beyond that nothing forces B5 to come sooner, as a "
-    "stronger disturbance also stops feeding and with it X sooner: nine of ten are asked for.",
-)
+@experiment("dose-response")
 def dose_response(seed: int, progress: Progress) -> Outcome:
+    """Stentor's costliest behavior against the strength of the disturbance
+
+    In the notes: section 7.2
+
+    Figure: Costliest behavior reached within 4 s, and time until feeding stops and until B5 begins, against the
+    strength X_1 of the disturbance. Dotted: below it Stentor goes on feeding for these 4 s.
+
+    Expected: While it feeds, (7.12) and (7.14) are linear in X_1: the strength at which feeding stops within 4 s
+    has a closed form, and a stronger one stops it sooner. Beyond that nothing forces B5 to come sooner, as a
+    stronger disturbance also stops feeding and with it X sooner: nine of ten are asked for.
+    """
     doses = np.linspace(0.2, 4.0, 39)
     highest, stopping, detaching = np.zeros(len(doses), dtype=int), np.full(len(doses), np.nan), np.zeros(len(doses))
     for index, strength in enumerate(doses.tolist()):

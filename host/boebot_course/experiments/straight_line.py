@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from boebot.behaviors import StraightRun
 from boebot.brain import Brain
 from boebot.cognition import Odometry
-from boebot_course.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
 from boebot_course.trials import Trial, trial_seeds, try_once
 
 if TYPE_CHECKING:
@@ -137,30 +137,10 @@ def judge_notes(trial: Straight) -> list[Measured]:
     ]
 
 
-@experiment(
-    "E22",
-    title="A metre straight ahead by odometry",
-    source="section 5.4, code listings 5.3 and 5.4, equation (5.1)",
-    caption="Distance and motor signals of the notes' robot on its way to a destination 1 m ahead.",
-    robot="arsim",
-    criterion="By (5.1) and b = 0.02: the stop command at 0.98 m, in its step, at 3.2 s ± 0.2 s; at rest by 0.985 m.",
-)
-def notes_run(seed: int, progress: Progress) -> Outcome:
-    trial = drive(runner(period=0.01), "arsim", 6.0, seed)
-    return Outcome(judge_notes(trial), columns(trial), lambda figure: draw_runs(figure, [trial]))
-
-
 # Time by (5.1) down to s_min: ln(sinh 0.9 k / sinh 0.06 k) / (0.9 · 0.178 m · k), k = 200 / 78.5; the rest of the
 # derivation is the criterion.
 LEAST, HOLD = 0.06, 0.5
 RUN_S = 14.0
-_BY_SERVO = (
-    "Servos, centred, run at v(s) = 0.178 m/s tanh(2.55 s) and stand still within 0.045: s_min = 0.06 as in E23; they "
-    "differ by 2.9 % (1 σ): heading hold k = 0.5. Time: 8.5 s by (5.1) down to s_min, 1.7 s at v(0.06), 0.1 s lag; 3 σ "
-    "of the mean of two servos are 0.65 s, a curved way 0.5 s. Believed d: 0.98 m and at most an edge (3.3 mm). "
-    "True d at rest: ± an edge (3.3 mm) and up to three misses or flickers of 2 edges of one wheel (9.8 mm; more in "
-    "one run of 2000), and 2 mm of coming to rest. Mean of all 0.98 m ± 0.03 m, as is asked of 10 repeats"
-)
 
 
 def judge_shieldbot(runs: Sequence[Straight]) -> list[Measured]:
@@ -179,7 +159,35 @@ def judge_shieldbot(runs: Sequence[Straight]) -> list[Measured]:
     ]
 
 
-def _shieldbot(on: str, count: int, seed: int, progress: Progress) -> Outcome:
+@experiment(
+    "E22",
+    on={
+        "arsim": Variant("arsim", None, 1),
+        "shieldbot": Variant("shieldbot (native)", "native", 10),
+        "avr": Variant("shieldbot (avr)", "avr", 3),
+    },
+)
+def metre(on: str | None, count: int, seed: int, progress: Progress) -> Outcome:
+    """A metre straight ahead by odometry
+
+    In the notes: section 5.4, code listings 5.3 and 5.4, equation (5.1)
+
+    Figure: Distance and motor signals on the way to a destination 1 m ahead; of shieldbots, each with its own servos.
+
+    Expected: By (5.1) and b = 0.02: the stop command at 0.98 m, in its step, at 3.2 s ± 0.2 s; at rest by 0.985 m.
+
+    Expected on shieldbot: Servos, centred, run at v(s) = 0.178 m/s tanh(2.55 s) and stand still within 0.045:
+    s_min = 0.06 as in E23; they differ by 2.9 % (1 σ): heading hold k = 0.5. Time: 8.5 s by (5.1) down to s_min,
+    1.7 s at v(0.06), 0.1 s lag; 3 σ of the mean of two servos are 0.65 s, a curved way 0.5 s. Believed d: 0.98 m and
+    at most an edge (3.3 mm). True d at rest: ± an edge (3.3 mm) and up to three misses or flickers of 2 edges of one
+    wheel (9.8 mm; more in one run of 2000), and 2 mm of coming to rest. Mean of all 0.98 m ± 0.03 m, as is asked of
+    10 repeats.
+
+    Expected on avr: As on shieldbot; 3 runs.
+    """
+    if on is None:
+        trial = drive(runner(period=0.01), "arsim", 6.0, seed)
+        return Outcome(judge_notes(trial), columns(trial), lambda figure: draw_runs(figure, [trial]))
     seeds = trial_seeds(seed, count)
     runs = [
         drive(runner(period=0.05, least=LEAST, hold=HOLD), "shieldbot", RUN_S, trial_seed, on)
@@ -193,29 +201,3 @@ def _shieldbot(on: str, count: int, seed: int, progress: Progress) -> Outcome:
         "rest_y_m": [float(one.path[-1, 1]) for one in runs],
     }
     return Outcome(judge_shieldbot(runs), data, lambda figure: draw_runs(figure, runs))
-
-
-@experiment(
-    "E22-shieldbot",
-    title="A metre straight ahead by odometry: ten shieldbots",
-    source="section 5.4, code listings 5.3 and 5.4, equation (5.1)",
-    caption="Distance and motor signals of ten shieldbots, each with its own servos, on their way to a destination "
-    "1 m ahead.",
-    robot="shieldbot (native)",
-    criterion=f"{_BY_SERVO}.",
-)
-def shieldbot_run(seed: int, progress: Progress) -> Outcome:
-    return _shieldbot("native", 10, seed, progress)
-
-
-@experiment(
-    "E22-avr",
-    title="A metre straight ahead by odometry: the AVR image",
-    source="section 5.4, code listings 5.3 and 5.4, equation (5.1)",
-    caption="Distance and motor signals of three shieldbots with the image of their ATmega328P, each with servos of "
-    "its own, on their way to a destination 1 m ahead.",
-    robot="shieldbot (avr)",
-    criterion=f"{_BY_SERVO}; here 3.",
-)
-def avr_run(seed: int, progress: Progress) -> Outcome:
-    return _shieldbot("avr", 3, seed, progress)

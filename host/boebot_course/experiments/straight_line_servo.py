@@ -17,7 +17,7 @@ from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.robot import Observation, Robot
-from boebot_course.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Progress, Variant, exactly, experiment, with_progress
 from boebot_course.experiments.straight_line import Straight, drive, runner
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import varied
@@ -140,23 +140,6 @@ def _draw(figure: Figure, rows: dict[str, Columns], dead_band: float) -> None:
     lower.legend(fontsize="small", loc="upper right")
 
 
-@experiment(
-    "E23",
-    title="A metre straight ahead on servos with a dead band",
-    source="section 5.4, equation (5.1)",
-    caption="The straight run on the servo model (dead band 0.05, lag 50 ms, encoder edges of 13.08 mm): the last "
-    "fifth of the way with and without a least motor signal of 0.06.",
-    robot="shieldbot (16 edges, as a model of its servos)",
-    criterion="It stops at 0.98 m to an edge later; else it stalls about 1 - 0.05 / 0.9 = 0.944 m, to an edge later.",
-)
-def servo_model(seed: int, progress: Progress) -> Outcome:
-    with_least = on_servo_model(LEAST)
-    progress(0.5)
-    without = on_servo_model(0.0)
-    columns = [(run.times, run.distances, run.signals) for run in (with_least, without)]
-    return _outcome(judge_model(with_least, without), DEAD_BAND, *columns)
-
-
 # ---- through the circle ----------------------------------------------------------------------------------------------
 
 
@@ -176,18 +159,33 @@ def judge_shieldbot(with_least: Straight, without: Straight) -> list[Measured]:
 
 
 @experiment(
-    "E23-shieldbot",
-    title="A metre straight ahead on a shieldbot with coarse encoders",
-    source="section 5.4, equation (5.1)",
-    caption="The straight run of a shieldbot with encoders of 16 edges (13.0 mm): the last fifth of the way with and "
-    "without a least motor signal of 0.06.",
-    robot="shieldbot (native)",
-    criterion="Nominal servos, whose dead band is 9 us = 0.045; no edge missed or counted twice; an edge is q = 208 mm "
-    "/ 16 = 13.0 mm. With s_min it stops with a believed d from 0.980 m to 0.980 m + q; the truth is up to q less or "
-    "more, as the first edge comes anywhere, and 2 mm of coming to rest (75 ms at 0.027 m/s). Without, it stalls once "
-    "0.9 (1 - d) < 0.045: believed d from 0.950 m to 0.950 m + q, the truth again up to q less or more, and 2 mm.",
+    "E23",
+    on={
+        "model": Variant("shieldbot (16 edges, as a model of its servos)", False),
+        "shieldbot": Variant("shieldbot (native)", True),
+    },
 )
-def servo_shieldbot(seed: int, progress: Progress) -> Outcome:
+def dead_band(on_board: bool, seed: int, progress: Progress) -> Outcome:
+    """A metre straight ahead on servos with a dead band
+
+    In the notes: section 5.4, equation (5.1)
+
+    Figure: The straight run on servos with a dead band and encoder edges of 13 mm, by a model (dead band 0.05, lag
+    50 ms) or on the board: the last fifth of the way with and without a least motor signal of 0.06.
+
+    Expected: It stops at 0.98 m to an edge later; else it stalls about 1 - 0.05 / 0.9 = 0.944 m, to an edge later.
+
+    Expected on shieldbot: Nominal servos, whose dead band is 9 us = 0.045; no edge missed or counted twice; an edge is
+    q = 208 mm / 16 = 13.0 mm. With s_min it stops with a believed d from 0.980 m to 0.980 m + q; the truth is up to q
+    less or more, as the first edge comes anywhere, and 2 mm of coming to rest (75 ms at 0.027 m/s). Without, it stalls
+    once 0.9 (1 - d) < 0.045: believed d from 0.950 m to 0.950 m + q, the truth again up to q less or more, and 2 mm.
+    """
+    if not on_board:
+        with_least = on_servo_model(LEAST)
+        progress(0.5)
+        without = on_servo_model(0.0)
+        columns = [(run.times, run.distances, run.signals) for run in (with_least, without)]
+        return _outcome(judge_model(with_least, without), DEAD_BAND, *columns)
     robot = coarse(load_robot("shieldbot").body.wheel_radius_m)
     runs = [
         drive(runner(period=0.05, least=least), robot, 20.0, trial_seed, "native", "encoder_errors")

@@ -19,7 +19,7 @@ from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
 from boebot.description.robots import RobotDescription
 from boebot.devices.light import Phototransistor
-from boebot_course.experiment import Measured, Outcome, Progress, about, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import SMALL_RADIUS, arena_file, at_angle, small_arsim, varied
@@ -144,7 +144,29 @@ def _draw(figure: Figure, done: Sequence[Trial], times: Sequence[float], straigh
     right.legend(fontsize="small")
 
 
-def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
+@experiment(
+    "E27",
+    on={
+        "arsim": Variant("arsim in the size of a Boe-Bot", ARSIM, slow=True),
+        "shieldbot": Variant("shieldbot (native)", SHIELDBOT, slow=True),
+    },
+)
+def taxis(setting: Setting, seed: int, progress: Progress) -> Outcome:
+    """Taxis: to the lamp from everywhere
+
+    In the notes: section 4.4.2
+
+    Figure: Phototaxis from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, and times.
+
+    Expected: At least 58 of 60 arrive; the median in 1.2 times the straight time, 1.85 m / 0.15 m/s = 12.3 s.
+
+    Expected on shieldbot: Ambient light: up to 2000 / s of both sensors together it is dark (ambient 1333 / s ± 7 σ of
+    10 % unlike sensors). Sensors unlike by 10 % (1 σ) each make a lamp ahead seem 0.07 / tan 0.5 = 0.13 rad beside,
+    servos unlike by 2.9 % another 0.1 rad: a way at such a bearing is a spiral into the lamp, 1 / cos 0.16 = 1.3 %
+    longer, and at 3 σ 13 %. Turning towards the lamp takes it up to 1 s in the dark (1.9 rad/s) and an arc of 0.15 m
+    of radius, 0.2 m at a right angle, of 1.85 m of way: 1.2 times the straight time is kept by the median, and 24 s,
+    twice the straight time, by all but the rarest.
+    """
     done = trials(setting, seed, progress)
     times, straight = [time_to_lamp(trial) for trial in done], straight_time(setting)
     poses = [trial.start for trial in done]
@@ -156,35 +178,3 @@ def _outcome(setting: Setting, seed: int, progress: Progress) -> Outcome:
         "time_s": times,
     }
     return Outcome(judge(setting, times, straight), data, lambda figure: _draw(figure, done, times, straight))
-
-
-@experiment(
-    "E27",
-    title="Taxis: to the lamp from everywhere",
-    source="section 4.4.2",
-    caption="Phototaxis from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, and times.",
-    robot="arsim in the size of a Boe-Bot",
-    criterion="At least 58 of 60 arrive; the median in 1.2 times the straight time, 1.85 m / 0.15 m/s = 12.3 s.",
-    slow=True,
-)
-def taxis(seed: int, progress: Progress) -> Outcome:
-    return _outcome(ARSIM, seed, progress)
-
-
-@experiment(
-    "E27-shieldbot",
-    title="Taxis: the same brain on a board",
-    source="section 4.4.2",
-    caption="Phototaxis of a shieldbot from 60 places 2 m from a lamp, headings by chance: paths until 0.15 m from it, "
-    "and times.",
-    robot="shieldbot (native)",
-    criterion="Ambient light: up to 2000 / s of both sensors together it is dark (ambient 1333 / s ± 7 σ of 10 % "
-    "unlike sensors). Sensors unlike by 10 % (1 σ) each make a lamp ahead seem 0.07 / tan 0.5 = 0.13 rad beside, "
-    "servos unlike by 2.9 % another 0.1 rad: a way at such a bearing is a spiral into the lamp, 1 / cos 0.16 = 1.3 % "
-    "longer, and at 3 σ 13 %. Turning towards the lamp takes it up to 1 s in the dark (1.9 rad/s) and an arc of 0.15 m "
-    "of radius, 0.2 m at a right angle, of 1.85 m of way: 1.2 times the straight time is kept by the median, and 24 s, "
-    "twice the straight time, by all but the rarest: the criterion of E27.",
-    slow=True,
-)
-def taxis_shieldbot(seed: int, progress: Progress) -> Outcome:
-    return _outcome(SHIELDBOT, seed, progress)

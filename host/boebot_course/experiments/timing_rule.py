@@ -39,15 +39,16 @@ def is_run(count: int) -> bool:
         return False
 
 
-@experiment(
-    "E17",
-    title="Timing: two IR sensors fit into the time step, four do not",
-    source="section 3.2, Fig. 3.2",
-    caption="All that one time step asks of the hardware, to scale, for two IR sensors and for four; the line is Δt.",
-    robot="arsim",
-    criterion="The rule of section 3.2: the sum of all events that follow one another is less than Δt.",
-)
+@experiment("E17", robot="arsim")
 def timing_rule(seed: int, progress: Progress) -> Outcome:
+    """Timing: two IR sensors fit into the time step, four do not
+
+    In the notes: section 3.2, Fig. 3.2
+
+    Figure: All that one time step asks of the hardware, to scale, for two IR sensors and for four; the line is Δt.
+
+    Expected: The rule of section 3.2: the sum of all events that follow one another is less than Δt.
+    """
     verdicts = {count: judge(robot_with(count), STEP_S, brain_s=BRAIN_S) for count in (2, 3, 4)}
     measured = [
         about(f"sum with {count} sensors", verdict.seconds * 1000, count * 3.0 + 1.0, 1e-9, "ms")

@@ -45,15 +45,17 @@ WEIGHT = 2.0  # of z_2 in u_3, Fig. 8.3
 KICK = 3.0  # of E63
 
 
-@experiment(
-    "E61",
-    title="A short loss of readings hardly moves a utility",
-    source="section 8.2.2, Fig. 8.2",
-    caption="Left: a state variable z that is lost for 0.15 s. Right: a utility function of it, with time constant "
-    "0.3 s; dotted: without.",
-    criterion="(8.4) solved: tanh 1.5 = 0.9051 falls by 0.0566, 1 - exp(-0.5) = 0.393 of all; back in 0.73 s.",
-)
+@experiment("E61")
 def loss(seed: int, progress: Progress) -> Outcome:
+    """A short loss of readings hardly moves a utility
+
+    In the notes: section 8.2.2, Fig. 8.2
+
+    Figure: Left: a state variable z that is lost for 0.15 s. Right: a utility function of it, with time constant
+    0.3 s; dotted: without.
+
+    Expected: (8.4) solved: tanh 1.5 = 0.9051 falls by 0.0566, 1 - exp(-0.5) = 0.393 of all; back in 0.73 s.
+    """
     step = 0.005
     times = np.arange(0, 10, step)
     z = np.where((times >= LOST_AT - 1e-9) & (times < LOST_AT + LOSS - 1e-9), 0.0, 1.0)
@@ -113,19 +115,21 @@ def by_convolution(settled: Floats, step: float, tau: float) -> Floats:
     return np.asarray(settled[0] + whole)
 
 
-@experiment(
-    "E62",
-    title="Of three behaviors the one of the highest utility is active",
-    source="section 8.2.3, Fig. 8.3",
-    caption="Utilities of three behaviors: u1 (red) is constant, u2 (green) and u3 (blue) follow state variables. "
-    "Below: the active one.",
-    criterion="The notes say: B1 most of the time, B3 around 21 s for around 2.5 s and around 27 s for less than 1 s, "
-    "B2 never. Parameters are not given; here w and b are chosen, and when z_2 is 1 follows from those times by the "
-    "closed solution of (8.4), with the mean of z_2's ripple and u_3 at rest before and after. Ripple, 0 to 0.1, "
-    "makes the rise up to 0.03 s and the fall up to 0.01 s sooner or later, a pulse that is over after 2.7 τ the fall "
-    "0.02 s sooner, and steps are 0.01 s: 0.1 s is allowed. All utilities are compared with (8.4) as an integral.",
-)
+@experiment("E62")
 def three_behaviors(seed: int, progress: Progress) -> Outcome:
+    """Of three behaviors the one of the highest utility is active
+
+    In the notes: section 8.2.3, Fig. 8.3
+
+    Figure: Utilities of three behaviors: u1 (red) is constant, u2 (green) and u3 (blue) follow state variables.
+    Below: the active one.
+
+    Expected: The notes say: B1 most of the time, B3 around 21 s for around 2.5 s and around 27 s for less than 1 s,
+    B2 never. Parameters are not given; here w and b are chosen, and when z_2 is 1 follows from those times by the
+    closed solution of (8.4), with the mean of z_2's ripple and u_3 at rest before and after. Ripple, 0 to 0.1,
+    makes the rise up to 0.03 s and the fall up to 0.01 s sooner or later, a pulse that is over after 2.7 τ the fall
+    0.02 s sooner, and steps are 0.01 s: 0.1 s is allowed. All utilities are compared with (8.4) as an integral.
+    """
     step = 0.01
     times = np.arange(0, 50, step)
     z_1 = 0.5 + 0.4 * np.sin(0.35 * times) + 0.03 * np.sin(9 * times)
@@ -171,14 +175,16 @@ def three_behaviors(seed: int, progress: Progress) -> Outcome:
     return Outcome(measured, data | {f"u{i + 1}": utilities[:, i] for i in range(3)}, draw)
 
 
-@experiment(
-    "E63",
-    title="A gamma parameter calls a process for a while",
-    source="section 8.2.2, equation (8.6)",
-    caption="A process at rest at tanh(-0.5) whose gamma parameter is set to 3: gamma and utility; grey: active.",
-    criterion="Γ = 3 exp(-t / 0.5 s) by (8.6); with it (8.4) gives u > 0 from 0.117 s to 1.215 s, ± 0.01 s.",
-)
+@experiment("E63")
 def gamma(seed: int, progress: Progress) -> Outcome:
+    """A gamma parameter calls a process for a while
+
+    In the notes: section 8.2.2, equation (8.6)
+
+    Figure: A process at rest at tanh(-0.5) whose gamma parameter is set to 3: gamma and utility; grey: active.
+
+    Expected: Γ = 3 exp(-t / 0.5 s) by (8.6); with it (8.4) gives u > 0 from 0.117 s to 1.215 s, ± 0.01 s.
+    """
     step, decay = 0.001, 0.5
     utilities = Utilities([Utility(b=-0.5, tau=TAU, tau_gamma=decay)], [])
     utilities.start([])
@@ -238,16 +244,17 @@ class Note(CognitiveProcess):
 RISE, FALL = 1.0, 4.0  # s
 
 
-@experiment(
-    "E64",
-    title="One motor behavior, and every cognitive process above zero",
-    source="section 8.2.3",
-    caption="Utilities of three motor behaviors and three cognitive processes while a state variable is 1 from 1 s "
-    "to 4 s; thick: active.",
-    robot="arsim",
-    criterion="The best motor behavior drives, cognitive ones run while u > 0: by (8.4) 0.142 s and 0.292 s late.",
-)
+@experiment("E64", robot="arsim")
 def activation(seed: int, progress: Progress) -> Outcome:
+    """One motor behavior, and every cognitive process above zero
+
+    In the notes: section 8.2.3
+
+    Figure: Utilities of three motor behaviors and three cognitive processes while a state variable is 1 from 1 s to
+    4 s; thick: active.
+
+    Expected: The best motor behavior drives, cognitive ones run while u > 0: by (8.4) 0.142 s and 0.292 s late.
+    """
     motor = [Hold(name=f"m{i}", signal=i / 10, utility=Utility(b=i / 10, w={"z": 0.3 - i / 5})) for i in range(3)]
     delayed = Note(name="delayed", utility=Utility(b=-0.5, w={"z": 1.5}, tau=TAU))
     notes = [delayed, Note(name="always"), Note(name="never", utility=Utility(b=-0.2))]

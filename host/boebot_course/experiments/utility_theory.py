@@ -59,15 +59,17 @@ def played(tosses: int, source: np.random.Generator) -> Measured:
     return about(f"mean payoff of games of {tosses} tosses at most", float(payoff.mean()), tosses, 4 * error)
 
 
-@experiment(
-    "E56",
-    title="St. Petersburg: a game of infinite payoff has a fair price",
-    source="section 7.1, equations (7.2), (7.3)",
-    caption="Fair price of the St. Petersburg game against the player's wealth; the payoff itself is infinite.",
-    criterion="Prices solved from (7.3) by another program. Each toss that a game may last longer adds 1 to its mean "
-    "payoff: of 100,000 games by chance, give or take four standard errors.",
-)
+@experiment("E56")
 def saint_petersburg(seed: int, progress: Progress) -> Outcome:
+    """St. Petersburg: a game of infinite payoff has a fair price
+
+    In the notes: section 7.1, equations (7.2), (7.3)
+
+    Figure: Fair price of the St. Petersburg game against the player's wealth; the payoff itself is infinite.
+
+    Expected: Prices solved from (7.3) by another program. Each toss that a game may last longer adds 1 to its mean
+    payoff: of 100,000 games by chance, give or take four standard errors.
+    """
     expected = {100.0: 7.792, 1000.0: 10.954, 1e6: 20.875}
     measured = [
         about(f"fair price at wealth {wealth:g}", fair_price(wealth), r, 1e-3) for wealth, r in expected.items()
@@ -131,21 +133,21 @@ def crosses_from(staying: float, seed: int) -> float:
     return float(record.values[crosses[0], 0]) if len(crosses) else math.nan
 
 
-@experiment(
-    "E57",
-    title="The street: expected utilities of two choices",
-    source="section 7.1, equations (7.6) to (7.9)",
-    caption="Expected utility of crossing the street against the chance p to get across. Dots: mean of 20,000 "
-    "crossings by chance. Dashed: what not crossing is worth to somebody who dares and to a cautious one; dotted: "
-    "where a robot with these utilities began to cross.",
-    robot="arsim",
-    criterion="(7.6) and (7.9) by hand. The mean of n crossings at p = 0.2 is off by 15 √(0.2 · 0.8 / n) = 0.042 (1 "
-    "σ): four of them are allowed. A robot for which not crossing is worth -8.5 crosses where 15 p - 10 > "
-    "-8.5, from p = 0.1 on, and one for which it is worth -2.5 from p = 0.5 on: p grows by 0.05 in a "
-    "second, and the brain's step of 0.01 s and the utilities' lag of 0.02 s make it later by at most two "
-    "steps and a lag.",
-)
+@experiment("E57", robot="arsim")
 def street(seed: int, progress: Progress) -> Outcome:
+    """The street: expected utilities of two choices
+
+    In the notes: section 7.1, equations (7.6) to (7.9)
+
+    Figure: Expected utility of crossing the street against the chance p to get across. Dots: mean of 20,000
+    crossings by chance. Dashed: what not crossing is worth to somebody who dares and to a cautious one; dotted:
+    where a robot with these utilities began to cross.
+
+    Expected: (7.6) and (7.9) by hand. The mean of n crossings at p = 0.2 is off by 15 √(0.2 · 0.8 / n) = 0.042 (1
+    σ): four of them are allowed. A robot for which not crossing is worth -8.5 crosses where 15 p - 10 > -8.5, from
+    p = 0.1 on, and one for which it is worth -2.5 from p = 0.5 on: p grows by 0.05 in a second, and the brain's
+    step of 0.01 s and the utilities' lag of 0.02 s make it later by at most two steps and a lag.
+    """
     source = np.random.default_rng([seed, 57])
     chances = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95])
     means = [float(np.where(source.random(CROSSINGS) < p, MEET, HIT).mean()) for p in chances]
@@ -202,17 +204,19 @@ def certainty_equivalent(
     return bisected(lambda amount: utility(amount) < aim, min(amounts), max(amounts))
 
 
-@experiment(
-    "E58",
-    title="Utility of money to somebody who avoids risks",
-    source="section 7.1, equation (7.10), Fig. 7.1",
-    caption="Utility of money: 30 for sure is worth an even chance of 100 or nothing. Dashed: to somebody who does not "
-    "mind risks; dotted: to somebody who likes them as much.",
-    criterion="By hand: u(30) = 1/2 asks for (1 + 30 κ)² = 1 + 100 κ, κ = 40/900; a chance of 1/4 of 100 is then worth "
-    "((1 + 100 κ)^(1/4) - 1) / κ = 11.87. u'' = -κ² / ((1 + κ x)² ln(1 + 100 κ)) is nearest to 0 at x = 100. Somebody "
-    "who likes risks has u mirrored in both axes: 100 - 30.",
-)
+@experiment("E58")
 def money(seed: int, progress: Progress) -> Outcome:
+    """Utility of money to somebody who avoids risks
+
+    In the notes: section 7.1, equation (7.10), Fig. 7.1
+
+    Figure: Utility of money: 30 for sure is worth an even chance of 100 or nothing. Dashed: to somebody who does
+    not mind risks; dotted: to somebody who likes them as much.
+
+    Expected: By hand: u(30) = 1/2 asks for (1 + 30 κ)² = 1 + 100 κ, κ = 40/900; a chance of 1/4 of 100 is then
+    worth ((1 + 100 κ)^(1/4) - 1) / κ = 11.87. u'' = -κ² / ((1 + κ x)² ln(1 + 100 κ)) is nearest to 0 at x = 100.
+    Somebody who likes risks has u mirrored in both axes: 100 - 30.
+    """
     kappa = bend(30.0)
     amounts = np.linspace(0, MOST, 201)
     utilities = np.array([money_utility(amount, kappa) for amount in amounts])
@@ -293,18 +297,21 @@ def choices(amounts: Floats, utilities: Floats, seed: int) -> tuple[Floats, Floa
     )
 
 
-@experiment(
-    "elicitation",
-    title="A utility function from certainty equivalents",
-    source="section 7.1, equation (7.10)",
-    caption="Utility of money as asked for by halving (dots, joined), and that of the one who gave the answers (line).",
-    criterion="Who is asked answers by u = ln(1 + κ x) / ln(1 + 100 κ) in closed form. Straight pieces of height h = "
-    "1/16 lie below u by h²/8 · |u''| / u'² at most, which is h²/8 · ln(1 + 100 κ) = 0.00083 everywhere. The elicited "
-    "function may therefore choose otherwise than the one who was asked only where two things are worth the same "
-    "within twice that; utility differences spread over 1, so that this is rarer than one in a hundred. "
-    "Who goes by expected payoff errs more often.",
-)
+@experiment("elicitation")
 def elicitation(seed: int, progress: Progress) -> Outcome:
+    """A utility function from certainty equivalents
+
+    In the notes: section 7.1, equation (7.10)
+
+    Figure: Utility of money as asked for by halving (dots, joined), and that of the one who gave the answers
+    (line).
+
+    Expected: Who is asked answers by u = ln(1 + κ x) / ln(1 + 100 κ) in closed form. Straight pieces of height h =
+    1/16 lie below u by h²/8 · |u''| / u'² at most, which is h²/8 · ln(1 + 100 κ) = 0.00083 everywhere. The elicited
+    function may therefore choose otherwise than the one who was asked only where two things are worth the same
+    within twice that; utility differences spread over 1, so that this is rarer than one in a hundred. Who goes by
+    expected payoff errs more often.
+    """
     found = elicited(answer, DEPTH)
     amounts, utilities = np.array(found[0]), np.array(found[1])
     grid = np.linspace(0, MOST, 401)

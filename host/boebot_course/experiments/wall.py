@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
-from boebot_course.experiment import Measured, Outcome, Progress, experiment
+from boebot_course.experiment import Measured, Outcome, Progress, Variant, experiment
 from boebot_course.paths import floor
 from boebot_course.variants import SMALL_SPEED, arena_file, small_arsim, varied
 
@@ -33,6 +34,14 @@ def follower() -> Brain:
     return Brain([FollowWall(signal=SPEED / SMALL_SPEED, gain=0.5 / SMALL_SPEED, reference=0.25)])
 
 
+START = 0.30  # m, of the shieldbot from the wall: about the distance that it will keep
+
+
+def pinger() -> RobotDescription:
+    """shieldbot with its Ping on the turret."""
+    return varied("shieldbot", "shieldbot-turret", turret={"on": True})
+
+
 def lap(robot: RobotDescription, on: str | None, seed: int, start: float, progress: Progress) -> RunResult:
     """A run along the walls, which begins `start` metres from one."""
     with arena_file("room", ROOM) as arena:
@@ -48,8 +57,44 @@ def lap(robot: RobotDescription, on: str | None, seed: int, start: float, progre
         )
 
 
-def outcome(result: RunResult, least: float, most: float) -> Outcome:
-    """What is asked of every robot; distances from its middle to the nearest wall (m)."""
+@experiment(
+    "E35",
+    on={
+        "arsim": Variant(
+            "arsim in the size of a Boe-Bot, IR ahead and at -60 degrees", small_arsim, None, 0.25, 0.20, 0.30
+        ),
+        "shieldbot": Variant("shieldbot with its turret (native)", pinger, "native", START, 0.19, 0.345),
+        "avr": Variant("shieldbot with its turret (avr)", pinger, "avr", START, 0.19, 0.345, slow=True),
+    },
+)
+def wall(
+    robot: Callable[[], RobotDescription],
+    on: str | None,
+    start: float,
+    least: float,
+    most: float,
+    seed: int,
+    progress: Progress,
+) -> Outcome:
+    """A lap along the walls
+
+    In the notes: chapter 5, Fig. 5.1
+
+    Figure: Path of a robot that follows the walls of a room of 3 m by 2 m, and its distance from them. The shieldbot's
+    Ping on its turret looks to the wall, IR pairs look ahead.
+
+    Expected: Once about the room at least in 80 s, at 0.25 m ± 0.05 m from the nearest wall, without a contact.
+
+    Expected on shieldbot: S_ref = 0.25 is 0.30 m by Ping, whose beam of ±20 degrees about -60 degrees meets the wall at
+    80 degrees: 0.295 m from the middle, and as the notes' row has it 0.05 m more at most. In a corner it comes as near
+    as its IR pairs let it: they reach 0.20 m less 3 × 3 % of it, at 0.25 rad to the heading and 0.05 m ahead of the
+    middle, 0.226 m; until the wheels answer (0.05 s for a reading, 0.05 s for a step, 0.055 s of lag) its 0.168 m/s
+    take it 0.027 m farther: 0.199 m, less 0.01 m for skew. The parameters are those of the notes' row; by the servos'
+    curve its motor signal stands for 0.168 m/s instead of 0.12 m/s.
+
+    Expected on avr: As on shieldbot.
+    """
+    result = lap(robot(), on, seed, start, progress)
     truth = result.truth
     assert truth is not None
     time, x, y = truth.time - result.clock_offset, truth.x, truth.y
@@ -83,59 +128,3 @@ def outcome(result: RunResult, least: float, most: float) -> Outcome:
         beside.legend(loc="lower right", fontsize=9, frameon=False)
 
     return Outcome(measured, data, draw)
-
-
-@experiment(
-    "E35",
-    title="A lap along the walls",
-    source="chapter 5, Fig. 5.1",
-    caption="Path of a robot that follows the walls of a room of 3 m by 2 m, and its distance from them.",
-    robot="arsim in the size of a Boe-Bot, IR ahead and at -60 degrees",
-    criterion="Once about the room at least in 80 s, at 0.25 m ± 0.05 m from the nearest wall, without a contact.",
-)
-def wall(seed: int, progress: Progress) -> Outcome:
-    return outcome(lap(small_arsim(), None, seed, 0.25, progress), 0.20, 0.30)
-
-
-# ---- on shieldbot: what is expected of it, from its description -----------------------------------------------------
-
-START = 0.30  # m, about the distance that it will keep
-LEAST, MOST = 0.19, 0.345  # m
-DERIVED = (
-    "S_ref = 0.25 is 0.30 m by Ping, whose beam of ±20 degrees about -60 degrees meets the wall at 80 degrees: 0.295 m "
-    "from the middle, and as the notes' row has it 0.05 m more at most. In a corner it comes as near as its IR pairs "
-    "let it: they reach 0.20 m less 3 × 3 % of it, at 0.25 rad to the heading and 0.05 m ahead of the middle, 0.226 m; "
-    "until the wheels answer (0.05 s for a reading, 0.05 s for a step, 0.055 s of lag) its 0.168 m/s take it 0.027 m "
-    "farther: 0.199 m, less 0.01 m for skew. The parameters are those of the notes' row; by the servos' curve its "
-    "motor signal stands for 0.168 m/s instead of 0.12 m/s."
-)
-
-
-def pinger() -> RobotDescription:
-    """shieldbot with its Ping on the turret."""
-    return varied("shieldbot", "shieldbot-turret", turret={"on": True})
-
-
-@experiment(
-    "E35-shieldbot",
-    title="A lap along the walls by Ping and IR pairs",
-    source="chapter 5, Fig. 5.1",
-    caption="Path of shieldbot with the same brain: Ping on its turret looks to the wall, IR pairs look ahead.",
-    robot="shieldbot with its turret (native)",
-    criterion=DERIVED,
-)
-def wall_native(seed: int, progress: Progress) -> Outcome:
-    return outcome(lap(pinger(), "native", seed, START, progress), LEAST, MOST)
-
-
-@experiment(
-    "E35-avr",
-    title="A lap along the walls, with the firmware's AVR image",
-    source="chapter 5, Fig. 5.1",
-    caption="The same on the emulated ATmega328P.",
-    robot="shieldbot with its turret (avr)",
-    criterion=DERIVED,
-    slow=True,
-)
-def wall_avr(seed: int, progress: Progress) -> Outcome:
-    return outcome(lap(pinger(), "avr", seed, START, progress), LEAST, MOST)

@@ -18,7 +18,7 @@ from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.robot import Observation, Robot
-from boebot_course.experiment import Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
 from boebot_course.paths import draw_paths, floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, narrow_arsim, scaled_arsim_arena
@@ -70,15 +70,17 @@ def judge_stays(forward: list[int], turning: list[int], lefts: list[bool]) -> li
     ]
 
 
-@experiment(
-    "E19",
-    title="Wandering: stays in its states are geometric",
-    source="section 5.3.2, code listings 5.1 and 5.2",
-    caption="Steps that wandering drives ahead, and turns, before it changes: histograms of 400,000 steps of 0.01 s, "
-    "and the geometric law of the listing's probabilities.",
-    criterion="Means of 1 / 0.01 = 100 and 1 / 0.03 = 33.3 steps, known to 1.8 and 0.6: ± 5 and ± 2. Half turn left.",
-)
+@experiment("E19")
 def stay_lengths(seed: int, progress: Progress) -> Outcome:
+    """Wandering: stays in its states are geometric
+
+    In the notes: section 5.3.2, code listings 5.1 and 5.2
+
+    Figure: Steps that wandering drives ahead, and turns, before it changes: histograms of 400,000 steps of 0.01 s,
+    and the geometric law of the listing's probabilities.
+
+    Expected: Means of 1 / 0.01 = 100 and 1 / 0.03 = 33.3 steps, known to 1.8 and 0.6: ± 5 and ± 2. Half turn left.
+    """
     forward, turning, lefts = stays(Wander(), seed, progress)
     count = min(len(forward), len(turning))
 
@@ -122,11 +124,10 @@ class Setting:
 
 NOTES = Setting(robot="arsim")
 NARROW = Setting(robot=narrow_arsim())
-# scaled as `_SCALED` says
+# scaled as E20 says
 SHIELDBOT = Setting(
     robot="shieldbot", on="native", scale=0.35, turn=0.0064, stop_turn=0.0215, period=0.05, seconds=47.0
 )
-SHIELDBOT_AVR = replace(SHIELDBOT, on="avr", runs=4)
 
 Make = Callable[[Setting], Brain]
 
@@ -203,7 +204,30 @@ def _data(done: list[Trial], seed: int) -> dict[str, object]:
     }
 
 
-def _alone(setting: Setting, seed: int, progress: Progress) -> Outcome:
+@experiment(
+    "E20",
+    on={
+        "arsim": Variant("arsim", NOTES, slow=True),
+        "shieldbot": Variant("shieldbot (native)", SHIELDBOT, slow=True),
+    },
+)
+def wandering(setting: Setting, seed: int, progress: Progress) -> Outcome:
+    """Wandering alone ends at a wall
+
+    In the notes: section 5.3.2, code listing 5.2
+
+    Figure: Wandering without avoidance, in ARSim's arena or at the shieldbot's scale: paths up to the first contact,
+    and how many runs are free of contact yet.
+
+    Expected: At least 10 of 12 runs collide, and that by wandering: of n steps ahead, each with probability p,
+    np ± 4 √(np (1 - p)) begin a turn, as the listing has it.
+
+    Expected on shieldbot: Lengths of the arena 0.35 times ARSim's, as the robots' radii (0.07 m, 0.20 m). At motor
+    signal 0.5 its servos run at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s against 0.682 m/s, so that everything
+    takes 0.35 · 0.682 / 0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot
+    with 3.19 against 4.447 rad/s, stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike, and so is the
+    criterion.
+    """
     done = trials(wanderer, setting, seed, progress)
 
     def draw(figure: Figure) -> None:
@@ -230,7 +254,34 @@ def _draw_survivors(axes: Axes, done: list[Trial], seconds: float) -> None:
     axes.set(xlabel="time (s)", ylabel="share of runs without contact", ylim=(0, 1.02), xlim=(0, seconds))
 
 
-def _avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
+@experiment(
+    "E21",
+    on={
+        "arsim": Variant("arsim", NARROW, slow=True),
+        "shieldbot": Variant("shieldbot (native)", SHIELDBOT, slow=True),
+        "avr": Variant("shieldbot (avr)", replace(SHIELDBOT, on="avr", runs=4), slow=True),
+    },
+)
+def avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
+    """Wandering and avoiding
+
+    In the notes: section 5.3.2 and Fig. 5.1
+
+    Figure: Wandering and avoiding in ARSim's arena, threshold 0.10: all paths, and the first one with the behavior
+    that was active.
+
+    Expected: IR sensors at ±0.3324 rad. No run of 12 collides. A threshold of 0.3 does not keep that (1 to 3 collide
+    at most seeds), nor quite does one of 0.15 (1 of 60 runs grazes a pillar's corner). Things are heeded from 0.10 on
+    here: 1 run of 420, of the seeds 1 to 35, grazes one after it has turned to where no beam had looked.
+
+    Expected on shieldbot: From seeing to turning it takes at most 50 ms (IR) + 50 ms (brain) + 50 ms (utility) +
+    75 ms (servo), 3.4 cm at 0.152 m/s; what lies in its way is in the beam of an IR pair or the Ping with at least
+    9 cm to go; a round body that turns on the spot touches nothing. So no run may collide. Its arena and chances are
+    those of E20.
+
+    Expected on avr: As on shieldbot; 4 runs.
+    """
+    # IR beams: 0.25 to 0.65 rad from (0.05, 0.04) m, 0.20 m long; Ping: ±0.35 rad, nearness 0.10 at 0.36 m.
     done = trials(avoider, setting, seed, progress)
 
     def draw(figure: Figure) -> None:
@@ -256,94 +307,3 @@ def _draw_activity(axes: Axes, trial: Trial) -> None:
         draw_robot(axes, trial.result.robot, pose, colour, plan=trial.plan)
     axes.legend(fontsize="small", ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.13))
     axes.set_title(f"the first path, {trial.times_on('avoid')} times avoided")
-
-
-_WANDERS = "of n steps ahead, each with probability p, np ± 4 √(np (1 - p)) begin a turn, as the listing has it"
-
-
-@experiment(
-    "E20",
-    title="Wandering alone ends at a wall",
-    source="section 5.3.2, code listing 5.2",
-    caption="Wandering in ARSim's arena without avoidance: paths up to the first contact, and how many runs are free "
-    "of contact yet.",
-    robot="arsim",
-    criterion=f"At least 10 of 12 runs collide, and that by wandering: {_WANDERS}.",
-    slow=True,
-)
-def wandering(seed: int, progress: Progress) -> Outcome:
-    return _alone(NOTES, seed, progress)
-
-
-_SCALED = (
-    "Lengths of the arena 0.35 times ARSim's, as the robots' radii (0.07 m, 0.20 m). At motor signal 0.5 its servos "
-    "run at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s against 0.682 m/s, so that everything takes 0.35 · 0.682 / "
-    "0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot with 3.19 against "
-    "4.447 rad/s, stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike"
-)
-
-
-@experiment(
-    "E20-shieldbot",
-    title="Wandering alone ends at a wall: the same brain on a board",
-    source="section 5.3.2, code listing 5.2",
-    caption="The shieldbot wandering without avoidance in ARSim's arena at its own scale: paths up to the first "
-    "contact, and how many runs are free of contact yet.",
-    robot="shieldbot (native)",
-    criterion=f"{_SCALED}, and so is the criterion of E20: at least 10 of 12 runs collide; {_WANDERS}.",
-    slow=True,
-)
-def wandering_shieldbot(seed: int, progress: Progress) -> Outcome:
-    return _alone(SHIELDBOT, seed, progress)
-
-
-@experiment(
-    "E21",
-    title="Wandering and avoiding",
-    source="section 5.3.2 and Fig. 5.1",
-    caption="Wandering and avoiding in ARSim's arena, IR sensors at ±0.3324 rad, threshold 0.10: all paths, and the "
-    "first one with the behavior that was active.",
-    robot="arsim",
-    criterion="No run of 12 collides. A threshold of 0.3 does not keep that (1 to 3 collide at most "
-    "seeds), nor quite does one of 0.15 (1 of 60 runs grazes a pillar's corner). Things are heeded from 0.10 on "
-    "here: 1 run of 420, of the seeds 1 to 35, grazes one after it has turned to where no beam had looked.",
-    slow=True,
-)
-def avoiding(seed: int, progress: Progress) -> Outcome:
-    return _avoiding(NARROW, seed, progress)
-
-
-# IR beams: 0.25 to 0.65 rad from (0.05, 0.04) m, 0.20 m long; Ping: ±0.35 rad, nearness 0.10 at 0.36 m.
-_SEEN = (
-    "From seeing to turning it takes at most 50 ms (IR) + 50 ms (brain) + 50 ms (utility) + 75 ms (servo), 3.4 cm at "
-    "0.152 m/s; what lies in its way is in the beam of an IR pair or the Ping with at least 9 cm to go; a round body "
-    "that turns on the spot touches nothing. So no run may collide, as in E21"
-)
-
-
-@experiment(
-    "E21-shieldbot",
-    title="Wandering and avoiding: the same brain on a board",
-    source="section 5.3.2 and Fig. 5.1",
-    caption="The shieldbot wandering and avoiding in ARSim's arena at its own scale: all paths, and the first one with "
-    "the behavior that was active.",
-    robot="shieldbot (native)",
-    criterion=f"{_SEEN}. {_SCALED}.",
-    slow=True,
-)
-def avoiding_shieldbot(seed: int, progress: Progress) -> Outcome:
-    return _avoiding(SHIELDBOT, seed, progress)
-
-
-@experiment(
-    "E21-avr",
-    title="Wandering and avoiding: the same brain on the AVR image",
-    source="section 5.3.2 and Fig. 5.1",
-    caption="The shieldbot with the image of its ATmega328P, wandering and avoiding in ARSim's arena at its own scale: "
-    "all paths, and the first one with the behavior that was active.",
-    robot="shieldbot (avr)",
-    criterion=f"{_SEEN}. 4 runs. {_SCALED}.",
-    slow=True,
-)
-def avoiding_avr(seed: int, progress: Progress) -> Outcome:
-    return _avoiding(SHIELDBOT_AVR, seed, progress)

@@ -189,13 +189,12 @@ NAVIGATION = [
     ),
     Mutant("E47", "the potentials' directions", put(PotentialField, "gradient", slope_of(heading=0.0))),
     Mutant("E47", "the factor 2 of (6.3)", put(PotentialField, "gradient", lambda old: lambda *at: old(*at) / 2)),
-    *(Mutant(name, "the hills", put(potential_fields, "ROOM", lambda _: NOTHING)) for name in ("E48", "E48-avr")),
+    Mutant("E48", "the hills", put(potential_fields, "ROOM", lambda _: NOTHING)),
     Mutant("E48", "the way down", put(SteeredBehavior, "steer", uphill)),
     Mutant("E49", "the hills", put(potential_fields, "WEDGE", lambda _: NOTHING)),
     Mutant("E49", "the middle hill", put(potential_fields, "WEDGE", lambda wedge: wedge[1:])),
     *(
-        Mutant(name, without, patch)
-        for name in ("E50", "E50-avr")
+        Mutant("E50", without, patch)
         for without, patch in (
             ("waypoints", put(potential_fields, "waypoints", lambda _: lambda path: NOTHING)),
             ("waypoints go", put(potential_fields, "PASSING", lambda _: 1e-3)),
@@ -203,8 +202,7 @@ NAVIGATION = [
         )
     ),
     *(
-        Mutant(name, without, patch)
-        for name in ("E51", "E51-avr")
+        Mutant("E51", without, patch)
         for without, patch in (
             ("turning on the spot", steering(turn_above=9.0)),
             ("it turns on the spot only beyond π/3", steering(turn_above=0.5)),

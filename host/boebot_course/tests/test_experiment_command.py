@@ -60,7 +60,7 @@ def four_experiments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Experiment]:
     known = {
         "X1": invented("X1", criterion="Of our own."),
         "X2": invented("X2", 1.2),
-        "X2-board": invented("X2-board", error=BoebotError("the board has gone")),
+        "X2-board": replace(invented("X2-board", error=BoebotError("the board has gone")), on="board"),
         "Y": invented("Y", error=ZeroDivisionError("by nothing")),
     }
     monkeypatch.setattr(experiments, "EXPERIMENTS", known)
@@ -70,11 +70,13 @@ def four_experiments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Experiment]:
 def test_list_names_all(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = boebot(capsys, "list", "experiments")
     assert (code, err) == (0, "")
-    assert {line.split()[0] for line in out.splitlines() if line.strip()} >= set(all_experiments())
+    names = {one.bare_name for one in all_experiments().values()}
+    assert {line.split()[0] for line in out.splitlines() if line.strip()} >= names
     _, out, _ = boebot(capsys, "list", "experiments", "--json")
     listed = {one["name"]: one for one in json.loads(out)["experiments"]}
-    assert list(listed) == list(all_experiments())
+    assert set(listed) == names
     assert listed["E29"]["robot"] == "none" and listed["E29"]["section"] == "4.4.2"
+    assert listed["E21"]["on"] == "arsim, avr, shieldbot"
 
 
 @pytest.mark.parametrize(
@@ -160,6 +162,7 @@ def test_figure_is_said_so_that_its_verdict_can_be_seen(
         (("E299",), "there is no experiment 'E299'; did you mean E29"),
         (("qqqqqq",), "there is no experiment 'qqqqqq'; `boebot list experiments` names all"),
         (("E29", "Z*"), "there is no experiment 'Z*'"),
+        (("E22", "--on", "arv"), "no such experiment runs on 'arv'; expected arsim, avr, shieldbot"),
         (("E29", "--seed", "-1"), "--seed"),
         (("--all", "--jobs", "0"), "--jobs"),
     ],
@@ -197,7 +200,8 @@ def test_experiments_that_miss_or_fail_are_named_and_the_others_go_on(
 def test_pattern_means_all_that_it_matches(
     four_experiments: dict[str, Experiment], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    code, out, _ = boebot(capsys, "experiment", "x2*", "X1", "x1", "--jobs", "1", "--json", "--out", str(tmp_path))
+    which = ("x2*", "X1", "x1", "--on", "*")
+    code, out, _ = boebot(capsys, "experiment", *which, "--jobs", "1", "--json", "--out", str(tmp_path))
     printed = json.loads(out)
     assert code == 1
     assert [(one["name"], one["met"]) for one in printed["experiments"]] == [
@@ -207,6 +211,21 @@ def test_pattern_means_all_that_it_matches(
     ]
     assert printed["experiments"][2]["error"] == "the board has gone"
     assert {Path(name).name for name in printed["files"]} == {path.name for path in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [(("X2",), ["X2"]), (("X2", "--on", "board"), ["X2-board"]), (("--all", "--on", "board"), ["X2-board"])],
+)
+def test_robot_is_the_first_or_the_one_that_is_named(
+    arguments: tuple[str, ...],
+    names: list[str],
+    four_experiments: dict[str, Experiment],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    _, out, _ = boebot(capsys, "experiment", *arguments, "--jobs", "1", "--json", "--out", str(tmp_path))
+    assert [one["name"] for one in json.loads(out)["experiments"]] == names
 
 
 class Reader(HTMLParser):
