@@ -10,21 +10,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.arenas.floor_plan import FloorPlan
+from boebot.brain import Brain
+from boebot.description.robots import RobotDescription
+from boebot.record.brain_record import BrainRecord
 from boebot.record.truth import Pose, truth_at
+from boebot.result import RunResult
 from boebot.running.runner import run
 from boebot_course.experiment import Floats
-
-if TYPE_CHECKING:
-    from boebot.arenas.floor_plan import FloorPlan
-    from boebot.brain import Brain
-    from boebot.description.robots import RobotDescription
-    from boebot.record.brain_record import BrainRecord
-    from boebot.result import RunResult
 
 PER_SEED = 1000
 

@@ -15,18 +15,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.brain import Utility
 from boebot.brain.utility import Utilities
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 USE = 0.02  # 1/s, of each
 INTAKE = 0.10  # 1/s at cue 1, of what it takes in, times its cue

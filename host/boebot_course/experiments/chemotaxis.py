@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import RunAndTumble
@@ -23,10 +25,6 @@ from boebot.robot import Observation, Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import varied
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 STEP = 0.01  # s
 SIZE, SPREAD, SPEED = 10.0, 2.5, 1.0  # side of the square (m), width of the attractant (m), speed of a run (m/s)

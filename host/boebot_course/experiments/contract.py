@@ -19,17 +19,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import boebot
+from boebot.robot import Robot
 from boebot_course.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 ROOMS = ("boebot.brain", "boebot.behaviors", "boebot.cognition", "boebot.navigation", "boebot.brains")
 """Packages that brains are made of."""

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors import Avoid, ChargeBattery, Wander, Withdraw
@@ -26,9 +26,6 @@ from boebot.running.runner import execute
 from boebot.running.tasks import Request
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot_course.trials import Trial, decisions
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SECONDS = 300.0
 FARADS = 25.0 / 3  # three capacitors in a row

@@ -13,19 +13,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.brain import Utility
 from boebot.brain.utility import Utilities
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 PATROL = Utility(b=0.5)
 DRAIN, CHARGE = 0.02, 0.1  # 1/s

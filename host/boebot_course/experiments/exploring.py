@@ -9,24 +9,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
 from boebot.description.robots import RobotDescription
 from boebot.navigation import Coverage, Explore, Lattice, LineMap, Placement
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, varied
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 Pose = tuple[float, float, float]
 

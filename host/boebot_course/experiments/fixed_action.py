@@ -9,24 +9,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot import run
 from boebot.behaviors import Stop
 from boebot.brain import Action, Brain, FixedActionPattern
 from boebot.description.robots import load_robot
+from boebot.result import RunResult
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, about, exactly, experiment
 from boebot_course.trials import decisions, true_pose
 from boebot_course.variants import arena_file
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.result import RunResult
-    from boebot.robot import Robot
 
 PERIOD = 0.02  # s
 COMES, GONE = 1.0, 1.2  # s; when the stimulus begins to come, and when it begins to leave, if it does

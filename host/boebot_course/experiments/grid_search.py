@@ -12,20 +12,22 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 
 from boebot.navigation import Cells, Found, Lattice, LineMap, search, tightened
 from boebot.navigation.lattice import Cell
 from boebot.navigation.search import Method
 from boebot.navigation.tighten import length
+from boebot.view.painter import frame
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Point = tuple[float, float]
 START, TARGET = (5, 3), (6, 17)  # row, column
@@ -89,8 +91,6 @@ EXPANDED, PATH, WALL, FROM = "#bfe3c6", "#0b6b3a", "#39415a", "#f0e442"
 
 def _draw_search(axes: Axes, free: NDArray[np.bool_], found: Found[Cell]) -> None:
     """As Figs. 6.8 and 6.10: checked cells light green, the path dark green."""
-    from matplotlib.colors import to_rgb
-
     rows, columns = free.shape
     picture = np.ones((rows, columns, 3))
     picture[~free] = to_rgb(WALL)
@@ -109,9 +109,6 @@ def _draw_search(axes: Axes, free: NDArray[np.bool_], found: Found[Cell]) -> Non
 
 
 def _legend(figure: Figure, *, with_wall: bool) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     figure.legend(
         handles=[
             Patch(fc=FROM, ec="0.6", label="start"),
@@ -412,7 +409,6 @@ def representations(seed: int, progress: Progress) -> Outcome:
 
 
 def _draw_nodes(axes: Axes, nodes: Nodes, path: Sequence[int]) -> None:
-    from matplotlib.collections import LineCollection
 
     ends = [(nodes.places[a], nodes.places[b]) for a, others in nodes.edges.items() for b in others if a < b]
     axes.add_collection(LineCollection(ends, colors="#b8bfcd", linewidths=0.6))
@@ -507,10 +503,6 @@ def tightening(seed: int, progress: Progress) -> Outcome:
 
 
 def _draw_grid(axes: Axes, plan: LineMap, lattice: Lattice, cells: Cells | None) -> None:
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import Rectangle
-
-    from boebot.view.painter import frame
 
     low, high = plan.bounds
     frame(axes, low, high)

@@ -8,25 +8,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import Homing, Wander
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.cognition import Odometry, PathIntegration
+from boebot.description.robots import RobotDescription
 from boebot.devices.compass import TESLA_PER_COUNT
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, experiment, with_progress
 from boebot_course.trials import PER_SEED, decisions, true_pose
 from boebot_course.variants import varied
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from boebot.description.robots import RobotDescription
-    from boebot.robot import Robot
 
 PERIOD = 0.02  # s
 SIGNAL = 0.9  # motor signal out and home

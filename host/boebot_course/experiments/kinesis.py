@@ -6,21 +6,17 @@ Density is proportional to 1/V: with speeds of 0.2 and 1 m/s the humid half of t
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import Kinesis
 from boebot.brain import Brain
 from boebot.devices.motor import RegulatedMotor
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, experiment
 from boebot_course.variants import varied
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 FULL_SPEED = 2.0  # m/s at motor signal 1: half of it is left for turning
 FAST, SLOW = 1.0, 0.2  # m/s

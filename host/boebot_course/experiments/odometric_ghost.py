@@ -10,22 +10,20 @@ The brain sees nothing but the ghost: it stops when the ghost has gone a metre.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from boebot.cognition import Odometry
+from boebot.view import scene, style
+from boebot.view.painter import draw_robot, paint
 from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
 from boebot_course.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import varied
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 FACTOR = 1.02
 RUNS = 5  # shieldbots
@@ -59,9 +57,6 @@ def error(trial: Straight) -> float:
 
 def _draw(figure: Figure, trials: Sequence[Straight]) -> None:
     """Ways of robots and ghosts from above, with robot and ghost where the first ones end."""
-    from boebot.view import scene, style
-    from boebot.view.painter import draw_robot, paint
-
     axes = figure.subplots()
     first = trials[0]
     reach = first.result.robot.body.radius_m

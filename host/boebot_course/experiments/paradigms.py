@@ -13,28 +13,24 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import boebot
+from boebot.arenas.floor_plan import FloorPlan
 from boebot.behaviors import Avoid
 from boebot.brain import Brain, MotorBehavior, Utility
 from boebot.cognition import near, wrapped
 from boebot.record.columns import VehicleColumns
 from boebot.record.truth import touch_indices
+from boebot.result import RunResult
+from boebot.robot import Command, Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.variants import narrow_arsim
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.arenas.floor_plan import FloorPlan
-    from boebot.result import RunResult
-    from boebot.robot import Command, Robot
-
 
 PERIOD, PLANNING = 0.05, 0.5  # s
 GOAL, NEAR_GOAL = (1.3, -1.3), 0.3  # m

@@ -8,22 +8,18 @@ turret does the same on the emulated AVR.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from boebot.brain import Brain, CognitiveProcess, Utility
 from boebot.cognition import Odometry
 from boebot.navigation import Estimator, FollowPath, LineMap, Localization, RandomSearch
 from boebot.navigation.frames import Pose, composed
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, true_pose, try_once
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 ARENA = "blocks"
 ROUND = ((2.8, 1.2), (2.8, 2.7), (4.4, 2.8), (4.4, 4.65), (1.2, 4.65), (0.8, 2.8), (0.8, 0.8))  # m

@@ -11,15 +11,20 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.navigation import FollowField, Lattice, LineMap, LockDetector, Potential, PotentialField
 from boebot.navigation.potential_field import waypoints
+from boebot.robot import Robot
+from boebot.view import style
+from boebot.view.painter import draw_robot
 from boebot_course.experiment import (
     Floats,
     Measured,
@@ -34,12 +39,6 @@ from boebot_course.experiment import (
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, varied
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -212,15 +211,12 @@ def _draw_field(axes: Axes, field: PotentialField, trial: Trial, low: float, hig
 
 
 def _draw_goal(axes: Axes, behavior: FollowField) -> None:
-    from matplotlib.patches import Circle
 
     place = behavior.goal.x, behavior.goal.y
     axes.add_patch(Circle(place, behavior.arrival, facecolor="#f0e442", edgecolor="#39415a", lw=1.0, zorder=5))
 
 
 def _draw_way(axes: Axes, trial: Trial, number: int, line: str = "-", width: float = 1.6) -> None:
-    from boebot.view import style
-    from boebot.view.painter import draw_robot
 
     axes.plot(*trial.path.T, line, color=style.colour(number), lw=width, zorder=6)
     draw_robot(axes, trial.result.robot, trial.start, style.colour(number))
@@ -354,7 +350,6 @@ def locked(seed: int, progress: Progress) -> Outcome:
     ]
 
     def draw(figure: Figure) -> None:
-        from boebot.view import style
 
         figure.set_figheight(3.5)
         left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))

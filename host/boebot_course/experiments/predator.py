@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, experiment
 from boebot_course.experiments.chemotaxis import (
@@ -27,9 +27,6 @@ from boebot_course.experiments.chemotaxis import (
     uniform,
 )
 from boebot_course.trials import trial_seeds
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 REACH = 0.5  # m around the predator
 SLOWER = 200.0

@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors.withdraw import ReflexIntensity
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, experiment
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 STEP = 0.01  # s
 

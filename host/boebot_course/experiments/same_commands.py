@@ -14,24 +14,20 @@ it back, so that the whole of two runs can be compared, and it has no chance, so
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import boebot
 from boebot.behaviors import Avoid, Wander, Withdraw
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
 from boebot.record.compare import Difference, command_difference, telemetry_difference
+from boebot.result import RunResult
 from boebot.running.replayed import replayed
 from boebot_course.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
 from boebot_course.experiments import wall
 from boebot_course.variants import arena_file
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.result import RunResult
 
 SECONDS = 20.0
 WALLS_SECONDS = 60.0

@@ -11,9 +11,11 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.arenas import load_arena
@@ -21,15 +23,10 @@ from boebot.arenas.floor_plan import floor_plan
 from boebot.navigation import Lattice, LineMap, Scan, TurretScan, laser_scan
 from boebot.navigation.frames import Pose
 from boebot.navigation.match import Match, search_pose
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, about, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 ARENA = "blocks"
 HALF_TURN = (-math.pi / 2, math.pi / 2)
@@ -187,8 +184,6 @@ def _draw_scan(
     axes: Axes, scan: Scan, at: Pose, colour: str, *, rays: bool = True, dotted: bool = False, label: str = "scan"
 ) -> None:
     """Its ends, and a few of its rays, as they lie when the range finder is there."""
-    from matplotlib.collections import LineCollection
-
     x, y, heading = at
     angles = heading + np.linspace(*scan.bearings, len(scan.distances))
     ends = np.column_stack((x + scan.distances * np.cos(angles), y + scan.distances * np.sin(angles)))[scan.known]

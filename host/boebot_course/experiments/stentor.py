@@ -14,17 +14,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors.escalate import LeakyChain
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 DECAYS = np.array((8.5, 4.3, 1.6, 0.75))  # a_2..a_5 (1/s)
 GAINS = np.array((12.0, 6.6, 2.75, 1.45))  # b_2..b_5 (1/s)

@@ -9,21 +9,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors import StraightRun
 from boebot.brain import Brain
 from boebot.cognition import Odometry
+from boebot.description.robots import RobotDescription
 from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
 from boebot_course.trials import Trial, trial_seeds, try_once
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.description.robots import RobotDescription
 
 AT_REST_S = 0.5  # without moving, at the end of a run
 

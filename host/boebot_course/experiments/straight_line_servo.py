@@ -7,10 +7,11 @@ robot never gets there.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import msgspec
+from matplotlib.figure import Figure
 
 from boebot.behaviors import StraightRun
 from boebot.description.equipment import Equipment
@@ -21,11 +22,6 @@ from boebot_course.experiment import Measured, Outcome, Progress, Variant, exact
 from boebot_course.experiments.straight_line import Straight, drive, runner
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import varied
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.figure import Figure
 
 STEP = 0.01  # s
 SECONDS = 25.0

@@ -9,25 +9,24 @@ import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from boebot import rates
 from boebot.behaviors import Phototaxis
 from boebot.brain import Brain, MotorBehavior
 from boebot.description.robots import RobotDescription
 from boebot.devices.light import Phototransistor
+from boebot.robot import Robot
+from boebot.view import style
+from boebot.view.painter import draw_robot
 from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, experiment, with_progress
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import SMALL_RADIUS, arena_file, at_angle, small_arsim, varied
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 STARTS = 60
 AWAY_M, REACHED_M = 2.0, 0.15
@@ -121,11 +120,6 @@ def judge(setting: Setting, times: Sequence[float], straight: float) -> list[Mea
 
 def _draw(figure: Figure, done: Sequence[Trial], times: Sequence[float], straight: float) -> None:
     """Ways up to the lamp, and the times that they took."""
-    from matplotlib.patches import Circle
-
-    from boebot.view import style
-    from boebot.view.painter import draw_robot
-
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     floor(left, done[0].plan, np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))
     for trial, time in zip(done, times, strict=True):

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import msgspec
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import NotRealisableError
 from boebot.running.runner import run
 from boebot_course.experiment import Outcome, Progress, about, exactly, experiment
 from boebot_timing.realisable import Verdict, judge
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 STEP_S = 0.01
 READING_S = 0.003  # of an IR sensor, chosen: two fit into the step with the brain, four do not, as in Fig. 3.2

@@ -9,21 +9,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import boebot
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.brain.utility import Utilities
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 from boebot_course.trials import decisions
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 
 def advanced(functions: list[Utility], variables: dict[str, Floats], step: float) -> Floats:

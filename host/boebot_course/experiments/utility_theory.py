@@ -5,20 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import boebot
 from boebot.behaviors import Stop
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
 from boebot_course.trials import decisions
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.robot import Robot
 
 TERMS = 100  # of the sum in (7.3): those beyond are below 1e-25
 

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
+from boebot.result import RunResult
 from boebot_course.experiment import Measured, Outcome, Progress, Variant, experiment
 from boebot_course.paths import floor
 from boebot_course.variants import SMALL_SPEED, arena_file, small_arsim, varied
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from boebot.result import RunResult
 
 LENGTH, WIDTH = 3.0, 2.0  # of the room (m)
 ROOM = f"""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot import rates
@@ -18,14 +19,12 @@ from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.robot import Observation, Robot
+from boebot.view import style
+from boebot.view.painter import draw_robot
 from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
 from boebot_course.paths import draw_paths, floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, narrow_arsim, scaled_arsim_arena
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 STEP = 0.01  # s, the notes'
 STEPS = 400_000
@@ -295,9 +294,6 @@ def avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
 
 def _draw_activity(axes: Axes, trial: Trial) -> None:
     """One path, with the behavior that drove."""
-    from boebot.view import style
-    from boebot.view.painter import draw_robot
-
     floor(axes, trial.plan)
     avoids: NDArray[np.bool_] = trial.when_active("avoid")
     for name, active, colour in (("wander", ~avoids, style.END), ("avoid", avoids, style.ESTIMATE)):
