@@ -129,13 +129,12 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
     by_name: dict[str, Verdict] = {}
     files: list[Path] = []
     with (
-        output.share_bars([one.name for one in experiments]) as watch,
+        output.progress_bar("experiments", len(experiments), unit="") as watch,
         closing(running.run(experiments, seed, jobs, watch, output_files.files)) as coming,
     ):
         for verdict in coming:
             by_name[verdict.name] = verdict
             files += output_files.write(out, verdict.files)
-            watch({verdict.name: 1.0})
     verdicts = [by_name[one.name] for one in experiments]
     if len(verdicts) > 1:
         index = index_page.page(experiments, verdicts, seed)

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from boebot.cli.output import share_bars
+from boebot.cli.output import progress_bar
 from boebot_course import output_files, running
 from boebot_course.experiments import Experiment, Measured, Outcome, all_experiments
 
@@ -107,7 +107,7 @@ def main(chapters: list[str]) -> int:
     known = all_experiments().values()
     chosen = [one for one in known if not chapters or chapter_of(one) in chapters]
     with (
-        share_bars([one.name for one in chosen]) as watch,
+        progress_bar("experiments", len(chosen), unit="") as watch,
         closing(running.run(chosen, SEED, os.cpu_count() or 1, watch, picture)) as coming,
     ):
         verdicts = {verdict.name: verdict for verdict in coming}

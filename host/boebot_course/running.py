@@ -7,28 +7,22 @@ its figure cannot leave its process: files are made where it runs, and handed ov
 from __future__ import annotations
 
 import contextlib
-import math
 import multiprocessing
 import os
 import threading
 import traceback
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import CancelledError, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from typing import Any
 
 from boebot.errors import BoebotError
 from boebot.running import interrupts
-from boebot_course.experiment import Experiment, Measured, Outcome
+from boebot_course.experiment import Experiment, Measured, Outcome, Progress
 from boebot_course.experiments import all_experiments
 
 Files = Callable[[Experiment, Outcome, int], dict[str, bytes]]
 """Makes files of what came of an experiment with that seed: name -> content. A function of a module, for processes."""
-Watch = Callable[[Mapping[str, float]], None]
-"""Called now and then with the share that is done, 0 to 1, of each experiment that is running."""
-
-LOOK_S = 0.1  # how often shares are looked at
 BOARDS = ("avr", "native", "direct", "arsim")  # from slow to fast, as named in `Experiment.robot`
 
 
@@ -54,25 +48,27 @@ class Verdict:
 
 
 def run(
-    experiments: Sequence[Experiment], seed: int, jobs: int, watch: Watch, files: Files
+    experiments: Sequence[Experiment], seed: int, jobs: int, watch: Progress, files: Files
 ) -> Generator[Verdict, None, None]:
-    """Runs them, with up to that many processes beside each other; the verdicts, as they come.
+    """Runs them, with up to that many processes beside each other; the verdicts, as they come. `watch` is told how many
+    are done.
 
     An experiment that raises, or whose process dies, has failed; the others go on. Processes end when what is returned
     is closed.
     """
     if jobs == 1 or len(experiments) == 1:
-        for one in experiments:
-            yield _run_here(one, seed, watch, files)
+        for number, one in enumerate(experiments):
+            yield _run(one, seed, lambda share, number=number: watch(number + share), files)  # type: ignore[misc]
         return
-    waiting = sorted(experiments, key=_length)
-    with contextlib.closing(_in_processes(waiting, seed, jobs, watch, files)) as verdicts:
-        for verdict in verdicts:
-            waiting = [one for one in waiting if one.name != verdict.name]
+    waiting = {one.name: one for one in sorted(experiments, key=_length)}
+    with contextlib.closing(_in_processes(list(waiting), seed, jobs, files)) as verdicts:
+        for number, verdict in enumerate(verdicts, 1):
+            del waiting[verdict.name]
+            watch(number)
             yield verdict
-    for one in waiting:  # a process died, and with it the others: each now gets its own
-        alone = list(_in_processes([one], seed, 1, watch, files))
-        yield alone[0] if alone else Verdict(one.name, error="its process has died")
+    for name in waiting:  # a process died, and with it the others: each now gets its own
+        alone = list(_in_processes([name], seed, 1, files))
+        yield alone[0] if alone else Verdict(name, error="its process has died")
 
 
 def _length(experiment: Experiment) -> tuple[bool, int]:
@@ -81,12 +77,7 @@ def _length(experiment: Experiment) -> tuple[bool, int]:
     return not experiment.slow, board
 
 
-def _run_here(experiment: Experiment, seed: int, watch: Watch, files: Files) -> Verdict:
-    watch({experiment.name: 0.0})
-    return _run(experiment, seed, lambda share: watch({experiment.name: share}), files)
-
-
-def _run(experiment: Experiment, seed: int, progress: Callable[[float], None], files: Files) -> Verdict:
+def _run(experiment: Experiment, seed: int, progress: Progress, files: Files) -> Verdict:
     try:
         outcome = experiment.run(seed, progress)
         if not outcome.measured:
@@ -105,21 +96,22 @@ def _place(error: Exception) -> str:
     return f"{type(error).__name__}{what and f': {what}'} ({os.path.basename(last.filename)}, line {last.lineno})"  # noqa: PTH119
 
 
-def _in_processes(
-    experiments: Sequence[Experiment], seed: int, jobs: int, watch: Watch, files: Files
-) -> Generator[Verdict, None, None]:
+def _in_processes(names: Sequence[str], seed: int, jobs: int, files: Files) -> Generator[Verdict, None, None]:
     """The verdicts of those whose process lived."""
-    context = multiprocessing.get_context("spawn")
-    shares = context.Array("d", [math.nan] * len(experiments), lock=False)  # NaN: it has not begun
     before = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(min(jobs, len(experiments)), context, _begin_process, (shares,))
+    spawned = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(jobs, len(names)), spawned, _end_with_parent)
     try:
         # Processes start with the signals ignored that ask to end, and keep to it: it is this one that ends them.
         with interrupts.ignored():
-            futures = {
-                pool.submit(_run_there, one.name, seed, place, files): place for place, one in enumerate(experiments)
-            }
-        yield from _collect(futures, experiments, shares, watch)
+            futures = {pool.submit(_run_there, name, seed, files): name for name in names}
+        for future in as_completed(futures):
+            try:
+                yield future.result()
+            except (BrokenProcessPool, CancelledError):
+                continue  # the caller sees that it is missing
+            except Exception as error:  # what came of it could not be handed over
+                yield Verdict(futures[future], error=_place(error))
     finally:
         with interrupts.ignored():
             for child in set(multiprocessing.active_children()) - before:
@@ -127,31 +119,8 @@ def _in_processes(
             pool.shutdown(cancel_futures=True)
 
 
-def _collect(
-    futures: Mapping[Future[Verdict], int], experiments: Sequence[Experiment], shares: Any, watch: Watch
-) -> Iterator[Verdict]:
-    left = set(futures)
-    while left:
-        done, left = wait(left, LOOK_S, FIRST_COMPLETED)
-        for future in done:
-            try:
-                verdict = future.result()
-            except (BrokenProcessPool, CancelledError):
-                continue  # the caller sees that it is missing
-            except Exception as error:  # what came of it could not be handed over
-                verdict = Verdict(experiments[futures[future]].name, error=_place(error))
-            yield verdict
-        places = (futures[future] for future in left)
-        watch({experiments[place].name: shares[place] for place in places if not math.isnan(shares[place])})
-
-
-_shares: Any = None  # of all experiments, in a process that runs some
-
-
-def _begin_process(shares: Any) -> None:
+def _end_with_parent() -> None:
     """Once in each process: it ends with the one that started it, however that ended."""
-    global _shares
-    _shares = shares
     parent = multiprocessing.parent_process()
     assert parent is not None
 
@@ -162,11 +131,6 @@ def _begin_process(shares: Any) -> None:
     threading.Thread(target=follow, daemon=True).start()
 
 
-def _run_there(name: str, seed: int, place: int, files: Files) -> Verdict:
+def _run_there(name: str, seed: int, files: Files) -> Verdict:
     """One experiment, by name, in one of the processes."""
-
-    def progress(share: float) -> None:
-        _shares[place] = share
-
-    progress(0.0)
-    return _run(all_experiments()[name], seed, progress, files)
+    return _run(all_experiments()[name], seed, lambda share: None, files)

@@ -45,9 +45,8 @@ def maxima(
     )
     with board_link(port, request) as (link, _):
         check_image(link.identity(), code, image.name, port)
-        label = f"listening to {port}"
-        with output.share_bars([label]) as watch:
-            found = measure(link, seconds, lambda share: watch({label: share}))
+        with output.progress_bar(f"listening to {port}", 100, unit=" %") as watch:
+            found = measure(link, seconds, lambda share: watch(100 * share))
     measured = {name: cycles for name, cycles in found.items() if cycles}
     if not measured:
         output.say(f"the board {port} does not measure its tasks: only the chip's own timer can")

@@ -124,10 +124,8 @@ def timing(
         if image is not None:
             maxima = {} if port is None else board.maxima(port, description, image, seconds, elf)
             measured = _measured(False, image, seconds, seed) if measure else None
-            label = f"bounds of {image.name}"
-            with output.share_bars([label]) as watch:
-                watch({label: 0.0})
-                found = budget.prove(image, asked, measured, maxima, progress=lambda share: watch({label: share}))
+            with output.progress_bar(f"bounds of {image.name}", 100, unit=" %") as watch:
+                found = budget.prove(image, asked, measured, maxima, progress=lambda share: watch(100 * share))
         brain_s, own_period = _brain(brain, step, description, seed)
         period_s = period if period is not None else own_period or DEFAULT_PERIOD
         times = None if found is None else _board_times(found)
@@ -228,8 +226,8 @@ def _measured(pins: bool, image: Path, seconds: float, seed: int) -> Any:
     except ImportError as error:
         raise TimingError(f"the image cannot be measured here: {error}") from None
     work: Any = jitter.measure_jitter if pins else measure.measure_image
-    with output.share_bars([f"measuring {image.name}"]) as watch:
-        return work(image, seconds=seconds, seed=seed, progress=lambda share: watch({f"measuring {image.name}": share}))
+    with output.progress_bar(f"measuring {image.name}", 100, unit=" %") as watch:
+        return work(image, seconds=seconds, seed=seed, progress=lambda share: watch(100 * share))
 
 
 @streams.kept()

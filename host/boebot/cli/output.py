@@ -13,7 +13,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -128,8 +128,9 @@ def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 @contextlib.contextmanager
-def progress_bar(title: str, seconds: float, quiet: bool = False) -> Iterator[Progress]:
-    """Gives a function to call with the seconds that have passed; shows a bar once 2 s of wall time have gone by."""
+def progress_bar(title: str, total: float, quiet: bool = False, unit: str = " s") -> Iterator[Progress]:
+    """Gives a function to call with how much of the total is done, such as the seconds that have passed; shows a bar
+    once 2 s of wall time have gone by."""
     if quiet or not sys.stderr.isatty():
         yield lambda _: None
         return
@@ -138,12 +139,12 @@ def progress_bar(title: str, seconds: float, quiet: bool = False) -> Iterator[Pr
     bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        TextColumn("{task.completed:.0f} s" if math.isinf(seconds) else "{task.completed:.0f} of {task.total:g} s"),
+        TextColumn(f"{{task.completed:.0f}}{'' if math.isinf(total) else f' of {total:g}'}{unit}"),
         TimeElapsedColumn(),
         console=console(stderr=True),
         transient=True,
     )
-    task = bar.add_task(printable(title), total=None if math.isinf(seconds) else seconds)
+    task = bar.add_task(printable(title), total=None if math.isinf(total) else total)
     begun = time.monotonic()
     shown = False
 
@@ -159,40 +160,6 @@ def progress_bar(title: str, seconds: float, quiet: bool = False) -> Iterator[Pr
     finally:
         if shown:
             bar.stop()
-
-
-@contextlib.contextmanager
-def share_bars(names: Sequence[str]) -> Iterator[Callable[[Mapping[str, float]], None]]:
-    """Gives a function to call with the shares that are done, 0 to 1, by name. Shows a bar for each that is under way
-    and one for all, once 2 s of wall time have gone by."""
-    if not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    bars = Progress(*columns, console=console(stderr=True), transient=True)
-    overall = bars.add_task(f"{len(names)} experiments", total=len(names), visible=len(names) > 1)
-    tasks = {name: bars.add_task(printable(name), total=1.0, visible=False, start=False) for name in names}
-    done = dict.fromkeys(names, 0.0)
-    timer = threading.Timer(BAR_AFTER_S, bars.start)
-    timer.daemon = True
-
-    def report(shares: Mapping[str, float]) -> None:
-        for name, share in shares.items():
-            if not bars.tasks[tasks[name]].started:
-                bars.start_task(tasks[name])
-            done[name] = share
-            bars.update(tasks[name], completed=share, visible=share < 1.0)
-        bars.update(overall, completed=sum(done.values()))
-
-    timer.start()
-    try:
-        yield report
-    finally:
-        timer.cancel()
-        timer.join()
-        bars.stop()
 
 
 @contextlib.contextmanager

@@ -20,7 +20,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from boebot.cli import output
 from boebot.errors import BoebotError
 from boebot_course import experiments, output_files, running
 from boebot_course.experiment import Progress, about, exactly
@@ -272,26 +271,6 @@ def test_same_seed_gives_the_same_files_whatever_the_number_of_processes() -> No
     )
     assert set(one) == set(QUICK) and one == two
     assert [path.rpartition(".")[2] for path in one[made_files.ONE].files] == ["png", "svg", "csv", "json"]
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_terminal_shows_a_bar_for_all_and_for_each_that_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setattr(output, "BAR_AFTER_S", 0.0)
-    monkeypatch.setenv("TERM", "xterm")
-    with output.share_bars(["first", "second", "third"]) as watch:
-        watch({"first": 1.0, "second": 0.5})
-        until = time.monotonic() + ENDS_S
-        while "50%" not in terminal.getvalue() and time.monotonic() < until:
-            time.sleep(0.01)
-    shown = terminal.getvalue()
-    assert re.search(r"3 experiments.* 50%", shown) and re.search(r"second.* 50%", shown)
-    assert "first" not in shown and "third" not in shown
 
 
 def test_process_that_dies_fails_its_experiment_alone() -> None:
