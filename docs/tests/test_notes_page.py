@@ -22,7 +22,7 @@ PAGE = (ROOT / "docs" / "reference" / "notes.md").read_text(encoding="utf-8")
 # ---- section by section ----------------------------------------------------------------------------------------------
 
 TABLE = PAGE.partition("## Section by section\n")[2].partition("\n## ")[0]
-ROWS = [cells for cells in re.findall(r"^\| (.*) \| (.*) \| (.*) \|$", TABLE, re.MULTILINE) if cells[2] != "command"]
+ROWS = [cells for cells in re.findall(r"^(.*) \| (.*) \| (.*)$", TABLE, re.MULTILINE) if cells[2] != "command"]
 
 CONTENTS = """
 1.1 1.2 1.2.1 1.2.2 1.2.3 1.2.4 2.1 2.2 3.1 3.2 3.2.1 3.2.2 3.2.3 3.2.4 3.2.5 3.2.6 3.2.7 3.3 4.1 4.2 4.3 4.4 4.4.1
@@ -56,7 +56,7 @@ def all_of(counts: dict[int, int]) -> set[str]:
 
 
 def test_each_section_figure_equation_and_listing_has_a_row() -> None:
-    assert listed("sections?") == {*SECTIONS}
+    assert set(re.findall(r"§(\d[\d.]*)", "\n".join(where for where, _, _ in ROWS))) == {*SECTIONS}
     assert listed(r"Figs?\.") == all_of(FIGURES)
     assert equations() == all_of(EQUATIONS)
     assert listed("code listings?") == all_of(LISTINGS)
@@ -92,6 +92,8 @@ def names_of_tests() -> list[str]:
 def check(command: str) -> None:
     """Refuses a command that names an experiment, robot, arena, brain or test that is not there."""
     words = shlex.split(command)
+    if words[0] in all_experiments():
+        return
     if words[0] == "pytest":
         assert words[1] == "-k" and len(words) == 3 and any(words[2] in name for name in names_of_tests()), command
         return

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import closing
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +13,7 @@ import typer
 
 from boebot import resources
 from boebot.cli import completion, options, output
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, did_you_mean
 
 if TYPE_CHECKING:
     from boebot_course.experiments import Experiment
@@ -83,36 +82,28 @@ def experiment(
     from boebot_course.experiments import all_experiments
 
     if every == bool(names):
-        raise _usage("give either NAME or --all")
-    chosen = _chosen(names or ["*"], on or ("*" if every else None), all_experiments())
+        raise typer.BadParameter("give either NAME or --all")
+    chosen = _chosen(names or ["*"], on or ("*" if every else None), all_experiments().values())
     _run(chosen, seed, out, jobs or os.cpu_count() or 1, json)
 
 
 experiment.__doc__ = _HELP
 
 
-def _usage(sentence: str) -> Exception:
-    from click import UsageError
-
-    return UsageError(sentence)
-
-
-def _chosen(wanted: Sequence[str], on: str | None, known: Mapping[str, Experiment]) -> list[Experiment]:
+def _chosen(wanted: Sequence[str], on: str | None, known: Collection[Experiment]) -> list[Experiment]:
     """Those that are meant, each once, in the order of all; `on`: None for the first robot of each, else a pattern."""
     names: set[str] = set()
     for text in wanted:
-        found = {one.bare_name for one in known.values() if fnmatchcase(one.bare_name.lower(), text.lower())}
+        found = {one.bare_name for one in known if fnmatchcase(one.bare_name.lower(), text.lower())}
         if not found:
-            lower = {one.bare_name.lower(): one.bare_name for one in known.values()}
-            near = [lower[name] for name in get_close_matches(text.lower(), lower, n=3, cutoff=0.5)]
-            hint = f"did you mean {' or '.join(near)}?" if near else "`boebot list experiments` names all"
-            raise _usage(f"there is no experiment {text!r}; {hint}")
+            near = did_you_mean(text, [one.bare_name for one in known]) or "; `boebot list experiments` names all"
+            raise typer.BadParameter(f"there is no experiment {text!r}{near}")
         names |= found
-    meant = [one for one in known.values() if one.bare_name in names]
+    meant = [one for one in known if one.bare_name in names]
     chosen = [one for one in meant if (one.name == one.bare_name if on is None else fnmatchcase(one.on, on))]
     if not chosen:
         robots = ", ".join(dict.fromkeys(one.on for one in meant if one.on)) or "one robot alone"
-        raise _usage(f"no such experiment runs on {on!r}; expected {robots}")
+        raise typer.BadParameter(f"no such experiment runs on {on!r}; expected {robots}")
     return chosen
 
 
@@ -140,12 +131,10 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
         index = index_page.page(experiments, verdicts, seed)
         files = output_files.write(out, {index_page.NAME: index}) + sorted(files)
     if as_json:
-        found = [
-            output_files.record(one, verdict.measured, verdict.error)
-            for one, verdict in zip(experiments, verdicts, strict=True)
-        ]
-        version = resources.version()
-        output.print_json({"seed": seed, "version": version, "experiments": found, "files": list(map(str, files))})
+        pairs = zip(experiments, verdicts, strict=True)
+        found = [output_files.record(one, verdict.measured, verdict.error) for one, verdict in pairs]
+        known = {"seed": seed, "version": resources.version(), "experiments": found}
+        output.print_json(known | {"files": list(map(str, files))})
     else:
         _print(experiments, verdicts)
         if files:
@@ -177,10 +166,8 @@ def _print(experiments: Sequence[Experiment], verdicts: Sequence[Verdict]) -> No
             for title in ("figure", "measured", "expected", "unit", ""):
                 rows.add_column(title, justify="right" if title == "measured" else "left", overflow="fold")
             for figure in verdict.measured:
-                word = "met" if figure.is_met else "missed"
-                rows.add_row(
-                    *map(Text, (figure.name, figure.text, figure.expected, figure.unit)), Text(word, colours[word])
-                )
+                cells = map(Text, (figure.name, figure.text, figure.expected, figure.unit))
+                rows.add_row(*cells, Text(figure.word, colours[figure.word]))
             console.print(rows)
         console.print(Text(f"Criterion: {one.criterion}", style="dim"))
         console.print()

@@ -40,6 +40,11 @@ class Measured:
         return self.least <= self.value <= self.most
 
     @property
+    def word(self) -> str:
+        """The verdict in a word."""
+        return "met" if self.is_met else "missed"
+
+    @property
     def text(self) -> str:
         """The value in as few digits, four or more, as are within the bounds just where the value is."""
         if not math.isfinite(self.value) or self.value == round(self.value):

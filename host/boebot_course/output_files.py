@@ -9,7 +9,6 @@ import csv
 import io
 import json
 import math
-import re
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
@@ -27,22 +26,22 @@ from boebot_course.experiment import Experiment, Measured, Outcome
 HEIGHT_IN = 4.8  # of a figure, unless what draws it asks for another
 
 
-def stem(name: str) -> str:
-    """An experiment's name as that of a file."""
-    return re.sub(r"[^\w.-]+", "-", name).strip("-.")
-
-
 def files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, bytes]:
     """All of them: name -> content.
 
     Raises:
         ValueError: the data are no columns of one length.
     """
-    name = stem(experiment.name)
+    name = experiment.name
     table = as_csv(outcome)  # first: it finds fault sooner than the figure is drawn
     png, svg = pictures(experiment, outcome, {"png": style.DPI, "svg": style.DPI})
     verdict = record(experiment, outcome.measured) | {"seed": seed, "version": resources.version()}
-    return {f"{name}.png": png, f"{name}.svg": svg, f"{name}.csv": table, f"{name}.json": as_json(verdict)}
+    return {
+        f"{name}.png": png,
+        f"{name}.svg": svg,
+        f"{name}.csv": table,
+        f"{name}.json": json.dumps(verdict, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n",
+    }
 
 
 def pictures(experiment: Experiment, outcome: Outcome, forms: dict[str, float]) -> list[bytes]:
@@ -81,32 +80,13 @@ def _cell(value: Any) -> Any:
 def record(experiment: Experiment, measured: Iterable[Measured], error: str = "") -> dict[str, Any]:
     """What an experiment is and what came of it, for programs; None where a figure is not finite."""
     figures = [
-        {
-            "name": one.name,
-            "value": _finite(one.value),
-            "unit": one.unit,
-            "least": _finite(one.least),
-            "most": _finite(one.most),
-            "expected": one.expected,
-            "met": one.is_met,
-        }
+        {"name": one.name, "value": _finite(one.value), "unit": one.unit}
+        | {"least": _finite(one.least), "most": _finite(one.most), "expected": one.expected, "met": one.is_met}
         for one in measured
     ]
-    return {
-        "name": experiment.name,
-        "title": experiment.title,
-        "source": experiment.source,
-        "robot": experiment.robot,
-        "criterion": experiment.criterion,
-        "met": not error and all(one["met"] for one in figures),
-        "error": error or None,
-        "measured": figures,
-    }
-
-
-def as_json(values: dict[str, Any]) -> bytes:
-    """As a file of JSON."""
-    return json.dumps(values, indent=1, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+    said = {field: getattr(experiment, field) for field in ("name", "title", "source", "robot", "criterion")}
+    is_met = not error and all(one["met"] for one in figures)
+    return {**said, "met": is_met, "error": error or None, "measured": figures}
 
 
 def _finite(value: float) -> float | None:

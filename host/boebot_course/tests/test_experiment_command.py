@@ -158,7 +158,7 @@ def test_figure_is_said_so_that_its_verdict_can_be_seen(
     [
         ((), "give either NAME or --all"),
         (("E29", "--all"), "give either NAME or --all"),
-        (("E299",), "there is no experiment 'E299'; did you mean E29"),
+        (("E299",), "there is no experiment 'E299'; did you mean 'E29'"),
         (("qqqqqq",), "there is no experiment 'qqqqqq'; `boebot list experiments` names all"),
         (("E29", "Z*"), "there is no experiment 'Z*'"),
         (("E22", "--on", "arv"), "no such experiment runs on 'arv'; expected arsim, avr, shieldbot"),
