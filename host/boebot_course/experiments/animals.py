@@ -102,9 +102,9 @@ def isocline(seed: int, progress: Progress) -> Outcome:
     beyond it), and animals that do what the larger tendency asks for. Red: one that only ever drinks.
 
     Expected: Derived from the rule: beside the isocline the animal does one thing until it is there, after a time
-    that follows from its rates; from then on it flips at each crossing, and stays within two steps' gain of it. On
-    the isocline it must take in as much as it uses: it holds since 0.02 / 0.1 + 0.02 / 0.06 < 1. Only drinking it
-    starves after nutrients / 0.02 per s at the latest.
+    that follows from its rates; then it flips at each crossing, and stays within two steps' gain of it. It must
+    take in there as much as it uses: 0.02 / 0.1 + 0.02 / 0.06 < 1. Only drinking it starves after nutrients / 0.02
+    per s at the latest.
     """
     lives = [live(start, CUES) for start in STARTS]
     single = live(STARTS[0], CUES, rule="water")

@@ -128,11 +128,10 @@ def economics(seed: int, progress: Progress) -> Outcome:
 
     Expected: At motor signal 0.5, 0.152 m/s, board and servos draw 0.08 A + 2 (0.015 A + 0.74 A s/m · 0.152 m/s) =
     0.335 A; from 6.68 V to 4.73 V, where the regulator gives 4.2 V, 25/3 F last for 48.5 s, within a tenth for
-    turns and unlike servos. Who always charges drives to the station once, 1.77 m away, and by arcs less than half
-    as far again. By utility: standing, it gains 2.4 A - 0.08 A, so that by the balance of charge it stands 0.335 /
-    (2.32 + 0.335) = 0.126 of the time, of which its brain notices all but the first second of some 7.5 s, 0.109,
-    within 0.02 for what is left in the end. The other 262 s it works, 5.4 times 48.5 s: with a quarter off for
-    turns and searches at the station 4 times. Nothing is earned while it stands but some millimetres of stopping.
+    turns and unlike servos. The station is 1.77 m away, by arcs less than half as far again. By utility: standing,
+    it gains 2.4 A - 0.08 A, so that it stands 0.335 / (2.32 + 0.335) = 0.126 of the time, of which its brain
+    notices all but the first second of some 7.5 s: 0.109 ± 0.02. The other 262 s it works, 5.4 times 48.5 s: with a
+    quarter off for turns and searches 4 times. Standing earns nothing but some millimetres.
     """
     never, always, utility = (live(charge, seed) for charge in with_progress(list(NAMES.values()), progress))
     stands = utility.stands

@@ -165,11 +165,10 @@ def evolution(seed: int, progress: Progress) -> Outcome:
     Figure: Left: performance of the best individual over the generations of three restarts; dashed: never charging.
     Right: utilities of the best of all over time, its battery, and where it is.
 
-    Expected: A toy, whose figures are chosen: patrol counts only in its place, 5 s from the charger, where the
-    robot starts; going there and back costs energy; a charging robot loses none. Of the 30 restarts of the seeds 1
-    to 10, 17 came to 190 s (39 to 73 %), the others stayed mostly at never charging, 50 s: all of three do so at
-    one seed in twelve, not at 1 to 10. Without selection, or without mutation, the best gets worse or stays where
-    chance put it.
+    Expected: A toy, whose figures are chosen: patrol counts only in its place, 5 s from the charger; going there
+    and back costs energy. Of the 30 restarts of the seeds 1 to 10, 17 came to 190 s (39 to 73 %), the others stayed
+    mostly at never charging, 50 s: all of three do so at one seed in twelve, not at 1 to 10. Without selection, or
+    without mutation, the best gets worse or stays where chance put it.
     """
     evolved = evolve(seed, progress)
     known = live(np.array([NEVER, ALWAYS, THRESHOLD, BY_HAND]))

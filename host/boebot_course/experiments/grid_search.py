@@ -232,10 +232,10 @@ def star(seed: int, progress: Progress) -> Outcome:
     Figure: 200 random maps, 28 % of the cells blocked. Left: cells that A* and Dijkstra's expand; right: cost of
     the greedy path against the shortest one.
 
-    Expected: That A*'s path is as long as Dijkstra's, and that it is more efficient, is what the notes say of it.
-    An earlier computation, with other maps and other code, had 0.61 of the cells and greedy paths 1.072 times as
-    long. Single maps differ by 0.20 and 0.10 (1 σ); the difference of two means of 200 maps is known to 0.02 and
-    0.01, and three times that is allowed: at most 0.67, and 1.072 ± 0.03.
+    Expected: A*'s path is as long as Dijkstra's, and it is more efficient, the notes say. An earlier computation,
+    with other maps and code, had 0.61 of the cells and greedy paths 1.072 times as long. Single maps differ by 0.20
+    and 0.10 (1 σ), two means of 200 maps by 0.02 and 0.01; three times that is allowed: at most 0.67, and 1.072 ±
+    0.03.
     """
     maps = list(itertools.islice(random_maps(seed), MAPS))
     rows = []

@@ -146,11 +146,10 @@ def paradigms(seed: int, progress: Progress) -> Outcome:
     Figure: The same task, sensors and motions: paths to the goal (star) of a robot that plans for 0.5 s before it
     acts, and of a behavior-based one; crosses: collisions. Right: collisions against the time that a plan takes.
 
-    Expected: Derived from the times: a behavior acts on a reading at its next step, within 0.05 s; a plan on which
-    work begins at once is acted on 0.5 s later, one that has to wait for the last up to 1 s later, and a period
-    either way. At 0.55 m/s that is 0.27 m to 0.55 m, and what the sensors call near is 0.39 m away: some must be
-    hit. Planned in 0.05 s the same decisions arrive everywhere and hit less than half as often: it is the time that
-    fails, not they.
+    Expected: A behavior acts on a reading at its next step, within 0.05 s; a plan 0.5 s later, one that has to wait
+    for the last up to 1 s later, and a period either way. At 0.55 m/s that is 0.27 m to 0.55 m, and what the
+    sensors call near is 0.39 m away: some must be hit. Planned in 0.05 s the same decisions arrive everywhere and
+    hit less than half as often.
     """
     brains: dict[str, Callable[[], object]] = {"parallel": behavior_based}
     brains |= {f"serial_{planning:g}s".replace(".", "_"): partial(Serial, planning) for planning in PLANNINGS}

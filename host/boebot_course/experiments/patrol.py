@@ -134,9 +134,9 @@ def patrol(
 
     In the notes: section 6.3, Figs. 6.14 and 6.15
 
-    Figure: Above: true path of the first run (green) and the path that it believes to take (red), by odometry alone,
-    with localization, and enlarged about its largest correction. Below: how far from the truth it believes to be, by
-    odometry alone and with localization every five seconds, by a turret every ten; all runs, the first one dark.
+    Figure: Above: true path of the first run (green) and the path as believed (red), by odometry alone, with
+    localization, and enlarged about its largest correction. Below: how far from the truth it believes to be; all
+    runs, the first one dark. It scans every five seconds, with a turret every ten.
 
     Expected: Medians of the greatest error of twelve runs: at least 0.5 m by odometry alone (0.73 m computed from its
     noise), at most 0.2 m with localization, whose corrections can be seen as jumps. In five seconds the heading drifts

@@ -65,7 +65,7 @@ def luring(seed: int, progress: Progress) -> Outcome:
     Expected: Prey around the predator at least three times as dense as if spread evenly, and not so without
     attractant. In the last 50 s the predator is 0.75 m to 1 m from where it began, 0.875 m in the mean, and so is
     the prey's middle. A bacterium is some 0.6 m (1 σ, along x) from the attractant's middle, the middle of 40 of
-    them 0.095 m: four of these are allowed. If the predator stood still it would be 0.
+    them 0.095 m: four of these are allowed.
     """
     first = trial_seeds(seed, PREY)[0] + 400
     prey = partial(swarm, count=PREY, seconds=LASTS, period=PERIOD)

@@ -111,12 +111,11 @@ def same_commands(seed: int, progress: Progress) -> Outcome:
     commands differ by too little to be seen.
 
     Expected: Along walls, whole runs of 60 s: boards may begin and end a turn on the spot one step of the brain
-    apart, so that two steps a turn may differ; else commands differ by what the robots' places do: 8.4 mm that it
-    drives in a step, and 4.2 mm by phase, of which follow nearness (1 in 0.40 m) times k = 2.9. A brain is a
-    function of its seed and of what it sees: no command may differ before telemetry does, and a fresh brain must
-    command the same at each of the 400 steps when it is given the telemetry of either run. The first difference is
-    explained by phase: telemetry comes within one tick (10 ms) of the other board's, set-points take hold within a
-    servo frame (20 ms): at 0.14 m/s 4.2 mm, less than two of the encoder's steps of 3.2 mm.
+    apart, so that two steps a turn may differ; else commands differ by what places do: 8.4 mm driven in a step and
+    4.2 mm by phase, times nearness (1 in 0.40 m) and k = 2.9. No command may differ before telemetry does, and a
+    fresh brain must command the same at each of 400 steps on the telemetry of either run. The first difference is
+    explained by phase: telemetry comes within one tick (10 ms), set-points take hold within a servo frame (20 ms):
+    at 0.14 m/s 4.2 mm, less than two of the encoder's steps of 3.2 mm.
     """
     measured: list[Measured] = []
     data: dict[str, list[float]] = {}

@@ -101,9 +101,9 @@ def at_the_true_pose(has_turret: bool, seed: int, progress: Progress) -> Outcome
 
     In the notes: section 6.3, equation (6.8)
 
-    Figure: Left: a scan in its map, by a laser or in 19 directions by a sonar on a turret. Right: the scan error. By
-    laser at 40 true poses with 1 % noise (dots), and at five with the simulated robot's own (squares); line: the share
-    of noise. By turret of each sweep at the true pose, and 0.1 m and 0.2 rad beside it.
+    Figure: Left: a scan in its map, by laser or in 19 directions by a sonar on a turret. Right: the scan error: by
+    laser at 40 true poses with 1 % noise (dots) and at five by the robot's own (squares); by turret at true poses,
+    and 0.1 m and 0.2 rad beside them.
 
     Expected: Without noise the error is none. With noise of 1 % it is the root mean square of up to 120 numbers of that
     deviation, known to 0.0006 or a little more; the mean of 40 is known to 0.0001, five of them are allowed. At most

@@ -172,10 +172,9 @@ def sequence(seed: int, progress: Progress) -> Outcome:
     Figure: Left: utilities of Stentor's five behaviors under a lasting disturbance, and which of them is active.
     Right: concentration X of the noxious substance.
 
-    Expected: The order of Fig. 7.4, with times found by Euler's method with steps of 1 ms, X first: so is it done
-    here. Later starts follow from short returns to feeding and feel the step; the last two of the exact solution,
-    which come 0.06 s later, stand beside them with the times that an independent integrator gives. The kit's chain,
-    by steps of 1 ms too, is compared with the exact solution.
+    Expected: The order of Fig. 7.4, with times found by Euler's method with steps of 1 ms, X first. Later starts
+    follow from short returns to feeding and feel the step; the last two of the exact solution, 0.06 s later, stand
+    beside them with the times of an independent integrator. The kit's chain is compared with the exact solution.
     """
     found, limit, chain = by_euler(), exact(), by_chain()
     expected = [(1, 0.0), (2, 0.24), (3, 0.61), (4, 1.15), (5, 2.07), (1, 2.82), (5, 2.85), (1, 3.62), (5, 3.64)]

@@ -121,10 +121,9 @@ def three_behaviors(seed: int, progress: Progress) -> Outcome:
     Below: the active one.
 
     Expected: The notes say: B1 most of the time, B3 around 21 s for around 2.5 s and around 27 s for less than 1 s,
-    B2 never. Parameters are not given; here w and b are chosen, and when z_2 is 1 follows from those times by the
-    closed solution of (8.4), with the mean of z_2's ripple and u_3 at rest before and after. Ripple, 0 to 0.1,
-    makes the rise up to 0.03 s and the fall up to 0.01 s sooner or later, a pulse that is over after 2.7 τ the fall
-    0.02 s sooner, and steps are 0.01 s: 0.1 s is allowed. All utilities are compared with (8.4) as an integral.
+    B2 never. w and b are chosen; when z_2 is 1 follows from those times by the closed solution of (8.4). Its
+    ripple, 0 to 0.1, moves the rise by up to 0.03 s and the fall by 0.01 s, a short pulse the fall by 0.02 s, and
+    steps are 0.01 s: 0.1 s is allowed. All utilities are compared with (8.4) as an integral.
     """
     step = 0.01
     times = np.arange(0, 50, step)

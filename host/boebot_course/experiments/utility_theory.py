@@ -136,13 +136,13 @@ def street(seed: int, progress: Progress) -> Outcome:
     In the notes: section 7.1, equations (7.6) to (7.9)
 
     Figure: Expected utility of crossing the street against the chance p to get across. Dots: mean of 20,000
-    crossings by chance. Dashed: what not crossing is worth to somebody who dares and to a cautious one; dotted:
-    where a robot with these utilities began to cross.
+    crossings. Dashed: what not crossing is worth to a daring and to a cautious one; dotted: where such a robot
+    began to cross.
 
     Expected: (7.6) and (7.9) by hand. The mean of n crossings at p = 0.2 is off by 15 √(0.2 · 0.8 / n) = 0.042 (1
     σ): four of them are allowed. A robot for which not crossing is worth -8.5 crosses where 15 p - 10 > -8.5, from
-    p = 0.1 on, and one for which it is worth -2.5 from p = 0.5 on: p grows by 0.05 in a second, and the brain's
-    step of 0.01 s and the utilities' lag of 0.02 s make it later by at most two steps and a lag.
+    p = 0.1 on, and one for which it is worth -2.5 from p = 0.5 on; the brain's step of 0.01 s and the utilities'
+    lag of 0.02 s make it later by at most two steps and a lag, p by 0.05 in a second.
     """
     source = np.random.default_rng([seed, 57])
     chances = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95])

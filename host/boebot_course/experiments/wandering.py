@@ -223,9 +223,8 @@ def wandering(setting: Setting, seed: int, progress: Progress) -> Outcome:
 
     Expected on shieldbot: Lengths of the arena 0.35 times ARSim's, as the robots' radii (0.07 m, 0.20 m). At motor
     signal 0.5 its servos run at 0.178 m/s tanh(200 · 0.5 / 78.5) = 0.152 m/s against 0.682 m/s, so that everything
-    takes 0.35 · 0.682 / 0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; turning on the spot
-    with 3.19 against 4.447 rad/s, stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike, and so is the
-    criterion.
+    takes 0.35 · 0.682 / 0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; it turns on the spot
+    with 3.19 against 4.447 rad/s: stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike.
     """
     done = trials(wanderer, setting, seed, progress)
 
