@@ -21,7 +21,7 @@ switch              the run's, of the step      of a brain of processes, JSON: w
 shown               the run's, of the step      JSON: what the brain shows from then on, by name
 sketch              the run's, of the step      JSON: what a layer of its sketches shows (`boebot.showing.Sketch`)
 intervention        the run's, of the step      JSON: what a person did before that step (boebot.running.hands)
-vehicle, movers     the run's, of the step      of a vehicle stepped by hand (sim_bridge.recorder)
+vehicle, movers     the run's, of the step      of a vehicle stepped by hand
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ from boebot.boards import Truth
 from boebot.description.robots import load_robot
 from boebot.record.record import Record
 from boebot.record.truth import lateness
+from boebot_course.recorder import Recorder
 from sim_bridge._core import ffi, lib
-from sim_bridge.recorder import Recorder
 from sim_bridge.sessions.opening import alone, truth_of
 from sim_bridge.sessions.without_board import DirectSession
 from sim_bridge.sim import Sim

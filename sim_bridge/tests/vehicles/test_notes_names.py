@@ -15,8 +15,8 @@ from shapely.geometry import LineString, Point
 from boebot.arenas import load_arena
 from boebot.arenas.rays import bearing_interval, ray_segment
 from boebot.errors import ArenaError, RobotError
+from boebot_course.recorder import Recorder
 from sim_bridge.motor import DCMotor
-from sim_bridge.recorder import Recorder
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, arsim
 from sim_bridge.view import View
