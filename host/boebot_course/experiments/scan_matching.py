@@ -74,7 +74,7 @@ def own_scan(pose: Pose, seed: int) -> Scan:
     return taken[0]
 
 
-TURRET_POSES = 8
+TURRET_ARENA, TURRET_POSES = "office", 8
 TURRET_MOST = 0.03
 
 
@@ -88,7 +88,7 @@ def turret_scan(pose: Pose, seed: int) -> Scan:
         if not sweeps and (sweep := scan(robot)) is not None:
             sweeps.append(sweep)
 
-    run(step, robot="shieldbot-turret", arena=ARENA, on="avr", pose=pose, seed=seed, seconds=5.0, record=False)
+    run(step, robot="shieldbot-turret", arena=TURRET_ARENA, on="avr", pose=pose, seed=seed, seconds=5.0, record=False)
     return sweeps[0]
 
 
@@ -149,7 +149,7 @@ def at_the_true_pose(has_turret: bool, seed: int, progress: Progress) -> Outcome
 
 
 def _by_turret(seed: int, progress: Progress) -> Outcome:
-    plan, chance = LineMap.of(ARENA), np.random.default_rng(seed)
+    plan, chance = LineMap.of(TURRET_ARENA), np.random.default_rng(seed)
     poses = poses_in(plan, chance, TURRET_POSES, 0.07)
     seeds = list(zip(poses, trial_seeds(seed, TURRET_POSES), strict=True))
     scans = [turret_scan(pose, one) for pose, one in with_progress(seeds, progress)]
@@ -167,7 +167,7 @@ def _by_turret(seed: int, progress: Progress) -> Outcome:
     def draw(figure: Figure) -> None:
         figure.set_figheight(4.0)
         left, right = figure.subplots(1, 2)
-        floor(left, floor_plan(load_arena(ARENA), 0.0, 0.0))
+        floor(left, floor_plan(load_arena(TURRET_ARENA), 0.0, 0.0))
         _draw_scan(left, scans[0], poses[0], "#0072b2")
         _draw_pose(left, poses[0], "#0072b2")
         numbers = range(1, TURRET_POSES + 1)
