@@ -15,11 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import Device
 from boebot.devices.infrared import InfraredProximity
 from boebot.devices.motor import RegulatedMotor
+from boebot.navigation import LineMap
 
 SMALL_RADIUS, SMALL_SPEED = 0.07, 0.17  # m, of a Boe-Bot; m/s at motor signal 1, of its servos
 NARROW_RAD = 0.3324  # directions of IR sensors that also see what lies ahead; arsim's own ±0.7854 rad leave it out
@@ -100,15 +102,17 @@ def arena_file(name: str, text: str) -> Iterator[Path]:
         yield path
 
 
-def scaled_arsim_arena(scale: float) -> str:
-    """Keys of ARSim's arena with its lengths times `scale`: walls, two pillars."""
-    wall, near_by, far = (f"{scale * length:.6g}" for length in (1.8, 0.7, 0.9))
-    near_to, far_to = f"-{near_by}", f"-{far}"
-    return f"""
-[[outline]]
-corners_m = [[-{wall}, -{wall}], [{wall}, -{wall}], [{wall}, {wall}], [-{wall}, {wall}]]
-[[obstacle]]
-corners_m = [[{far_to}, {near_by}], [{near_to}, {near_by}], [{near_to}, {far}], [{far_to}, {far}]]
-[[obstacle]]
-corners_m = [[{near_by}, {far_to}], [{far}, {far_to}], [{far}, {near_to}], [{near_by}, {near_to}]]
-"""
+@contextmanager
+def scaled_arena(name: str, scale: float) -> Iterator[str | Path]:
+    """A bundled arena with its lengths times `scale`, for as long as it is needed."""
+    if scale == 1:
+        yield name
+        return
+    plan = LineMap.of(name)
+    text = "".join(
+        f"[[{kind}]]\ncorners_m = {np.round(scale * shape, 9).tolist()}\n"
+        for kind, shapes in (("outline", plan.outlines), ("obstacle", plan.obstacles))
+        for shape in shapes
+    )
+    with arena_file(f"{name}-small", text) as path:
+        yield path

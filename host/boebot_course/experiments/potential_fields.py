@@ -7,8 +7,7 @@ long, and its encoders count.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -38,7 +37,7 @@ from boebot_course.experiment import (
 )
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
-from boebot_course.variants import arena_file, varied
+from boebot_course.variants import scaled_arena, varied
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -146,21 +145,6 @@ class World:
             arrival=ARRIVAL * self.scale,
             passing=PASSING * self.scale,
         )
-
-    @contextmanager
-    def arena(self, name: str) -> Iterator[str | Path]:
-        """A bundled arena in this size."""
-        if self.scale == 1:
-            yield name
-            return
-        plan = LineMap.of(name)
-        text = "".join(
-            f"[[{kind}]]\ncorners_m = {np.round(self.scale * shape, 9).tolist()}\n"
-            for kind, shapes in (("outline", plan.outlines), ("obstacle", plan.obstacles))
-            for shape in shapes
-        )
-        with arena_file(f"{name}-small", text) as path:
-            yield path
 
     def drive(
         self,
@@ -274,7 +258,7 @@ def among_pillars(make: Callable[[], World], seconds: float, seed: int, progress
     world = make()
     followers, trials = [], []
     starts = list(zip(STARTS, trial_seeds(seed, len(STARTS)), strict=True))
-    with world.arena("pillars") as arena:
+    with scaled_arena("pillars", world.scale) as arena:
         plan = LineMap.of(arena)
         for start, trial_seed in with_progress(starts, progress):
             followers.append(world.follower(CORNER, ROOM))
@@ -409,7 +393,7 @@ def past_the_wedge(make: Callable[[], World], seed: int, progress: Progress) -> 
     world, seconds = make(), 25.0
     ends = [(0.0, 0.0), *AROUND, (0.0, 0.0)]
     valleys = [world.size(valley) for valley in waypoints(ends)]
-    with world.arena("wedge") as arena:
+    with scaled_arena("wedge", world.scale) as arena:
         plan = LineMap.of(arena)
         keep = world.radius + 0.2 * world.scale
         lattice = Lattice.of(plan, world.radius, 0.2 * world.scale, 0.1 * world.scale)

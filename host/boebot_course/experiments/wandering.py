@@ -24,7 +24,7 @@ from boebot.view.painter import draw_robot
 from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
 from boebot_course.paths import draw_paths, floor
 from boebot_course.trials import Trial, trial_seeds, try_once
-from boebot_course.variants import arena_file, narrow_arsim, scaled_arsim_arena
+from boebot_course.variants import narrow_arsim, scaled_arena
 
 STEP = 0.01  # s, the notes'
 STEPS = 400_000
@@ -151,8 +151,7 @@ def _wander(setting: Setting) -> Wander:
 
 def trials(make: Make, setting: Setting, seed: int, progress: Progress) -> list[Trial]:
     """The setting's runs, each with its own brain and seed."""
-    with arena_file("arsim-small", scaled_arsim_arena(setting.scale)) as small:
-        arena = "arsim" if setting.scale == 1 else small
+    with scaled_arena("arsim", setting.scale) as arena:
         return [
             try_once(make(setting), setting.robot, arena, setting.seconds, on=setting.on, seed=trial_seed)
             for trial_seed in with_progress(trial_seeds(seed, setting.runs), progress)
