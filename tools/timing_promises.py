@@ -1,6 +1,5 @@
-"""What is promised of the timing of every bundled image, each a figure of its reports: held by the gate
-(hil_tests/test_timing_budgets.py), printed on the documentation's page and by the bench. What is promised of pulses and
-echoes shows at the pins (hil_tests/test_jitter.py)."""
+"""Promises about the timing of every bundled image, each a figure of its reports. The tests of `boebot_timing`
+hold them, the bench prints them. Pulses and echoes show at the pins (test_jitter.py there)."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ ROOMS = {
     "timing": Room(
         8,
         "host/avr_timing/|host/boebot_timing/",
-        "host/avr_timing/tests/test_*.py */test_timing*.py */tests/test_timing*.py hil_tests/test_jitter.py",
+        "host/avr_timing/tests/test_*.py host/boebot_timing/tests/test_*.py",
     ),
     "sim_bridge": Room(26, "sim_bridge/(?!fuzz)", "sim_bridge/tests/**/test_*.py"),
     "arenas": Room(8, "host/boebot/arenas/", "sim_bridge/tests/**/test_*.py"),

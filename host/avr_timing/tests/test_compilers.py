@@ -10,7 +10,7 @@ import pytest
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.flow.graph import load_program
 from boebot.errors import AnalysisError
-from hil_tests.test_timing_bounds import HEAD, measured
+from test_emulated import HEAD, measured
 
 # The input: r24 and r25 are `a`, r22 and r23 are `b`; r20 and r21 are `c`.
 PROGRAM = """

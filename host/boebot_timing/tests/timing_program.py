@@ -52,7 +52,7 @@ CONSTANTS = {
     "changes_due": 8,
     "changes_storm": 5,
 }
-FIRMWARE = Path(__file__).resolve().parents[2] / "firmware" / "src"
+FIRMWARE = Path(__file__).resolve().parents[3] / "firmware" / "src"
 
 
 def text(first_nops: int = 100, first_budget: int = 150, interrupt_budget: int = 40, reserve: int = 10) -> str:
