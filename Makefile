@@ -34,13 +34,13 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the search for the longest tasks (SEARCH_SECONDS=60), other compilers and emulators, tests with each protection left out, error rates"
+	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the search for the longest tasks, other compilers and emulators, tests with each protection left out, error rates"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
 	@echo "make experiments  all experiments of the notes, and a page of them, build/experiments/index.html"
 	@echo "make pictures  the pictures of the documentation, and the pages of experiments and of the timing"
-	@echo "make timing    the pages of the timing: table, bounds and measurements, a tick drawn to scale"
+	@echo "make timing    what the pages of the timing show: bounds and measurements, a tick drawn to scale"
 	@echo "make format    format all sources"
 	@echo "make setup     only what run, test and check need; do no more"
 	@echo "make clean     remove everything that was built"
@@ -71,15 +71,12 @@ experiments:
 	@$(VENV)/bin/boebot experiment --all --out build/experiments
 
 SECONDS ?= 3600
-SEARCH_SECONDS ?= 60
 SEEDS ?= 2 3 4 5 6 7 8 9 10
 soak: experiments
 	@$(SIDE_BY_SIDE) ready-soak
 	@failed=0; for seed in $(SEEDS); do echo "Experiments at seed $$seed"; \
 	  $(VENV)/bin/boebot experiment --all --seed $$seed --out build/experiments/seed-$$seed || failed=1; done; exit $$failed
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
-	@$(PYTHON_VENV) -m tools.timing_search --seconds $(SEARCH_SECONDS)
-	@$(PYTHON_VENV) -m tools.compilers
 	@$(PYTHON_VENV) -m tools.other_emulators
 	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
 	@PYTHONMALLOC=malloc tools/test_sanitized.sh
@@ -117,9 +114,9 @@ pictures:
 
 timing:
 	@$(SIDE_BY_SIDE) ready-run
-	@$(PYTHON_VENV) -m tools.timing_table --page docs/reference/timing-table.md
-	@$(PYTHON_VENV) -m tools.timing_page --page docs/reference/timing.md
-	@$(PYTHON_VENV) -m tools.shown_output docs/how-to/timing.md
+	@$(VENV)/bin/boebot timing --out build/timing >build/timing.log
+	@cp build/timing/timing.svg docs/images/timing.svg
+	@$(PYTHON_VENV) -m tools.shown_output docs/how-to/timing.md docs/reference/timing.md
 
 firmware: ready-firmware
 

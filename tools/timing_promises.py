@@ -5,11 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
-from boebot_timing.budget import Report
+from boebot_timing.budget import Report, prove_all
+from boebot_timing.emulated.measure import measure_image
+from boebot_timing.loads import LOADS
 from boebot_timing.measured import Measurement
 
 TICK = 160_000  # cycles
+
+
+def reports(elf: Path) -> dict[str, Report]:
+    """Of an image, measured as `boebot timing` does, under each load by its name."""
+    return prove_all(elf, LOADS, measure_image(elf, seconds=1.0, seed=1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ from boebot_timing.costs import Costs, costs
 from boebot_timing.firmware import Firmware, check, load_firmware
 from boebot_timing.loads import SLOT, Load
 from boebot_timing.measured import Measurement, Spans, as_json
+from boebot_timing.realisable import CLOCK_HZ, BoardTimes
 from boebot_timing.table import Table
 
 RAM_START, RAM_END = 0x100, 0x900  # data memory of the ATmega328P
@@ -156,6 +157,14 @@ class Report:
             return None
         begins = response(self.costs.loop + self.costs.round, self.sources)
         return None if begins is None else self.schedule.slot_cycles + begins
+
+    @property
+    def board_times(self) -> BoardTimes:
+        """For a step of the brain: by bounds; under overload by budgets."""
+        if self.responses is None:
+            return BoardTimes.of(self.table)
+        telemetry, frame = self.responses.pieces.get("telemetry", 0), self.taken or 0
+        return BoardTimes(self.table.sensors, telemetry / CLOCK_HZ, frame / CLOCK_HZ)
 
     @property
     def own(self) -> Measurement | None:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from boebot_timing.realisable import Verdict
 
 EXIT_BROKEN, EXIT_INPUT = 1, 2
-_CYCLES_PER_S = 16_000_000
 _SHORTEST_S, _LONGEST_S = 0.1, 3600.0  # of a scenario
 _HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
 
@@ -128,7 +127,7 @@ def timing(
                 found = budget.prove(image, asked, measured, maxima, progress=lambda share: watch(100 * share))
         brain_s, own_period = _brain(brain, step, description, seed)
         period_s = period if period is not None else own_period or DEFAULT_PERIOD
-        times = None if found is None else _board_times(found)
+        times = None if found is None else found.board_times
         verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
         distributions = _measured(True, image, seconds, seed) if jitter and image is not None else None
         answer = Answer(found, verdict, distributions)
@@ -246,16 +245,6 @@ def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, see
     if result.error is not None:
         raise result.error
     return result.longest_step or 0.0, loaded.period
-
-
-def _board_times(report: Report) -> Any:
-    """Of a board whose image was judged: bounds in place of budgets."""
-    from boebot_timing.realisable import BoardTimes
-
-    if report.responses is None:
-        return BoardTimes.of(report.table)
-    telemetry, frame = report.responses.pieces.get("telemetry", 0), report.taken or 0
-    return BoardTimes(report.table.sensors, telemetry / _CYCLES_PER_S, frame / _CYCLES_PER_S)
 
 
 def _write(answer: Answer, out: Path) -> list[Path]:

@@ -27,6 +27,7 @@ from boebot.running.driver import TICK_S, check_period, whole_ticks
 from boebot.running.tasks import Finding
 from boebot_timing.table import SensorRow, Table, read_table
 
+CLOCK_HZ = 16_000_000  # of the board
 TELEMETRY_BYTES = messages.Telemetry.LENGTH + FRAME_OVERHEAD
 COMMAND_BYTES = messages.SetpointSignal.LENGTH + FRAME_OVERHEAD
 BITS_PER_BYTE = 10  # 8N1
@@ -68,14 +69,14 @@ class BoardTimes:
     set_point_s: float = 0.0  # from the last byte of a set-point to its acceptance
 
     @classmethod
-    def of(cls, table: Table, cycles_per_second: int = 16_000_000) -> BoardTimes:
+    def of(cls, table: Table) -> BoardTimes:
         """By the budgets of an image's table: tasks up to telemetry's; those of the fullest slot, which go first."""
         names = [row.name for row in table.tasks]
         before = table.tasks[: names.index("telemetry") + 1] if "telemetry" in names else ()
         first = sum(row.budget for row in before if row.phase == 0)
         slots = range(max((row.period for row in table.tasks), default=1))
         fullest = max(sum(row.budget for row in table.tasks if slot % row.period == row.phase) for slot in slots)
-        return cls(table.sensors, first / cycles_per_second, fullest / cycles_per_second)
+        return cls(table.sensors, first / CLOCK_HZ, fullest / CLOCK_HZ)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,15 +9,16 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
 from boebot_timing import budget, loads
 from boebot_timing.emulated.loads import Bench
-from boebot_timing.emulated.measure import CLOCK_HZ, Run, run
+from boebot_timing.emulated.measure import Run, run
 from boebot_timing.emulated.scenarios import load, numbers_of, prepare
+from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_image
-from tools import timing_page
 from tools.avr_program import IMAGES
 from tools.bench.figures import Peer, figure
-from tools.timing_promises import PROMISES, Promise
+from tools.timing_promises import PROMISES, Promise, reports
 
 SECONDS = 1.0  # of the board's time
+_reports = functools.cache(reports)
 
 
 def _recorded(pin_map: str, scenario: str) -> Run:
@@ -59,13 +60,8 @@ for _scenario, _when in (("figures", " at the figures' load"), ("overload", ", o
     )(functools.partial(_speed, _scenario))
 
 
-@functools.cache
-def _reports(image: str) -> timing_page.Reports:
-    return timing_page.reports(image, timing_page.measured(image))
-
-
 def _reached(image: str, promise: Promise) -> float:
-    found = promise.figure(_reports(image)[promise.load])
+    found = promise.figure(_reports(avr_image(image))[promise.load])
     if found is None:
         raise BoebotError(f"{image}: {promise.what} is not known: overload")
     return found

@@ -25,6 +25,7 @@ from boebot_timing.emulated.scenarios import RANGES, SILENCE, STATES, load, numb
 from boebot_timing.emulated.watched import Circumstances, Watched, measurement, watched
 from boebot_timing.emulated.world_access import WorldAccess
 from boebot_timing.measured import Measurement, Worst, merged
+from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import FUNCTION_IDS
 from sim_bridge.boards.code_places import watchdog_resets
@@ -34,7 +35,6 @@ HANG = "hang"  # the load of the figures for HANGS_AFTER, then a task never retu
 HANGS_AFTER = 5 * TICK_CYCLES
 WATCHDOG = 6  # vector (data sheet, table 12-6)
 RESETS_WITHIN = 20 * TICK_CYCLES  # of the hang: the watchdog's 125 ms and the 16 ms after its interrupt
-CLOCK_HZ = 16_000_000
 DRAIN_TICKS = 3  # after a run, for what is under way
 RESTART = 0.3  # share of the search's runs that begin anew
 

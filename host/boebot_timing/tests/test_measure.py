@@ -13,9 +13,10 @@ from boebot.errors import BoardError
 from boebot.link.messages import Counters, Event, EventKind
 from boebot_timing.emulated.loads import SLOT_CYCLES, TICK_CYCLES, Bench
 from boebot_timing.emulated.losses import COUNTERS_TICKS, MASKED
-from boebot_timing.emulated.measure import CLOCK_HZ, HANG, WATCHDOG, Run, hang, measure, robot_of, run, search, span_at
+from boebot_timing.emulated.measure import HANG, WATCHDOG, Run, hang, measure, robot_of, run, search, span_at
 from boebot_timing.emulated.scenarios import RANGES, STATES, Numbers, load, numbers_of, prepare, seed_of
 from boebot_timing.measured import as_json, merged, statistics
+from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image

