@@ -34,7 +34,7 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the search for the longest tasks, other compilers and emulators, tests with each protection left out, error rates"
+	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the longest tasks of many seeds, other compilers and emulators, tests with each protection left out, error rates"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"

@@ -37,7 +37,7 @@ _HELP = """What the firmware may take, what it took, and whether that fits its b
 Times are cycles of 1/16 us. bound: the most that the machine code can take; emulator, board: the longest that was
 measured; slack: what the bound leaves of the budget; response: the latest end after a slot begins, interrupts included.
 
---out DIR writes the timing diagram, timing.png and timing.svg, and timing.json; with --jitter also the distributions.
+--out DIR writes the timing diagram, timing.png and timing.svg, and timing.json.
 
 Exit code: 0 all is well; 1 a budget or a limit is broken, or the robot is not realisable; 2 bad input, or an image
 whose timing is not known; 130 after Ctrl-C."""
@@ -257,9 +257,5 @@ def _write(answer: Answer, out: Path) -> list[Path]:
         from boebot_timing import diagram
 
         found |= diagram.files(answer.report, answer.verdict)
-    if answer.jitter is not None:
-        from boebot_timing import histograms
-
-        found |= histograms.files(answer.jitter.distributions)
     found["timing.json"] = (json.dumps(answer.as_dict(), indent=1) + "\n").encode()
     return [write_whole(out / name, partial(Path.write_bytes, data=data)) for name, data in found.items()]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -26,7 +25,6 @@ class Distribution:
     values: NDArray[np.int64] = field(repr=False)
     least: int | None = None
     most: int | None = None
-    subject: str = "boebot"  # whose firmware
 
     @property
     def count(self) -> int:
@@ -68,7 +66,7 @@ class Distribution:
         cycles = {f"{name}_cycles": value for name, value in said.items()}
         seconds = {f"{name}_s": None if value is None else value / CYCLES_PER_S for name, value in said.items()}
         ticks = {"max_ticks": None if said["max"] is None else said["max"] / CYCLES_PER_TICK}
-        texts = {name: getattr(self, name) for name in ("subject", "quantity", "meaning", "load")}
+        texts = {name: getattr(self, name) for name in ("quantity", "meaning", "load")}
         limits = {"least_cycles": self.least, "most_cycles": self.most}
         return {**texts, **limits, "count": self.count, **cycles, **seconds, **ticks, "broken": self.broken}
 
@@ -103,7 +101,6 @@ class JitterReport:
 
     distributions: tuple[Distribution, ...]
     losses: tuple[Losses, ...]
-    notes: tuple[str, ...] = ()  # what was not measured, and why
 
     @property
     def broken(self) -> list[Distribution]:
@@ -115,27 +112,4 @@ class JitterReport:
         return {
             "distributions": [one.summary() for one in self.distributions],
             "losses": [asdict(one) for one in self.losses],
-            "notes": list(self.notes),
         }
-
-
-def rows(distributions: Sequence[Distribution]) -> list[tuple[str, ...]]:
-    """A table for people, the first row its head; numbers in cycles, above 10,000 cycles in ms."""
-    head = ("quantity", "load", "count", "unit", "min", "p50", "p99", "max", "may be", "")
-    table: list[tuple[str, ...]] = [head]
-    for one in distributions:
-        numbers = (one.minimum, one.percentile(50), one.percentile(99), one.maximum)
-        limits = [number for number in (one.least, one.most) if number is not None]
-        large = max((abs(number) for number in (*numbers, *limits) if number == number), default=0.0) > 10_000.0
-        may = f"{_said(one.least, large)} .. {_said(one.most, large)}" if limits else ""
-        name = one.quantity if one.subject == "boebot" else f"{one.subject}: {one.quantity}"
-        said = (_said(number, large) for number in numbers)
-        unit, late = "ms" if large else "cycles", f"{one.broken} broken" if one.broken else ""
-        table.append((name, one.load, str(one.count), unit, *said, may, late))
-    return table
-
-
-def _said(cycles: float | None, large: bool) -> str:
-    if cycles is None or cycles != cycles:
-        return "-"
-    return f"{cycles / 16_000.0:.2f}" if large else f"{cycles:g}"

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -147,22 +146,15 @@ def show_verdict(verdict: Verdict) -> None:
 
 def show_jitter(report: JitterReport) -> None:
     """A table of distributions for each load; what broke its limit, and what was lost."""
-    from boebot_timing.distributions import rows
-
     console = output.console()
     for load in dict.fromkeys(one.load for one in report.distributions):
         found = [one for one in report.distributions if one.load == load]
-        head, *cells = ((row[0], *row[2:-1]) for row in rows(found))
         shown = _table(f"jitter and latency, {load}")
-        for title in head[1:]:
+        for title in ("count", "unit", "min", "p50", "p99", "max", "may be"):
             shown.add_column(title, justify="right", no_wrap=True)
-        for row, one in zip(cells, found, strict=True):
-            shown.add_row(*row, style=_BROKEN if one.broken else None)
+        for one in found:
+            shown.add_row(*_distribution(one), style=_BROKEN if one.broken else None)
         console.print(shown)
-    _show_broken(console, report)
-
-
-def _show_broken(console: Console, report: JitterReport) -> None:
     for one in report.broken:
         says = f"{one.quantity}, {one.load}: {one.broken} of {one.count} values are not {_limits(one)}"
         console.print(Text(f"broken: {says}", style=_BROKEN))
@@ -170,8 +162,20 @@ def _show_broken(console: Console, report: JitterReport) -> None:
         lost = [f"{number} {name.replace('_', ' ')}" for name, number in losses.counts.items() if number]
         says = f"{losses.load}: {', '.join(lost)}" if lost else f"{losses.load}: nothing was lost"
         console.print(Text(says, style="" if lost else _FINE))
-    for note in report.notes:
-        console.print(Text(f"note: {note}", style=_ASIDE))
+
+
+def _distribution(one: Distribution) -> list[str]:
+    """Numbers in cycles; where one is above 10,000 cycles, in ms."""
+    numbers = (one.minimum, one.percentile(50), one.percentile(99), one.maximum)
+    large = any(number is not None and abs(number) > 10_000 for number in (*numbers, one.least, one.most))
+
+    def said(cycles: float | None) -> str:
+        if cycles is None or cycles != cycles:
+            return "-"
+        return f"{cycles / 16_000:.2f}" if large else f"{cycles:g}"
+
+    may = f"{said(one.least)} .. {said(one.most)}" if (one.least, one.most) != (None, None) else ""
+    return [one.quantity, str(one.count), "ms" if large else "cycles", *map(said, numbers), may]
 
 
 def _limits(one: Distribution) -> str:

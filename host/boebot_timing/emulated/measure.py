@@ -1,14 +1,12 @@
-"""Measures an image in the emulator, the image untouched: runs scenarios, searches for the inputs that make each task
-longest, and shows a maximum again.
+"""Measures an image in the emulator, the image untouched.
 
 A run is a function of image, scenario, seed and length. What goes wrong in it is an error that names the place.
 """
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +19,12 @@ from boebot.link import messages
 from boebot_timing.emulated.line import Line
 from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Ping, PulseTrain
 from boebot_timing.emulated.losses import losses as losses_of
-from boebot_timing.emulated.scenarios import RANGES, SILENCE, STATES, load, numbers_of, prepare, seed_of
+from boebot_timing.emulated.scenarios import SILENCE, load, numbers_of, prepare
 from boebot_timing.emulated.watched import Circumstances, Watched, measurement, watched
 from boebot_timing.emulated.world_access import WorldAccess
-from boebot_timing.measured import Measurement, Worst, merged
+from boebot_timing.measured import Measurement, merged
 from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards import avr
-from sim_bridge.boards.avr import FUNCTION_IDS
 from sim_bridge.boards.code_places import watchdog_resets
 
 SCENARIOS = ("figures", "overload", "faults", "everything")
@@ -36,7 +33,6 @@ HANGS_AFTER = 5 * TICK_CYCLES
 WATCHDOG = 6  # vector (data sheet, table 12-6)
 RESETS_WITHIN = 20 * TICK_CYCLES  # of the hang: the watchdog's 125 ms and the 16 ms after its interrupt
 DRAIN_TICKS = 3  # after a run, for what is under way
-RESTART = 0.3  # share of the search's runs that begin anew
 
 Progress = Callable[[float], None]
 
@@ -183,75 +179,6 @@ def _lost(line: Line, wheels: list[list[PulseTrain]], scenario: str, after: dict
 def measure(image: Path, robot: RobotDescription, scenario: str, seconds: float, seed: int = 1) -> Measurement:
     """What one run of a scenario amounts to; see `run`."""
     return run(image, robot, scenario, seconds, seed).measurement()
-
-
-def span_at(image: Path, robot: RobotDescription, name: str, worst: Worst, seconds: float) -> dict[str, int]:
-    """Sees a maximum again: the span of task or interrupt `name` that begins at that cycle, as its record says it.
-
-    `seconds`: how long the run took in which it was found, at least.
-
-    Raises:
-        BoardError: there is none; and see `run`.
-    """
-    again = (
-        hang(image, robot, worst.seed)
-        if worst.scenario == HANG
-        else run(image, robot, worst.scenario, seconds, worst.seed, losses=False)
-    )
-    ids = {name: FUNCTION_IDS + i for i, name in enumerate(again.what.names)}
-    ids.update({name: vector for vector, name in again.what.vectors.items()})
-    found = again.spans[(again.spans["id"] == ids.get(name, -1)) & (again.spans["begin"] == worst.cycle)]
-    if len(found) != 1:
-        raise BoardError(f"{image.name}: no span of {name!r} begins in cycle {worst.cycle} of {worst}")
-    return {key: int(found[key][0]) for key in ("begin", "net", "gross", "latency")}
-
-
-def search(
-    image: Path,
-    robot: RobotDescription,
-    scenario: str,
-    *,
-    seconds: float,
-    runs: int,
-    seed: int = 1,
-    progress: Progress | None = None,
-) -> Measurement:
-    """Looks for the longest span of each task and interrupt: random restarts, and hill climbing over one number of the
-    scenario at a time from the best that is known of a task drawn at random. Returns the runs in which any was longer,
-    or an interrupt waited longer, than in all before.
-
-    Args:
-        seconds: of each run, of the board's time.
-        progress: called with the share of runs that are done, 0 to 1.
-    """
-    draw = random.Random(seed)
-    found: list[Measurement] = []
-    best: dict[str, tuple[int, int]] = {}  # name -> longest, seed
-    longest_wait: dict[str, int] = {}
-    for number in range(runs):
-        tried = seed if number == 0 else _next_seed(draw, best)
-        result = run(image, robot, scenario, seconds, tried, losses=False).measurement()
-        better = not found
-        for name, spans in {**result.tasks, **result.interrupts}.items():
-            if spans.largest > best.get(name, (0, 0))[0]:
-                best[name] = (spans.largest, tried)
-                better = True
-            if (wait := int(spans.latency.max(initial=0))) > longest_wait.get(name, 0):
-                longest_wait[name] = wait
-                better = True
-        if better:
-            found.append(result)
-        if progress:
-            progress((number + 1) / runs)
-    return merged(found)
-
-
-def _next_seed(draw: random.Random, best: dict[str, tuple[int, int]]) -> int:
-    if not best or draw.random() < RESTART:
-        return draw.randrange(STATES)
-    _, seed = best[draw.choice(sorted(best))]
-    name, size = draw.choice(list(RANGES.items()))
-    return seed_of(replace(numbers_of(seed), **{name: draw.randrange(size)}))
 
 
 def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | None = None) -> Measurement:

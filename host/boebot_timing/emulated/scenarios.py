@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import count
 from math import gcd, prod
 
@@ -64,7 +64,6 @@ RANGES = {
 STATES = prod(RANGES.values())
 GOLDEN = STATES * 6_180_339_887_498_948_482 // 10**19
 SPREAD = next(n for n in count(GOLDEN) if gcd(n, STATES) == 1)  # neighbouring seeds differ in all numbers
-BACK = pow(SPREAD, -1, STATES)
 
 
 def numbers_of(seed: int) -> Numbers:
@@ -73,14 +72,6 @@ def numbers_of(seed: int) -> Numbers:
     for name, size in RANGES.items():
         rest, values[name] = divmod(rest, size)
     return Numbers(**values)
-
-
-def seed_of(numbers: Numbers) -> int:
-    """The least seed that stands for those numbers."""
-    packed = 0
-    for field in reversed(fields(numbers)):
-        packed = packed * RANGES[field.name] + getattr(numbers, field.name)
-    return packed * BACK % STATES
 
 
 # ---- hosts -----------------------------------------------------------------------------------------------------------

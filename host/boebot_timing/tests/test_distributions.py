@@ -1,17 +1,14 @@
-"""Distributions of jitter and latency: their figures, the table, the picture."""
+"""Distributions of jitter and latency: their figures and the table."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
-import matplotlib.image
 import numpy as np
 import pytest
 
-from boebot.errors import BoebotError
-from boebot_timing.distributions import Distribution, JitterReport, Losses, rows
-from boebot_timing.histograms import draw
+from boebot_timing.distributions import Distribution, JitterReport, Losses
+from boebot_timing.shown import show_jitter
 
 
 def distribution(
@@ -36,7 +33,6 @@ def test_no_values_are_no_numbers_and_break_nothing() -> None:
     assert none.summary()["max_cycles"] is None
     report = JitterReport((none,), (Losses("figures", 0, 0, 0, 0, 0, 0, 0),))
     assert json.loads(json.dumps(report.as_json(), allow_nan=False))["distributions"][0]["count"] == 0
-    assert rows([none])[1][4:8] == ("-", "-", "-", "-")
 
 
 def test_each_kind_of_loss_counts() -> None:
@@ -46,28 +42,27 @@ def test_each_kind_of_loss_counts() -> None:
         assert Losses("saturated", *(int(other == number) for other in range(len(names)))).anything
 
 
-def test_table_says_cycles_or_milliseconds_and_broken_limits() -> None:
-    table = rows([distribution([0, 3], -2, 2), distribution([16_000, 32_000])])
-    assert table[1] == ("width", "figures", "2", "cycles", "0", "0", "3", "3", "-2 .. 2", "1 broken")
-    assert table[2][3:] == ("ms", "1.00", "1.00", "2.00", "2.00", "", "")
-
-
-@pytest.mark.parametrize("ending", ["png", "svg"])
-def test_picture_shows_every_quantity(tmp_path: Path, ending: str) -> None:
-    found = [distribution([0, 1, 2], -2, 2), distribution(list(range(0, 90_000, 7)), quantity="latency")]
-    path = draw(found, tmp_path / f"jitter.{ending}")
-    if ending == "png":
-        assert matplotlib.image.imread(path).shape[1] > 1000
-    else:
-        text = path.read_text(encoding="utf-8")
-        assert text.count("<!-- width -->") == text.count("<!-- latency -->") == 1
-        assert draw(found, tmp_path / "again.svg").read_text(encoding="utf-8") == text
-
-
-def test_picture_that_cannot_be_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BoebotError, match="expected one value"):
-        draw([distribution([])], tmp_path / "jitter.png")
-    with pytest.raises(BoebotError, match=r"\.svg"):
-        draw([distribution([1])], tmp_path / "jitter.bmp")
-    with pytest.raises(BoebotError, match="cannot be written"):
-        draw([distribution([1])], tmp_path / "nowhere" / "jitter.png")
+def test_table_says_cycles_or_milliseconds_and_broken_limits(capsys: pytest.CaptureFixture[str]) -> None:
+    found = (distribution([0, 3], -2, 2), distribution([16_000, 32_000], quantity="delay"), distribution([]))
+    show_jitter(JitterReport(found, (Losses("figures", 0, 0, 2, 0, 0, 0, 0),)))
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["width", "2", "cycles", "0", "0", "3", "3", "-2", "..", "2"] in lines
+    assert ["delay", "2", "ms", "1.00", "1.00", "2.00", "2.00"] in lines
+    assert ["width", "0", "cycles", "-", "-", "-", "-"] in lines
+    assert [
+        "broken:",
+        "width,",
+        "figures:",
+        "1",
+        "of",
+        "2",
+        "values",
+        "are",
+        "not",
+        "from",
+        "-2",
+        "to",
+        "2",
+        "cycles",
+    ] in lines
+    assert ["figures:", "2", "edges"] in lines
