@@ -230,7 +230,7 @@ def text(main: Sequence[str], f: Sequence[str], handlers: Sequence[tuple[int, bo
     return f"{VECTORS}main:\n{''.join(main)} rjmp main\n{functions}{''.join(bodies)}__vector_{len(handlers)}:\n{last}"
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(piece, min_size=1, max_size=7),
     st.lists(piece.filter(lambda each: " f\n" not in each), max_size=3),

@@ -220,7 +220,7 @@ body = st.lists(piece, max_size=4).map("".join)
 main = st.lists(st.sampled_from([NOP, NOP * 3, " cli\n" + NOP * 8 + " sei\n"]), min_size=1, max_size=4).map("".join)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(main, st.lists(body, min_size=3, max_size=3), st.lists(st.integers(120, 700), min_size=3, max_size=3),
        st.integers(60, 200), st.integers(0, 1 << 30))  # fmt: skip
 def test_no_byte_waits_longer(

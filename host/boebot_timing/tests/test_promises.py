@@ -33,7 +33,14 @@ PLANTED = 200  # cycles
 FARTHER = 1  # cycle: what follows moves by 400 bytes, and a jump over more than 4 KB takes so much longer
 
 
-@pytest.fixture(scope="module", params=list(avr_program.IMAGES))
+# The fullest and the barest; the others differ in single devices.
+JUDGED = [
+    pytest.param(name, marks=() if name in ("shieldbot-quad", "shieldbot-basic") else pytest.mark.soak)
+    for name in avr_program.IMAGES
+]
+
+
+@pytest.fixture(scope="module", params=JUDGED)
 def judged(request: pytest.FixtureRequest) -> dict[str, Report]:
     """A bundled image under each load."""
     return reports(avr_image(request.param))
