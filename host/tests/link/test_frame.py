@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import struct
 import sys
 from pathlib import Path
@@ -13,8 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.link import frame, messages
+from boebot.link.frame import reader, text
 
-PROTOCOL = Path(__file__).resolve().parents[2] / "protocol"
+PROTOCOL = Path(__file__).resolve().parents[3] / "protocol"
 sys.path.insert(0, str(PROTOCOL))
 
 import reference_frame  # noqa: E402
@@ -409,3 +411,18 @@ def test_hello_of_the_same_session_counts_like_any_other_frame() -> None:
     receiver.feed(frame.encode(HELLO, 10, hello(1, 7)))
     receiver.feed(frame.encode(HELLO, 14, hello(1, 7)))
     assert receiver.lost == 3
+
+
+@pytest.mark.parametrize("kind", [kind for kind in messages.MESSAGES.values() if kind._fields])
+def test_each_field_is_read_as_unpacking_all_of_them_does(kind: type[messages.Message]) -> None:
+    payload = random.Random(kind.ID).randbytes(kind.LENGTH)
+    whole = kind.unpack(payload)
+    for name, value in zip(kind._fields, whole, strict=True):
+        assert reader(kind, name)(payload) == (value,)
+    assert reader(kind, *kind._fields)(payload) == tuple(whole)
+
+
+def test_a_field_that_a_message_has_not_is_named() -> None:
+    with pytest.raises(ValueError, match="message telemetry has no field tock"):
+        reader(messages.Telemetry, "tick", "tock")
+    assert text(b"boebot\0\0rest") == "boebot"

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Iterator
 
 import pytest
 from channel import Latency, none, uniform
+from wire import Wire, clock_on, probes_in
 
+from boebot.link import messages
 from boebot.link.clock import DRIFT_LIMIT, BoardClock
+from boebot.link.line import NEVER
 
 BYTE_S = 2e-5
 PROBE_S, ANSWER_S, TELEMETRY_S = 10 * BYTE_S, 14 * BYTE_S, 45 * BYTE_S  # on the line, one delimiter counted
@@ -178,3 +182,54 @@ def test_bounds_that_meet_in_a_point_pile_up_no_corners() -> None:
         clock.observe(board_us, now_s + TELEMETRY_S + 1e-4)
         most = max(most, *(len(polygon) for polygon in clock._polygons))
     assert 3 <= most <= 24
+
+
+# ---- probes ----------------------------------------------------------------------------------------------------------
+
+
+def test_probes_are_irregular_and_often_enough_for_the_session() -> None:
+    wire = Wire()
+    clock = clock_on(wire)
+    dues = [0.0]
+    for _ in range(500):
+        dues.append(clock.service(dues[-1], 0.2))
+        assert clock.service(dues[-1] - 1e-6, 0.2) == dues[-1], "none before its time"
+    waits = [later - earlier for earlier, later in itertools.pairwise(dues)]
+    assert max(waits) <= 0.05 and len(set(waits)) > 400
+    assert len(clock._waiting) == 64
+
+
+def test_probe_tokens_roll_over() -> None:
+    wire = Wire()
+    clock = clock_on(wire)
+    clock.begin(0.0, 0, 0.0)
+    clock._token = 0xFFFF - 2
+    due, tokens = 0.0, list[int]()
+    for _ in range(5):
+        wire.time = due
+        due = clock.service(due, 1.0)
+        (token,) = probes_in(wire)
+        tokens.append(token)
+        clock.receive(messages.ClockAnswer(token, round(wire.time * 1e6) + 500).pack(), wire.time + 0.001)
+        clock.receive(messages.ClockAnswer(token, 0).pack(), wire.time + 0.9)  # a copy
+    assert tokens == [0xFFFE, 0xFFFF, 0, 1, 2]
+    assert clock.estimate.probes == 5 and clock.round_trips.longest() == pytest.approx(0.001)
+    assert (
+        clock.estimate.bounded
+        and abs(clock.estimate.observe(round(wire.time * 1e6), wire.time + 0.001)[1] - wire.time) < 600e-6
+    )
+
+
+def test_clock_begins_anew_with_a_session_and_with_another_rate() -> None:
+    wire = Wire()
+    clock = clock_on(wire)
+    clock.begin(7.0, 7_000_123, 0.0)
+    assert clock.began_us == 7_000_123
+    clock.session_ended()
+    assert clock.began_us is None and clock.service(9.0, 1.0) == NEVER
+    estimate = clock.estimate
+    clock.session_opened(1.0)
+    assert clock.estimate is estimate and not estimate.known
+    clock._line.known_byte_s = 1e-4
+    clock.session_opened(2.0)
+    assert clock.estimate is not estimate
