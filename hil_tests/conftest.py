@@ -24,9 +24,10 @@ def boards(config: pytest.Config) -> list[str]:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "board_url" in metafunc.fixturenames:
-        long = metafunc.definition.get_closest_marker("soak_on_avr") is not None
         urls = [
-            pytest.param(url, marks=pytest.mark.soak if long and url == "avr" else ())
+            pytest.param(
+                url, marks=pytest.mark.soak if metafunc.definition.get_closest_marker(f"soak_on_{url}") else ()
+            )
             for url in boards(metafunc.config)
         ]
         metafunc.parametrize("board_url", urls, scope="session")

@@ -575,6 +575,7 @@ def test_clock_probe_is_answered_between_its_sending_and_its_return(host: Host) 
 # ---- load ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.soak_on_native
 @pytest.mark.parametrize("setpoint", ["signals", "speeds"])
 def test_line_that_is_too_full_drops_whole_frames_and_misses_no_tick(host: Host, setpoint: str) -> None:
     """Set-points and clock probes without a gap, 50,000 bytes/s, with answers and telemetry on the way back."""
@@ -598,6 +599,7 @@ def test_line_that_is_too_full_drops_whole_frames_and_misses_no_tick(host: Host,
     assert host.refused == 0
 
 
+@pytest.mark.soak_on_native
 @pytest.mark.parametrize("setpoint", ["signals", "speeds"])
 def test_line_full_of_set_points_misses_no_tick(host: Host, setpoint: str) -> None:
     kind = SIGNAL if setpoint == "signals" else SPEED

@@ -11,6 +11,7 @@ from hil_tests.paths import cells_visited, windows_moved
 pytestmark = pytest.mark.emulated
 
 
+@pytest.mark.soak_on_avr
 @pytest.mark.parametrize("seed", [1, 2])
 def test_wander_keeps_moving_for_a_minute(board_url: str, seed: int) -> None:
     result = boebot.run("wander", on=board_url, seconds=60, seed=seed)
@@ -31,6 +32,7 @@ def test_wander_visits_half_of_its_arena_in_five_minutes(board_url: str) -> None
     assert np.mean(shares) >= 0.5, shares
 
 
+@pytest.mark.soak_on_avr
 def test_brain_that_does_nothing_fails_both_measures(board_url: str) -> None:
     result = boebot.run(lambda robot: None, on=board_url, seconds=20)
     assert result.truth is not None

@@ -118,6 +118,7 @@ def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -
         assert len(spared[0] | spared[1]) >= SAVED_BYTES - 2, "the cuts did not meet every cell"
 
 
+@pytest.mark.soak_on_avr
 def test_power_cut_in_the_boot_counter(board: BoardAccess) -> None:
     """Started again and again, cut in mid-write: it goes up by one or stays, and never anything else."""
     board.eeprom_damage(Damage.GARBAGE, garbage=0xA5)

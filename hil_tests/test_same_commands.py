@@ -24,6 +24,7 @@ def test_commands_differ_no_sooner_than_telemetry(board_url: str, name: str) -> 
     assert max(abs(a[0] - b[0]) for a, b in steps) <= 1
 
 
+@pytest.mark.soak_on_avr
 def test_whole_runs_along_walls_are_alike(board_url: str) -> None:
     """E68's brain that its readings pull back: 60 s on both boards, step by step."""
     measured = judge_walls([along_walls(on, seed=1) for on in ("native", board_url)])

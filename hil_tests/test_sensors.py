@@ -114,6 +114,7 @@ MANY = [Noise(p, h, (16, 17)) for p, h in ((160, 80), (200, 8), (400, 200))]
 QUAD = [Noise(p, h, (14, 15, 16, 17), "shieldbot-quad") for p, h in ((160, 80), (266, 8), (400, 200))]
 
 
+@pytest.mark.soak_on_native
 @pytest.mark.parametrize("noise", SQUARE + SPIKES + MANY + QUAD, ids=str)
 def test_noise_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, noise: Noise) -> None:
     """With the UART saturated both ways: no tick missed, pulses exact to a microsecond, the noise reported. Bytes may

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
 import signal
 import socket
@@ -160,7 +159,9 @@ def test_host_that_slept_ends_its_run_when_it_wakes(native_pty: str, tmp_path: P
     )
 
 
-@pytest.mark.parametrize("where", [("--pty",), ("--tcp", "0")], ids=["pty", "tcp"])
+@pytest.mark.parametrize(
+    "where", [("--pty",), pytest.param(("--tcp", "0"), marks=pytest.mark.soak)], ids=["pty", "tcp"]
+)
 def test_no_byte_is_lost_beside_a_brain_that_computes(where: tuple[str, ...], tmp_path: Path) -> None:
     """Its steps take 100 ms at a telemetry of 10 ms, and another of its threads never rests: what comes meanwhile waits
     in the operating system's buffer of 4 KB, which telemetry and the other messages fill in half a second."""
@@ -205,6 +206,7 @@ def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp
     assert (tmp_path / "replay.html").is_file()
 
 
+@pytest.mark.soak
 def test_suite_runs_on_a_board_behind_a_port(native_pty: str) -> None:
     """Some of what needs no pins, here against a served robot; what needs them is left out."""
     root = Path(__file__).resolve().parents[1]
@@ -246,14 +248,3 @@ def test_taken_tcp_port_is_one_sentence() -> None:
         done = boebot("serve", "--on", "native", "--tcp", str(taken.getsockname()[1]))
     assert done.returncode == 1
     assert len(done.stderr.strip().splitlines()) == 1 and "cannot be opened" in done.stderr
-
-
-def test_silent_port_is_said_to_be_silent() -> None:
-    master, slave = os.openpty()
-    try:
-        done = boebot("info", os.ttyname(slave))
-    finally:
-        os.close(master)
-        os.close(slave)
-    assert done.returncode == 1
-    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
