@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import re
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -818,3 +820,13 @@ def test_same_run_twice_is_the_same_to_the_last_byte() -> None:
         link, _, _ = open_link(channel=Channel(trace=trace))
         listen(link, 2.0)
     assert traces[0] == traces[1] and len(traces[0]) > 200
+
+
+def test_the_link_is_imported_on_every_system() -> None:
+    """A port is not before one is opened, with what only POSIX has."""
+    script = (
+        "import sys\n"
+        "for name in ('fcntl', 'grp', 'pty', 'serial', 'termios', 'tty'):\n    sys.modules[name] = None\n"
+        "import boebot.boards, boebot.link.link\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
