@@ -146,38 +146,26 @@ def _looks_like_frame(piece: bytes) -> bool:
     return _is_frame(piece) or _has_checksum(piece) or _is_damaged_frame(piece)
 
 
+def _checks(piece: bytes) -> int:
+    """How many of its three check bytes look like some, where id and length are those of a message to the host; else
+    0. Such a frame is one block of COBS: the id stands behind its code byte."""
+    kind = messages.MESSAGES.get(piece[1])
+    if kind is None or kind.ID < 0x80 or len(piece) != kind.LENGTH + _SHORTEST:
+        return 0
+    return sum(byte >= 0x80 for byte in piece[-_CHECK_BYTES:])
+
+
 def _is_frame(piece: bytes) -> bool:
-    """Whether it unstuffs to an id and a length of the table, whatever the session's seed."""
-    if any(byte < 0x80 for byte in piece[-_CHECK_BYTES:]):
+    """Whether id, length and check bytes are a message's to the host, whatever the session's seed."""
+    if _checks(piece) < _CHECK_BYTES:
         return False
-    stuffed = piece[:-_CHECK_BYTES]
-    content = bytearray()
-    at = 0
-    while at < len(stuffed):
-        code = stuffed[at]
-        content += stuffed[at + 1 : at + code]
-        at += code
-        if at < len(stuffed):
-            content.append(0)
-    if at != len(stuffed) or len(content) < 2:
-        return False
-    kind = messages.MESSAGES.get(content[0])
-    if kind is None or content[0] < 0x80 or len(content) - 2 != kind.LENGTH:
-        return False
-    return kind.DELIVERY != "handshake" or _has_checksum(piece)
+    return messages.MESSAGES[piece[1]].DELIVERY != "handshake" or _has_checksum(piece)
 
 
 def _is_damaged_frame(piece: bytes) -> bool:
-    """Whether id, length and check bytes are a message's to the host, but for one byte of the check: so it looks where
-    a line spoils some bytes, and hardly ever where the rate is wrong."""
-    kind = messages.MESSAGES.get(piece[1])
-    return (
-        kind is not None
-        and kind.ID >= 0x80
-        and len(piece) == kind.LENGTH + _SHORTEST
-        and sum(byte >= 0x80 for byte in piece[-_CHECK_BYTES:]) >= _CHECK_BYTES - 1
-        and not _is_frame(piece)
-    )
+    """The same but for one byte of the check: so it looks where a line spoils some bytes, and hardly ever where the
+    rate is wrong."""
+    return _checks(piece) >= _CHECK_BYTES - 1 and not _is_frame(piece)
 
 
 def _spoilt(where: str, limit_s: float, damaged: int, frames: int) -> BoardError:
