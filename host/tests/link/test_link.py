@@ -12,70 +12,19 @@ from types import SimpleNamespace
 
 import pytest
 from channel import Channel, uniform
+from linked import Recorded, listen, newest_tick, open_link, sent, sent_kinds, tick_of
 
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import finding, messages
-from boebot.link.counters import HostCounters
 from boebot.link.errors import LatchedAgainError, SessionLostError, TakenOverError
 from boebot.link.frame import encode, text
 from boebot.link.link import Link
-from boebot.record.record import Record
 from boebot_timing.board import measure
 from peer import InProcess, Peer, without
 
 Latch = messages.Latch
 ROUND_S = 0.04 * (len(messages.Task) + 1)
 """In which the time of each task and the counters come once, one of them with every fourth telemetry."""
-
-
-def open_link(
-    peer: Peer | None = None, channel: Channel | None = None, **options: object
-) -> tuple[Link, Peer, InProcess]:
-    """A link with an open session, its board, and the channel between them."""
-    peer = peer or Peer()
-    session = InProcess(peer, channel)
-    link = Recorded(session, **options)
-    link.open()
-    return link, peer, session
-
-
-class Recorded(Link):
-    """A link that keeps what it sends."""
-
-    def __init__(self, session: InProcess, **options: object) -> None:
-        self.memory = Record()
-        super().__init__(session, self.memory.append, **options)  # type: ignore[arg-type]
-
-
-def sent(link: Link) -> list[tuple[float, bytes]]:
-    """(time, frame) of all that a recorded link has sent."""
-    assert isinstance(link, Recorded)
-    return list(link.memory.rows("to_board"))
-
-
-def sent_kinds(link: Link) -> list[str]:
-    """Names of the messages that the host sent."""
-    return [messages.MESSAGES[frame[2]].NAME for _, frame in sent(link)]
-
-
-def tick_of(payload: bytes) -> int:
-    """Of a telemetry message."""
-    return messages.Telemetry.unpack(payload).tick
-
-
-def listen(link: Link, seconds: float) -> list[int]:
-    """Lets time pass; the ticks of the telemetry that came."""
-    end = link.transport.now() + seconds
-    ticks: list[int] = []
-    while link.transport.now() < end - 1e-9:
-        ticks += [tick_of(payload) for payload, *_ in link.poll(end - link.transport.now())]
-    return ticks
-
-
-def newest_tick(link: Link) -> int:
-    """Of the telemetry that has come."""
-    assert link.telemetry.latest is not None
-    return tick_of(link.telemetry.latest)
 
 
 # ---- handshake -------------------------------------------------------------------------------------------------------
@@ -458,65 +407,6 @@ def test_slow_line_is_not_flooded_with_retries() -> None:
     assert link.counters().retransmitted == before
 
 
-@pytest.mark.parametrize("value", [1, 251, -5, float("nan"), float("inf")])
-def test_parameter_out_of_range_is_refused_before_it_is_sent(value: float) -> None:
-    link, peer, _ = open_link()
-    with pytest.raises(BoebotError, match=r"infrared_period cannot be .* ticks; expected 2 to 250"):
-        link.parameters.set("infrared_period", value)
-    assert peer.carried_out == []
-
-
-def test_unknown_parameter_is_named() -> None:
-    link, _, _ = open_link()
-    with pytest.raises(BoebotError, match="no parameter 'speed'; expected one of devices"):
-        link.parameters.get("speed")
-
-
-def test_parameter_travels_in_its_unit() -> None:
-    link, peer, _ = open_link()
-    assert link.parameters.set("servo_left_centre", 1499.5) == 1499.5
-    assert peer.parameter("servo_left_centre") == 23992
-    assert link.parameters.get("servo_left_centre") == 1499.5
-
-
-def test_parameters_are_saved_and_reset() -> None:
-    link, peer, session = open_link()
-    link.parameters.set("ping_period", 9)
-    begun = session.now()
-    link.parameters.save()
-    assert session.now() - begun >= 0.2, "answered when it is written"
-    assert peer.saved is not None
-    link.parameters.reset()
-    assert link.parameters.get("ping_period") != 9
-    peer.reset()
-    listen(link, 0.1)
-    assert link.parameters.get("ping_period") == 9 and link.open().parameters_saved == 1
-
-
-def test_board_that_is_busy_writing_is_asked_again() -> None:
-    link, peer, session = open_link()
-    saving = link.submit(messages.SaveParameters, what="save", limit_s=5.0)
-    listen(link, 0.005)
-    request = link.submit(messages.GetParameter, 7, what="send it")
-    listen(link, 0.1)
-    assert not saving.done and not request.done, "one at a time"
-    listen(link, 0.2)
-    assert saving.done and request.done
-    peer._saving_until = session.now() + 0.2
-    assert link.parameters.set("ping_period", 9) == 9
-    assert peer._saving_until is None
-
-
-@pytest.mark.parametrize(
-    ("status", "reason"), [(messages.AnswerStatus.OUT_OF_RANGE, "out of range"), (99, "unknown 99")]
-)
-def test_board_that_refuses_a_parameter_is_believed(status: int, reason: str) -> None:
-    link, peer, _ = open_link()
-    peer._set = lambda message, saving: (status, 0)  # type: ignore[method-assign]
-    with pytest.raises(BoardError, match=f"refuses parameter devices: {reason}"):
-        link.parameters.set("devices", 3)
-
-
 # ---- arming and stop -------------------------------------------------------------------------------------------------
 
 
@@ -699,11 +589,6 @@ def test_telemetry_thinner_than_its_parameter_is_reported(line_ticks: int, param
     assert link.notices == ([notice] if line_ticks > parameter else [])
 
 
-def test_both_ends_count_by_the_same_names() -> None:
-    same = {"good", "bad", "unknown", "resynchronised", "retransmitted", "duplicate", "overrun", "dropped", "late"}
-    assert same == set(HostCounters().as_dict()) & set(messages.Counters._fields)
-
-
 def test_stops_without_a_host_are_reported_in_the_next_session() -> None:
     """The host sleeps in mid-drive: dead-man, end of the session. Both come with their times, once, and are earlier."""
     link, peer, session = open_link()
@@ -732,13 +617,6 @@ def test_stops_without_a_host_are_reported_in_the_next_session() -> None:
     assert [(event.value, event.earlier) for event in link.events.fetch()] == [(messages.Latch.NONE, False)]
 
 
-def test_overruns_are_those_that_the_transport_knows_of() -> None:
-    link, _, session = open_link()
-    assert link.counters().overrun == 0
-    session.overruns = 7  # type: ignore[attr-defined]
-    assert link.counters().overrun == 7
-
-
 @pytest.mark.parametrize("first_tick", [0, 0xFFFF - 50, 0xFFFFFFFF - 50])
 def test_ticks_roll_over(first_tick: int) -> None:
     peer = Peer()
@@ -751,21 +629,6 @@ def test_ticks_roll_over(first_tick: int) -> None:
         link.send_signal(0.1, 0.1, 250, newest_tick(link))
     listen(link, 0.02)
     assert len(peer.accepted) >= 98 and peer.counts["late"] <= 2
-
-
-def test_board_counters_are_unwrapped() -> None:
-    link, peer, _ = open_link()
-    peer.counts["late"] = 65500
-    listen(link, ROUND_S)
-    peer.counts["late"] = 65536 + 20
-    listen(link, ROUND_S)
-    assert link.board_counters.values["late"] == 65556
-    before = link.board_counters.values["late"]
-    peer.reset()
-    listen(link, 0.1)
-    peer.counts["late"] = 3
-    listen(link, ROUND_S)
-    assert link.board_counters.values["late"] == before + 3
 
 
 def test_longest_times_of_tasks_are_those_of_this_session() -> None:
