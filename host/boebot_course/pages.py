@@ -46,7 +46,7 @@ def page(chapter: str, experiments: Iterable[Experiment], measured: Mapping[str,
         parts += [
             f"{capital('computed' if one.robot == 'none' else one.robot)}. {plain(one.criterion)}",
             f"![{one.name}]({one.name}.png)",
-            "\n".join(["figure | measured (expected)", "---|---", *map(row, measured.get(one.name, ()))]),
+            "\n".join(["figure | measured", "---|---", *map(row, measured.get(one.name, ()))]),
         ]
     return "\n\n".join(parts) + "\n"
 
@@ -80,7 +80,7 @@ def listing(experiments: Iterable[Experiment]) -> str:
     return (
         "# Experiments\n\n"
         "Each shows something that the lecture notes say. `boebot experiment NAME` runs one, with `--on ROBOT` on\n"
-        "another robot or board. It prints what was measured against what was expected, and leaves NAME.png and\n"
+        "another robot or board. It prints what was measured and expected, here in brackets, and leaves NAME.png and\n"
         "NAME.svg, the figure; NAME.csv, its data, with units in the columns' names and an empty cell where there is\n"
         "no number; and NAME.json, the verdict. The same seed gives the same bytes. The exit code is 0 when all is\n"
         "met.\n\n"

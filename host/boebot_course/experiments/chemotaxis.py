@@ -277,7 +277,7 @@ def trap(seed: int, progress: Progress) -> Outcome:
     In the notes: section 4.4.2, Fig. 4.2
 
     Figure: The same bacteria, but they do not run after a tumble unless U > 0: those whose utility has fallen to
-    zero stay for ever.
+    zero stay.
 
     Expected: With T = 0 a tumble never ends: at most 1 % of the steps are runs, the mean distance stays (± 5 %).
     """

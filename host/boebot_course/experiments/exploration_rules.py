@@ -127,8 +127,8 @@ def moving_on(seed: int, progress: Progress) -> Outcome:
     Figure: Thin circle: the robot. Double circle: target; circle: pending; disc: completed; square: unreachable.
     Hatched: a low block that the laser does not see. Lines: paths from the robot's node.
 
-    Expected: The paths are worked out by hand by the rule of the notes' examples: from the new node back to the one
-    where both paths part, and on from there.
+    Expected: Worked out by hand by the notes' rule: from the new node back to the one where both paths part, and on
+    from there.
     """
     panels = walked()
     first, *later = panels

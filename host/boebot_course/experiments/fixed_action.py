@@ -140,11 +140,10 @@ def pattern(robot: str, at: tuple[float, float, float], seed: int, progress: Pro
 
     Expected: Commands are the same without the stimulus; the pattern lasts as long as its parts, ± 3 steps.
 
-    Expected on shieldbot: The turn lasts as long as 120 degrees take on shieldbot, at 3.20 rad/s by its servos' curve.
-    Commands and pulses follow from the brain's steps alone: none may differ. Each of three actions ends at the first
-    step of the brain, every 0.02 s, after its time. The wheels' lag is the same as the turn begins and ends; servos
-    differ by 2.5 % of top speed and 3 % by direction, the mean of two by 2.8 %: three times that, and up to two steps
-    more of 0.02 s, 7 degrees: 120 degrees ± 17.
+    Expected on shieldbot: The turn lasts as long as 120 degrees take at 3.20 rad/s by the servos' curve. Commands
+    and pulses follow from the brain's steps alone: none may differ. Each of three actions ends at the first step,
+    every 0.02 s, after its time. Servos differ by 2.5 % of top speed and 3 % by direction, the mean of two by 2.8
+    %: three times that, and up to two steps more, 7 degrees: 120 degrees ± 17.
     """
     both = stays, gone = [run_escape(robot, at, one, seed) for one in (True, False)]
     measured = compare(stays, gone, escape(robot).duration)

@@ -462,7 +462,7 @@ def tightening(seed: int, progress: Progress) -> Outcome:
 
     Expected: On a lattice of 8 neighbours a way is longer than the straight one by |cos| + (√2 - 1) |sin| of its
     direction within 45 degrees, 5.5 % in the mean: a tightened path is at least 2 % shorter in the mean, and keeps
-    the robot's radius and margin everywhere.
+    radius and margin everywhere.
     """
     plan = LineMap.of(ARENA)
     whole = Lattice.of(plan, RADIUS, MARGIN + DIP, CELL)

@@ -160,11 +160,11 @@ def cataglyphis(on: str | None, seed: int, progress: Progress) -> Outcome:
 
     Expected: After 200 m the home vector is at most 0.4 m off in the mean, 0.05 m without noise; search: 0.1 m.
 
-    Expected on shieldbot: The way is 20 m, a tenth of the notes' as its speed is. Iron, 0.3 of the earth's field, would
-    bend headings by 0.3 rad and lead astray by 0.3 / 2 of the way, 3 m; turning on the spot measures it, by 120
-    readings of 0.01 each, to 0.0013 of the field: 0.0013 / 2 × 20 m = 0.013 m is left. Some 400 reversals of a wheel
-    miscount an edge of 3.25 mm each, at headings by chance: √400 × 3.25 mm / 2 = 0.033 m. Compass noise of 0.01 rad
-    each 6 mm: 0.004 m. Together 0.036 m; three times that and the 0.1 m at which the search begins: 0.21 m.
+    Expected on shieldbot: The way is 20 m, a tenth of the notes' as its speed is. Iron, 0.3 of the earth's field,
+    would lead astray by 0.3 / 2 of the way, 3 m; turning on the spot measures it, by 120 readings of 0.01 each, to
+    0.0013: 0.0013 / 2 × 20 m = 0.013 m is left. Some 400 reversals of a wheel miscount an edge of 3.25 mm each, at
+    headings by chance: √400 × 3.25 mm / 2 = 0.033 m. Compass noise of 0.01 rad each 6 mm: 0.004 m. Together 0.036
+    m; three times that and the 0.1 m at which the search begins: 0.21 m.
     """
     if on is None:
         noise = [(0.05, 0.02, number) for number in range(4)] + [(0.0, 0.0, number) for number in range(2)]

@@ -64,9 +64,8 @@ def wood_louse(seed: int, progress: Progress) -> Outcome:
     Figure: Path of 5 min over a floor whose shaded squares are humid, and the share of time spent there.
 
     Expected: Density is proportional to 1/V: 1/(1 + 0.2) = 0.833, from which lags of brain and motors take 0.005.
-    Some 950 visits to squares of either kind, whose lengths differ by 0.6 of their mean (1 σ), leave the share a
-    standard error of 0.83 · 0.17 · 0.6 √(2 / 950) = 0.004, a fifth of what is allowed; what it is, the 30 parts of
-    the run say.
+    Some 950 visits to squares of either kind, whose lengths differ by 0.6 of their mean (1 σ), leave a standard
+    error of 0.83 · 0.17 · 0.6 √(2 / 950) = 0.004, a fifth of what is allowed.
     """
     robot = varied(
         "arsim", "wood louse", body={"wheel_speed_maximum_m_s": FULL_SPEED}, motor_left=MOTOR, motor_right=MOTOR

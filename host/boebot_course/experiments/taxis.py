@@ -154,12 +154,12 @@ def taxis(setting: Setting, seed: int, progress: Progress) -> Outcome:
 
     Expected: At least 58 of 60 arrive; the median in 1.2 times the straight time, 1.85 m / 0.15 m/s = 12.3 s.
 
-    Expected on shieldbot: Ambient light: up to 2000 / s of both sensors together it is dark (ambient 1333 / s ± 7 σ of
-    10 % unlike sensors). Sensors unlike by 10 % (1 σ) each make a lamp ahead seem 0.07 / tan 0.5 = 0.13 rad beside,
-    servos unlike by 2.9 % another 0.1 rad: a way at such a bearing is a spiral into the lamp, 1 / cos 0.16 = 1.3 %
-    longer, and at 3 σ 13 %. Turning towards the lamp takes it up to 1 s in the dark (1.9 rad/s) and an arc of 0.15 m
-    of radius, 0.2 m at a right angle, of 1.85 m of way: 1.2 times the straight time is kept by the median, and 24 s,
-    twice the straight time, by all but the rarest.
+    Expected on shieldbot: Up to 2000 / s of both sensors together it is dark (ambient 1333 / s ± 7 σ of 10 % unlike
+    sensors). Sensors unlike by 10 % (1 σ) each make a lamp ahead seem 0.07 / tan 0.5 = 0.13 rad beside, servos
+    unlike by 2.9 % another 0.1 rad: the way is a spiral into the lamp, 1 / cos 0.16 = 1.3 % longer, at 3 σ 13 %.
+    Turning towards the lamp takes up to 1 s in the dark (1.9 rad/s) and an arc of 0.15 m of radius, 0.2 m at a
+    right angle, of 1.85 m of way: 1.2 times the straight time is kept by the median, and 24 s by all but the
+    rarest.
     """
     done = trials(setting, seed, progress)
     times, straight = [time_to_lamp(trial) for trial in done], straight_time(setting)

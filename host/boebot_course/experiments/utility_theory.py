@@ -302,11 +302,10 @@ def elicitation(seed: int, progress: Progress) -> Outcome:
     Figure: Utility of money as asked for by halving (dots, joined), and that of the one who gave the answers
     (line).
 
-    Expected: Who is asked answers by u = ln(1 + κ x) / ln(1 + 100 κ) in closed form. Straight pieces of height h =
-    1/16 lie below u by h²/8 · |u''| / u'² at most, which is h²/8 · ln(1 + 100 κ) = 0.00083 everywhere. The elicited
-    function may therefore choose otherwise than the one who was asked only where two things are worth the same
-    within twice that; utility differences spread over 1, so that this is rarer than one in a hundred. Who goes by
-    expected payoff errs more often.
+    Expected: Answers are by u = ln(1 + κ x) / ln(1 + 100 κ) in closed form. Straight pieces of height h = 1/16 lie
+    below u by h²/8 · |u''| / u'² at most, h²/8 · ln(1 + 100 κ) = 0.00083 everywhere. The elicited function may
+    choose otherwise only where two things are worth the same within twice that: rarer than one in a hundred, as
+    differences spread over 1. Who goes by expected payoff errs more often.
     """
     found = elicited(answer, DEPTH)
     amounts, utilities = np.array(found[0]), np.array(found[1])

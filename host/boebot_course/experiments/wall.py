@@ -81,12 +81,12 @@ def wall(
 
     Expected: Once about the room at least in 80 s, at 0.25 m ± 0.05 m from the nearest wall, without a contact.
 
-    Expected on shieldbot: S_ref = 0.25 is 0.30 m by Ping, whose beam of ±20 degrees about -60 degrees meets the wall at
-    80 degrees: 0.295 m from the middle, and as the notes' row has it 0.05 m more at most. In a corner it comes as near
-    as its IR pairs let it: they reach 0.20 m less 3 × 3 % of it, at 0.25 rad to the heading and 0.05 m ahead of the
-    middle, 0.226 m; until the wheels answer (0.05 s for a reading, 0.05 s for a step, 0.055 s of lag) its 0.168 m/s
-    take it 0.027 m farther: 0.199 m, less 0.01 m for skew. The parameters are those of the notes' row; by the servos'
-    curve its motor signal stands for 0.168 m/s instead of 0.12 m/s.
+    Expected on shieldbot: S_ref = 0.25 is 0.30 m by Ping, whose beam of ±20 degrees about -60 degrees meets the
+    wall at 80 degrees: 0.295 m from the middle, and 0.05 m more at most. In a corner it comes as near as its IR
+    pairs let it: they reach 0.20 m less 3 × 3 %, at 0.25 rad to the heading and 0.05 m ahead of the middle, 0.226
+    m; until the wheels answer (0.05 s for a reading, 0.05 s for a step, 0.055 s of lag) its 0.168 m/s take it 0.027
+    m farther: 0.199 m, less 0.01 m for skew. By the servos' curve its motor signal stands for 0.168 m/s instead of
+    0.12 m/s.
 
     Expected on avr: As on shieldbot.
     """
