@@ -179,7 +179,7 @@ def _running(link: Link, robot: RobotDescription) -> Iterator[Check]:
         return
     newest, _ = heard[-1]
     late = (newest.overruns - heard[0][0].overruns) % 256
-    yield Check("ticks", f"{late} overrun", "0", "a task of the firmware takes too long: boebot timing" if late else "")
+    yield Check("ticks", f"{late} overrun", "0", "a task of the firmware takes too long" if late else "")
     least = link.parameters.get("supply_minimum")
     low = f"charge or change the battery; below {least:g} V the motors do not run"
     volts = newest.supply / 1000

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from boebot.description.robots import RobotDescription, load_robot
+from boebot.devices.device import pin_number
 from boebot.link import messages
 from boebot_timing.emulated.line import Line
 from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels, with_noise
@@ -91,14 +92,9 @@ def pins_of(robot: RobotDescription) -> dict[str, int]:
             for part, fields in parts.items():
                 for pin in (getattr(device, one, None) for one in fields):
                     if pin is not None:
-                        found[f"{'ir' if name == 'infrared' else name} {side}{part}"] = number_of(pin)
-    found["ping"] = number_of(getattr(robot.device.get("ping"), "pin", 8))
+                        found[f"{'ir' if name == 'infrared' else name} {side}{part}"] = pin_number(pin)
+    found["ping"] = pin_number(getattr(robot.device.get("ping"), "pin", 8))
     return found
-
-
-def number_of(pin: int | str) -> int:
-    """A pin's Arduino number: A0 is 14."""
-    return 14 + int(pin[1:]) if isinstance(pin, str) else pin
 
 
 def prepare(line: Line) -> None:
