@@ -9,8 +9,9 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
 from boebot_timing import budget, loads
 from boebot_timing.emulated.loads import Bench
-from boebot_timing.emulated.measure import Run, run
+from boebot_timing.emulated.measure import run
 from boebot_timing.emulated.scenarios import load, numbers_of, prepare
+from boebot_timing.emulated.watched import Run
 from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_image
 from tools.avr_program import IMAGES

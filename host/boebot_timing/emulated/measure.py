@@ -6,11 +6,8 @@ A run is a function of image, scenario, seed and length. What goes wrong in it i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from boebot.description import robots
 from boebot.description.robots import RobotDescription
@@ -20,7 +17,7 @@ from boebot_timing.emulated.line import Line
 from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Ping, PulseTrain
 from boebot_timing.emulated.losses import losses as losses_of
 from boebot_timing.emulated.scenarios import SILENCE, load, numbers_of, prepare
-from boebot_timing.emulated.watched import Circumstances, Watched, measurement, watched
+from boebot_timing.emulated.watched import Run, watched
 from boebot_timing.emulated.world_access import WorldAccess
 from boebot_timing.measured import Measurement, merged
 from boebot_timing.realisable import CLOCK_HZ
@@ -35,35 +32,6 @@ RESETS_WITHIN = 20 * TICK_CYCLES  # of the hang: the watchdog's 125 ms and the 1
 DRAIN_TICKS = 3  # after a run, for what is under way
 
 Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Run:
-    """What was recorded from power-on to the end: all spans (dtype SPAN), and the same without the preparations."""
-
-    what: Watched
-    under: Circumstances
-    spans: NDArray[Any]
-    cycles: int
-    executed: int
-    lowest_stack: int
-    loaded_from: int  # cycle at which the load began
-    lost: dict[str, int]  # what should have come and did not (Losses), as far as it was asked for
-    sent: int  # bytes to the board and from it under the load
-    received: int
-
-    def measurement(self) -> Measurement:
-        """Spans and stack of all of it, load and ticks of what came after the preparations."""
-        return measurement(
-            self.what,
-            self.spans,
-            self.under,
-            since=self.loaded_from,
-            cycles=self.cycles,
-            executed=self.executed,
-            lowest_stack=self.lowest_stack,
-            losses=self.lost,
-        )
 
 
 def robot_of(image: Path) -> RobotDescription:
@@ -97,7 +65,6 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
     what = watched(image)
     board = avr.create(image)
     board.record(what.watch)
-    under = Circumstances(scenario, seed)
     access = WorldAccess(board, image, robot, seed=1) if scenario == "everything" else board.access()
     with Bench(image, access) as bench:
         line = prepare(bench, robot, scenario)
@@ -106,14 +73,15 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
         bench.run(round(seconds * CLOCK_HZ))
         after = bench.access.counters()
         if resets := watchdog_resets(bench.access.watchdog_log(), image):
-            raise BoardError(f"{image.name}, {under.scenario}, seed {seed}: {resets[0]}")
+            raise BoardError(f"{image.name}, {scenario}, seed {seed}: {resets[0]}")
         record = board.spans()
         lowest_stack = board.lowest_stack
         board.stop_recording()
         cycles = bench.now - loaded_from
         return Run(
             what=what,
-            under=under,
+            scenario=scenario,
+            seed=seed,
             spans=record,
             cycles=cycles,
             executed=after["executed_cycles"] - before["executed_cycles"],
@@ -153,7 +121,8 @@ def hang(image: Path, robot: RobotDescription, seed: int) -> Run:
         spans = board.spans()
         return Run(
             what=what,
-            under=Circumstances(HANG, seed),
+            scenario=HANG,
+            seed=seed,
             spans=spans[(spans["begin"] < hung_at) | (spans["id"] == WATCHDOG)],
             cycles=hung_at - loaded_from,
             executed=after["executed_cycles"] - before["executed_cycles"],

@@ -7,7 +7,7 @@ than of longer ones, and the board has work with each.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from boebot.link import messages
 from boebot_timing.emulated.line import Line
@@ -42,15 +42,17 @@ class Traffic:
         self, line: Line, first: int, signals: Sequence[tuple[int, int]] = SIGNALS, probes: bool = True
     ) -> None:
         """Begins at cycle `first`. `signals`: of the motors, one after the other; `probes`: the clock is asked for."""
-        self.line = line
+        self.line, self.first = line, first
         self._choice, self._probing = signals, probes
         self.changes: list[Change] = []
         self.newest = first
         """the cycle at which the last byte of the last set-point has arrived"""
         self.probes: list[Probe] = []
-        self._change_at = self._probe_at = first
-        self._signals = 0
-        self._muted = False
+        self.muted = False
+        """no set-point more"""
+        self._change_at = self._probe_at = self._next = first
+        self._signals = self._count = 0
+        self._request: Any = None
 
     def setpoint(self, at: int) -> None:
         """A set-point in answer to the newest telemetry; now and then another one than before."""
@@ -62,10 +64,6 @@ class Traffic:
         self.newest = arrived = self.line.send(messages.SetpointSignal(*signals, TIME_TO_LIVE_MS, self.line.tick), at)
         if changed:
             self.changes.append(Change(arrived, signals))
-
-    def mute(self) -> None:
-        """No set-point more."""
-        self._muted = True
 
     def probe(self, at: int) -> bool:
         """A probe, if it is time for one."""
@@ -80,12 +78,6 @@ class Traffic:
 class EachTick(Traffic):
     """A set-point each tick."""
 
-    def __init__(
-        self, line: Line, first: int, signals: Sequence[tuple[int, int]] = SIGNALS, probes: bool = True
-    ) -> None:
-        super().__init__(line, first, signals, probes)
-        self._next = first
-
     def queue(self, bench: Bench, until: int) -> None:
         """See Source."""
         del bench
@@ -98,18 +90,12 @@ class EachTick(Traffic):
 class FullLine(Traffic):
     """Frames back to back: set-points and requests, and as many answers."""
 
-    def __init__(
-        self, line: Line, first: int, signals: Sequence[tuple[int, int]] = SIGNALS, probes: bool = True
-    ) -> None:
-        super().__init__(line, first, signals, probes)
-        self._first = first
-        self._count = 0
-        self._request = line.numbered(messages.SetParameter, messages.PARAMETERS["track_width"].id, 10_000)
-
     def queue(self, bench: Bench, until: int) -> None:
         """See Source. The board answers a request that comes again as it answered the first time."""
-        while (at := max(self._first, self.line.free, bench.now)) < until:
-            if self._count % EVERY_SETPOINT == 0 and not self._muted:
+        if self._request is None:
+            self._request = self.line.numbered(messages.SetParameter, messages.PARAMETERS["track_width"].id, 10_000)
+        while (at := max(self.first, self.line.free, bench.now)) < until:
+            if self._count % EVERY_SETPOINT == 0 and not self.muted:
                 self.setpoint(at)
             elif not self.probe(at):
                 self.line.send(self._request, at)

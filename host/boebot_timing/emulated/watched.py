@@ -74,63 +74,50 @@ def watched(path: Path) -> Watched:
 
 
 @dataclass(frozen=True, slots=True)
-class Circumstances:
-    """Under which a run was made."""
+class Run:
+    """What was recorded of a scenario from power-on to the end. Load and ticks are those of the `cycles` cycles since
+    the load began, in `executed` of which something was executed."""
 
+    what: Watched
     scenario: str
     seed: int
+    spans: NDArray[Any]  # all of them (dtype SPAN), those of the preparations too
+    cycles: int
+    executed: int
+    lowest_stack: int
+    loaded_from: int  # cycle at which the load began
+    lost: dict[str, int]  # what should have come and did not (Losses), as far as it was asked for
+    sent: int  # bytes to the board and from it under the load
+    received: int
 
+    def measurement(self) -> Measurement:
+        """What the record amounts to."""
+        what, spans, since = self.what, self.spans, self.loaded_from
+        found = {name: self._spans(name, FUNCTION_IDS + index) for index, name in enumerate(what.names)}
+        others = {name: found.pop(name) for name in (POLL,) if name in found}
+        work, busy = _ticks(what, spans, since)
+        return Measurement(
+            tasks=found,
+            interrupts={name: self._spans(name, vector, since) for vector, name in what.vectors.items()},
+            lowest_stack=self.lowest_stack,
+            seconds=self.cycles / 16e6,
+            load=self.executed / self.cycles,
+            worst_tick=int(work.max(initial=0)),
+            scenarios=(self.scenario,),
+            functions=others,
+            busiest_tick=int(busy.max(initial=0)),
+            late_slots=_late_slots(what, spans, since),
+            between_polls=_between_polls(what, spans),
+            tick=_fullest_tick(what, spans, since, work),
+            losses=self.lost,
+        )
 
-def measurement(
-    what: Watched,
-    spans: NDArray[Any],
-    under: Circumstances,
-    *,
-    since: int,
-    cycles: int,
-    executed: int,
-    lowest_stack: int,
-    losses: dict[str, int],
-) -> Measurement:
-    """What a run's records (dtype SPAN) since power-on amount to. Load and ticks are those of the `cycles` cycles from
-    `since` on, in `executed` of which something was executed."""
-    tasks: dict[str, Spans] = {}
-    others: dict[str, Spans] = {}
-    for index, name in enumerate(what.names):
-        found = _spans(name, spans[spans["id"] == FUNCTION_IDS + index], under)
-        (others if name == POLL else tasks)[name] = found
-    interrupts = {
-        name: _spans(name, spans[spans["id"] == vector], under, since) for vector, name in what.vectors.items()
-    }
-    work, busy = _ticks(what, spans, since)
-    return Measurement(
-        tasks=tasks,
-        interrupts=interrupts,
-        lowest_stack=lowest_stack,
-        seconds=cycles / 16e6,
-        load=executed / cycles,
-        worst_tick=int(work.max(initial=0)),
-        scenarios=(under.scenario,),
-        functions=others,
-        busiest_tick=int(busy.max(initial=0)),
-        late_slots=_late_slots(what, spans, since),
-        between_polls=_between_polls(what, spans),
-        tick=_fullest_tick(what, spans, since, work),
-        losses=losses,
-    )
-
-
-def _spans(name: str, spans: NDArray[Any], under: Circumstances, latency_since: int | None = None) -> Spans:
-    at = int(spans["begin"][np.argmax(spans["net"])]) if len(spans) else 0
-    return Spans(
-        name=name,
-        net=spans["net"].copy(),
-        gross=spans["gross"].copy(),
-        worst=Worst(under.scenario, under.seed, at),
-        latency=np.empty(0, dtype=np.uint32)
-        if latency_since is None
-        else spans["latency"][spans["begin"] >= latency_since].copy(),
-    )
+    def _spans(self, name: str, number: int, latency_since: int | None = None) -> Spans:
+        spans = self.spans[self.spans["id"] == number]
+        at = int(spans["begin"][np.argmax(spans["net"])]) if len(spans) else 0
+        counted = spans[:0] if latency_since is None else spans[spans["begin"] >= latency_since]
+        worst = Worst(self.scenario, self.seed, at)
+        return Spans(name, spans["net"].copy(), spans["gross"].copy(), worst, counted["latency"].copy())
 
 
 def _ticks(what: Watched, spans: NDArray[Any], since: int) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -181,7 +181,7 @@ def test_frames_that_are_dropped_renew_no_time_to_live() -> None:
     """In an overload that goes on without set-points the pulses end with the life of the last one that was sent."""
     with Bench(image()) as bench:
         run = drive(bench, OVERLOAD, 0.2, 6, lambda share: None)
-        run.traffic.mute()
+        run.traffic.muted = True
         trains = wheels(ENCODER_PINS, OVERLOAD.edges_per_s, bench.now)
         bench.sources[:] = [run.ping, *(train for wheel in trains for train in wheel), run.traffic]
         bench.run(40 * TICK_CYCLES)

@@ -12,8 +12,9 @@ from boebot.errors import BoardError
 from boebot.link.messages import Counters, Event, EventKind
 from boebot_timing.emulated.loads import SLOT_CYCLES, TICK_CYCLES, Bench
 from boebot_timing.emulated.losses import COUNTERS_TICKS, MASKED
-from boebot_timing.emulated.measure import HANG, WATCHDOG, Run, hang, robot_of, run
+from boebot_timing.emulated.measure import HANG, WATCHDOG, hang, robot_of, run
 from boebot_timing.emulated.scenarios import RANGES, load, numbers_of, prepare
+from boebot_timing.emulated.watched import Run
 from boebot_timing.measured import as_json, merged, statistics
 from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards import avr
