@@ -12,8 +12,8 @@ from boebot.description.robots import load_robot
 from boebot.robot import Robot
 from boebot.running.board_driver import BoardDriver
 from boebot.running.driver import Task
-from boebot_timing.emulated.latency_limits import WHISKER
 from boebot_timing.emulated.loads import TICK_CYCLES
+from boebot_timing.tests.latency_limits import WHISKER
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 
 pytestmark = pytest.mark.emulated

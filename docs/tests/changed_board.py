@@ -11,9 +11,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from boebot.link import messages
-from boebot_timing.emulated.jitter import lost, servo_pulses
-from boebot_timing.emulated.jitter_run import drive
 from boebot_timing.emulated.loads import FIGURES, Bench
+from boebot_timing.tests.jitter import lost, servo_pulses
+from boebot_timing.tests.jitter_run import drive
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.symbols import find_symbol
 
@@ -38,9 +38,9 @@ def seen(elf: Path) -> dict[str, object]:
             bench.run(160_000)
             switched.append(bench.access.output(LAMP) == Level.HIGH)
         return {
-            "pulses": [one.count for one in pulses],
+            "pulses": [len(one.values) for one in pulses],
             "broken pulses": sum(one.broken for one in pulses),
-            "lost": {name: count for name, count in asdict(lost(ridden)).items() if name != "load"},
+            "lost": asdict(lost(ridden)),
             "ride to steady": int(rides[-1].split(b" mm/s\0")[0]) / steady,
             "cycles between clicks": sorted({after - before for before, after in pairwise(clicks)}),
             "lamp": switched,

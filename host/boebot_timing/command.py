@@ -18,6 +18,7 @@ from boebot.errors import BoebotError, TimingError
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
     from boebot_timing.budget import Report
+    from boebot_timing.measured import Measurement
     from boebot_timing.realisable import Verdict
 
 EXIT_BROKEN, EXIT_INPUT = 1, 2
@@ -92,9 +93,6 @@ def timing(
         str | None,
         typer.Option("--where", metavar="NAME", help="Only this: where the bound of a task or an interrupt goes."),
     ] = None,
-    jitter: Annotated[
-        bool, typer.Option("--jitter", help="Measure jitter and latency at the pins, too, as distributions.")
-    ] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Where to write the timing diagram and timing.json.")
     ] = None,
@@ -122,15 +120,14 @@ def timing(
         found = None
         if image is not None:
             maxima = {} if port is None else board.maxima(port, description, image, seconds, elf)
-            measured = _measured(False, image, seconds, seed) if measure else None
+            measured = _measured(image, seconds, seed) if measure else None
             with output.progress_bar(f"bounds of {image.name}", 100, unit=" %") as watch:
                 found = budget.prove(image, asked, measured, maxima, progress=lambda share: watch(100 * share))
         brain_s, own_period = _brain(brain, step, description, seed)
         period_s = period if period is not None else own_period or DEFAULT_PERIOD
         times = None if found is None else found.board_times
         verdict = realisable.judge(description, period_s, board=times, brain_s=brain_s, baud=baud)
-        distributions = _measured(True, image, seconds, seed) if jitter and image is not None else None
-        answer = Answer(found, verdict, distributions)
+        answer = Answer(found, verdict)
         if out is not None:
             answer.files = _write(answer, out)
     except BoebotError as error:
@@ -153,21 +150,18 @@ class Answer:
 
     report: Report | None
     verdict: Verdict
-    jitter: Any
     files: Sequence[Path] = ()
 
     @property
     def is_broken(self) -> bool:
-        """A budget or a limit of the jitter is broken, or the robot is not realisable."""
-        late = self.jitter is not None and bool(self.jitter.broken)
-        return late or bool(self.report and self.report.faults) or not self.verdict.is_realisable
+        """A budget is broken, or the robot is not realisable."""
+        return bool(self.report and self.report.faults) or not self.verdict.is_realisable
 
     def as_dict(self) -> dict[str, Any]:
         """For programs."""
         return {
             "image": None if self.report is None else self.report.as_dict(),
             "realisable": self.verdict.as_dict(),
-            "jitter": None if self.jitter is None else self.jitter.as_json(),
             "files": [str(path) for path in self.files],
         }
 
@@ -178,8 +172,6 @@ class Answer:
         if self.report is not None:
             shown.show_report(self.report)
         shown.show_verdict(self.verdict)
-        if self.jitter is not None:
-            shown.show_jitter(self.jitter)
         if self.files:
             output.line(f"files in {self.files[0].parent}: {', '.join(path.name for path in self.files)}")
 
@@ -218,15 +210,14 @@ def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
     return image
 
 
-def _measured(pins: bool, image: Path, seconds: float, seed: int) -> Any:
-    """What the emulator shows of the image: spans of its code, or what is late at its pins."""
+def _measured(image: Path, seconds: float, seed: int) -> Measurement:
+    """What the emulator shows of the image."""
     try:
-        from boebot_timing.emulated import jitter, measure
+        from boebot_timing.emulated.measure import measure_image
     except ImportError as error:
         raise TimingError(f"the image cannot be measured here: {error}") from None
-    work: Any = jitter.measure_jitter if pins else measure.measure_image
     with output.progress_bar(f"measuring {image.name}", 100, unit=" %") as watch:
-        return work(image, seconds=seconds, seed=seed, progress=lambda share: watch(100 * share))
+        return measure_image(image, seconds=seconds, seed=seed, progress=lambda share: watch(100 * share))
 
 
 @streams.kept()

@@ -14,7 +14,6 @@ from boebot_timing.budget import FOR_EVER
 
 if TYPE_CHECKING:
     from boebot_timing.budget import Report, Row
-    from boebot_timing.distributions import Distribution, JitterReport
     from boebot_timing.realisable import Verdict
     from boebot_timing.worst_path import WorstPath
 
@@ -142,47 +141,6 @@ def show_verdict(verdict: Verdict) -> None:
     console.print(Text(verdict.sentence, style=_FINE if verdict.is_realisable else _BROKEN))
     for note in verdict.notes:
         console.print(Text(f"note: {note}", style=_ASIDE))
-
-
-def show_jitter(report: JitterReport) -> None:
-    """A table of distributions for each load; what broke its limit, and what was lost."""
-    console = output.console()
-    for load in dict.fromkeys(one.load for one in report.distributions):
-        found = [one for one in report.distributions if one.load == load]
-        shown = _table(f"jitter and latency, {load}")
-        for title in ("count", "unit", "min", "p50", "p99", "max", "may be"):
-            shown.add_column(title, justify="right", no_wrap=True)
-        for one in found:
-            shown.add_row(*_distribution(one), style=_BROKEN if one.broken else None)
-        console.print(shown)
-    for one in report.broken:
-        says = f"{one.quantity}, {one.load}: {one.broken} of {one.count} values are not {_limits(one)}"
-        console.print(Text(f"broken: {says}", style=_BROKEN))
-    for losses in report.losses:
-        lost = [f"{number} {name.replace('_', ' ')}" for name, number in losses.counts.items() if number]
-        says = f"{losses.load}: {', '.join(lost)}" if lost else f"{losses.load}: nothing was lost"
-        console.print(Text(says, style="" if lost else _FINE))
-
-
-def _distribution(one: Distribution) -> list[str]:
-    """Numbers in cycles; where one is above 10,000 cycles, in ms."""
-    numbers = (one.minimum, one.percentile(50), one.percentile(99), one.maximum)
-    large = any(number is not None and abs(number) > 10_000 for number in (*numbers, one.least, one.most))
-
-    def said(cycles: float | None) -> str:
-        if cycles is None or cycles != cycles:
-            return "-"
-        return f"{cycles / 16_000:.2f}" if large else f"{cycles:g}"
-
-    may = f"{said(one.least)} .. {said(one.most)}" if (one.least, one.most) != (None, None) else ""
-    return [one.quantity, str(one.count), "ms" if large else "cycles", *map(said, numbers), may]
-
-
-def _limits(one: Distribution) -> str:
-    least, most = one.least, one.most
-    if least is None or most is None:
-        return f"at most {most} cycles" if least is None else f"at least {least} cycles"
-    return f"from {least} to {most} cycles"
 
 
 def _table(title: str) -> Table:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from boebot.link import messages
-from boebot_timing.distributions import Losses
 from boebot_timing.emulated.line import Line
 from boebot_timing.emulated.loads import TICK_CYCLES, PulseTrain
 
@@ -16,7 +16,20 @@ SIDES = ("left", "right")
 MASKED = messages.Status.ENCODER_LEFT_MASKED | messages.Status.ENCODER_RIGHT_MASKED
 
 
-def losses(line: Line, wheels: Sequence[Sequence[PulseTrain]], load: str) -> Losses:
+@dataclass(frozen=True, slots=True)
+class Losses:
+    """What got lost under a load, counted by who knows best; all 0 where nothing was."""
+
+    frames: int  # refused at either end, or missing in the sequence numbers
+    bytes: int  # that the receiver or its ring had no room for
+    edges: int  # of encoders, that the counts lack
+    ticks: int  # without telemetry
+    late_ticks: int  # whose work went on when the next tick had begun
+    masked: int  # telemetries with a masked encoder line
+    resets: int
+
+
+def losses(line: Line, wheels: Sequence[Sequence[PulseTrain]]) -> Losses:
     """Since power-on, of a board that nothing acts on any more. Lets time pass until the board reports it.
 
     `wheels`: the encoder lines of the left and the right wheel; one whose line is noisy may be left empty: its edges
@@ -32,7 +45,6 @@ def losses(line: Line, wheels: Sequence[Sequence[PulseTrain]], load: str) -> Los
         if trains:
             edges += sum(len(train.edges) for train in trains) - getattr(telemetry[-1], f"encoder_{side}")
     return Losses(
-        load=load,
         frames=counted.bad + counted.dropped + line.decoder.bad + line.decoder.lost,
         bytes=board["overruns"] + counted.overrun,
         edges=edges,

@@ -141,8 +141,7 @@ def _lost(line: Line, wheels: list[list[PulseTrain]], scenario: str, after: dict
         return {"bytes": after["overruns"], "resets": after["resets"]}
     line.bench.sources[:] = [source for source in line.bench.sources if isinstance(source, Ping)]
     line.bench.run(DRAIN_TICKS * TICK_CYCLES)
-    found = asdict(losses_of(line, wheels, scenario))
-    return {name: count for name, count in found.items() if name != "load"}
+    return asdict(losses_of(line, wheels))
 
 
 def measure(image: Path, robot: RobotDescription, scenario: str, seconds: float, seed: int = 1) -> Measurement:

@@ -21,8 +21,8 @@ from boebot_timing.command import EXIT_BROKEN, EXIT_INPUT
 from boebot_timing.firmware import load_firmware
 from boebot_timing.measured import Measurement, Moment, Spans, Worst, merged
 from boebot_timing.table import InterruptRow
+from boebot_timing.tests.timing_program import build
 from command import boebot as command
-from timing_program import build
 
 FIGURES = loads.LOADS["figures"]
 

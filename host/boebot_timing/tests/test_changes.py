@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import timing_program
 from avr_timing.interrupts.response import Piece, Schedule, Source, load
 from boebot import resources
 from boebot_timing import budget, loads
@@ -18,6 +17,7 @@ from boebot_timing.changes import most_waiting
 from boebot_timing.costs import Costs
 from boebot_timing.loads import LOADS
 from boebot_timing.table import Constants, InterruptRow
+from boebot_timing.tests import timing_program
 
 ROUND, LOOP, FRAME, CHANGE = 100, 20, 2000, 10
 COSTS = Costs(

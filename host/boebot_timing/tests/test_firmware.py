@@ -13,12 +13,12 @@ from elftools.elf.elffile import ELFFile
 from hypothesis import given
 from hypothesis import strategies as st
 
-import timing_program
 from boebot.errors import AnalysisError, TimingError
 from boebot_timing import budget
 from boebot_timing.loads import LOADS
 from boebot_timing.measured import Measurement, Spans, Worst
 from boebot_timing.table import read_table
+from boebot_timing.tests import timing_program
 
 REFUSED = (AnalysisError, TimingError)
 FIGURES = LOADS["figures"]

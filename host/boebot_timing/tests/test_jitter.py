@@ -1,9 +1,10 @@
 """Servo pulses, echoes and latencies of the untouched image at its pins and on its line, against what is promised and
-what the schedule gives (boebot_timing.emulated.latency_limits); and what an overload leaves behind: nothing."""
+what the schedule gives (boebot_timing.tests.latency_limits); and what an overload leaves behind: nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,6 @@ import pytest
 
 from boebot import resources
 from boebot.link import messages
-from boebot_timing.distributions import Distribution
-from boebot_timing.emulated.jitter import distributions, lost, servo_pulses
-from boebot_timing.emulated.jitter_run import Run, drive, prepare
 from boebot_timing.emulated.line import Line
 from boebot_timing.emulated.loads import (
     FIGURES,
@@ -28,6 +26,8 @@ from boebot_timing.emulated.loads import (
     wheels,
 )
 from boebot_timing.emulated.traffic import TIME_TO_LIVE_MS, EachTick
+from boebot_timing.tests.jitter import Distribution, distributions, lost, servo_pulses
+from boebot_timing.tests.jitter_run import Run, drive, prepare
 from sim_bridge.boards.board import Edge, Level
 
 pytestmark = pytest.mark.emulated
@@ -76,32 +76,32 @@ def found(run: Run) -> dict[str, Distribution]:
 def test_servo_pulses_are_exact_to_16_cycles(run: Run, found: dict[str, Distribution], side: str) -> None:
     for quantity in ("width", "period"):
         errors = found[f"servo {quantity}, {side}"]
-        assert errors.count >= seconds_of(run) * 50 - 2, "a pulse is missing"
+        assert len(errors.values) >= seconds_of(run) * 50 - 2, "a pulse is missing"
         assert np.all(np.abs(errors.values) <= SERVO_TOLERANCE), errors.values
 
 
 def test_echoes_are_right_to_16_cycles(run: Run, found: dict[str, Distribution]) -> None:
     """Ping at its fastest: a trigger every 4 ticks."""
     errors = found["echo length"]
-    assert errors.count >= seconds_of(run) * 25 - 3, "an echo is missing"
+    assert len(errors.values) >= seconds_of(run) * 25 - 3, "an echo is missing"
     assert np.all(np.abs(errors.values) <= ECHO_TOLERANCE), errors.values
 
 
 def test_latencies_keep_what_the_schedule_gives(run: Run, found: dict[str, Distribution]) -> None:
     """And in ticks: an edge, an echo or a whisker is observed in the second tick after it at the latest. Under an
     overload what is said of them may be dropped."""
-    assert not [(one.quantity, one.minimum, one.maximum, one.least, one.most) for one in found.values() if one.broken]
+    assert not [(one.quantity, min(one.values), max(one.values)) for one in found.values() if one.broken]
     if run.load.is_overload:
         return
     assert len(found) == 13
-    assert all(one.count > 4 for one in found.values()), [(one.quantity, one.count) for one in found.values()]
+    assert min(len(one.values) for one in found.values()) > 4
     for quantity, ticks in {
         "encoder left to observation": 2.0,
         "echo to observation": 2.0,
         "whisker left to observation": 2.0,
         "set-point to pulse, left": 2.5,
     }.items():
-        assert found[quantity].maximum <= ticks * TICK_CYCLES
+        assert max(found[quantity].values) <= ticks * TICK_CYCLES
 
 
 def test_nothing_is_lost_but_in_an_overload_and_no_tick_there(run: Run) -> None:
@@ -109,7 +109,7 @@ def test_nothing_is_lost_but_in_an_overload_and_no_tick_there(run: Run) -> None:
     lost is reported, and so is the noise, in each tick."""
     losses = lost(run)
     if not run.load.is_overload:
-        assert not losses.anything, losses
+        assert not any(asdict(losses).values()), losses
         return
     assert (losses.ticks, losses.late_ticks, losses.resets) == (0, 0, 0)
     (*_, counted) = (heard.message for heard in run.line.heard if isinstance(heard.message, messages.Counters))
@@ -195,7 +195,7 @@ def test_no_edge_of_four_lines_is_lost(edges_per_s: int) -> None:
     with Bench(image()) as bench:
         load = Load(f"{edges_per_s}", edges_per_s, is_overload=False)
         run = drive(bench, load, 0.4, edges_per_s, lambda share: None)
-        assert not lost(run).anything
+        assert not any(asdict(lost(run)).values())
         assert all(len(train.edges) > 0.4 * edges_per_s for wheel in run.encoders for train in wheel)
 
 

@@ -12,7 +12,7 @@ import avr_image
 from boebot import resources
 from boebot.errors import TimingError
 from boebot_timing.table import InterruptRow, SensorRow, Table, TaskRow, read_table, table_of
-from timing_program import build
+from boebot_timing.tests.timing_program import build
 from tools.avr_program import IMAGES
 
 ROWS = """

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-import timing_program
 from avr_timing.bounds.worst_path import PathRow
 from boebot import resources
 from boebot_timing import budget, loads
 from boebot_timing.command import EXIT_INPUT
 from boebot_timing.firmware import load_firmware
+from boebot_timing.tests import timing_program
 from boebot_timing.worst_path import ACCEPTANCE, WorstPath, worst_path
 from command import boebot as command
 

@@ -5,49 +5,41 @@ A run is made in jitter_run.py; here its record becomes values, one for each pul
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boebot.link import messages
-from boebot_timing.distributions import Distribution, JitterReport, Losses
-from boebot_timing.emulated import latency_limits as limits
-from boebot_timing.emulated.jitter_run import CENTRE, GAIN, MIRROR, Progress, Run, drive
-from boebot_timing.emulated.latency_limits import Limits
 from boebot_timing.emulated.line import Heard
-from boebot_timing.emulated.loads import LOADS, SERVO_FRAME_CYCLES, Bench, Load
-from boebot_timing.emulated.losses import losses
+from boebot_timing.emulated.loads import SERVO_FRAME_CYCLES
+from boebot_timing.emulated.losses import Losses, losses
+from boebot_timing.tests import latency_limits as limits
+from boebot_timing.tests.jitter_run import CENTRE, GAIN, MIRROR, Run
+from boebot_timing.tests.latency_limits import Limits
 
 CYCLES_PER_US = 16
 SAME_WIDTH = 16  # cycles by which a pulse may differ from the set-point's
 
 
-def measure_jitter(
-    elf: Path, *, seconds: float = 2.0, seed: int = 1, progress: Progress | None = None, loads: Sequence[Load] = LOADS
-) -> JitterReport:
-    """All distributions of an image: `seconds` of the board's time under each load.
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """All values of one quantity under one load, in cycles, in the order in which they came; `least` and `most` are
+    what it may be, as promised or derived from the schedule; None: not said."""
 
-    `progress` is called with the share that is done, 0 to 1.
+    quantity: str  # "servo width, left"
+    values: NDArray[np.int64]
+    least: int | None
+    most: int | None
 
-    Raises:
-        BoardError: the image cannot be loaded, does not answer, or crashes.
-    """
-    found: list[Distribution] = []
-    missing: list[Losses] = []
-    for number, load in enumerate(loads):
-
-        def share(done: float, number: int = number) -> None:
-            if progress is not None:
-                progress((number + done) / len(loads))
-
-        with Bench(elf) as bench:
-            run = drive(bench, load, seconds, seed, share)
-            found += distributions(run)
-            missing.append(lost(run))
-    return JitterReport(tuple(found), tuple(missing))
+    @property
+    def broken(self) -> int:
+        """How many values are not what they may be."""
+        below = 0 if self.least is None else int(np.sum(self.values < self.least))
+        above = 0 if self.most is None else int(np.sum(self.values > self.most))
+        return below + above
 
 
 def distributions(run: Run) -> list[Distribution]:
@@ -64,9 +56,8 @@ def _only_counted(one: Distribution) -> Distribution:
     return replace(one, least=None, most=None)
 
 
-def _of(run: Run, quantity: str, meaning: str, values: Iterable[int], may: Limits | None = None) -> Distribution:
-    least, most = may or (None, None)
-    return Distribution(quantity, meaning, run.load.name, np.array(list(values), dtype=np.int64), least, most)
+def _of(quantity: str, values: Iterable[int], may: Limits) -> Distribution:
+    return Distribution(quantity, np.array(list(values), dtype=np.int64), *may)
 
 
 def width_of(side: str, signals: tuple[int, int]) -> int:
@@ -76,7 +67,7 @@ def width_of(side: str, signals: tuple[int, int]) -> int:
 
 
 def servo_pulses(run: Run) -> list[Distribution]:
-    """Width and period of both servos' pulses, less what they should be."""
+    """Width of both servos' pulses, less what was set, and their period from rise to rise, less 20 ms."""
     found = []
     widths = {side: [width_of(side, change.signals) for change in run.traffic.changes] for side in MIRROR}
     for side in MIRROR:
@@ -87,20 +78,20 @@ def servo_pulses(run: Run) -> list[Distribution]:
         errors = [int(width - allowed[np.argmin(np.abs(allowed - width))]) for width in pulses[:, 1]]
         periods = np.diff(pulses[:, 0]) - SERVO_FRAME_CYCLES
         found += [
-            _of(run, f"servo width, {side}", f"of the pulse at pin {pin}, less what was set", errors, limits.EXACT),
-            _of(run, f"servo period, {side}", f"from rise to rise at pin {pin}, less 20 ms", periods, limits.EXACT),
+            _of(f"servo width, {side}", errors, limits.EXACT),
+            _of(f"servo period, {side}", periods, limits.EXACT),
         ]
     return found
 
 
 def echo_lengths(run: Run) -> Distribution:
-    """How far an echo's reported length is off."""
+    """An echo's length as reported, in whole microseconds, less that of the pulse."""
     errors = [
         heard.message.ping_echo * CYCLES_PER_US - (fall - rise)
         for (rise, fall), heard in echoes_told(run)
         if run.begun < rise < run.ended
     ]
-    return _of(run, "echo length", "as reported, in whole microseconds, less that of the pulse", errors, limits.ECHO)
+    return _of("echo length", errors, limits.ECHO)
 
 
 def echoes_told(run: Run) -> Iterator[tuple[tuple[int, int], Heard]]:
@@ -114,19 +105,13 @@ def echoes_told(run: Run) -> Iterator[tuple[tuple[int, int], Heard]]:
 
 
 def reactions(run: Run) -> list[Distribution]:
-    """From the last byte of a frame to what it brings about."""
+    """From the last byte of a frame to what it brings about; of a set-point to the first pulse of its width."""
     answers = {
         heard.message.token: heard.first for heard in run.line.heard if isinstance(heard.message, messages.ClockAnswer)
     }
     probes = [answers[probe.token] - probe.arrived for probe in run.traffic.probes if probe.token in answers]
     found = [
-        _of(
-            run,
-            "byte in to reaction",
-            "from a probe's last byte to the first byte of its answer",
-            probes,
-            limits.BYTE_TO_REACTION,
-        )
+        _of("byte in to reaction", probes, limits.BYTE_TO_REACTION)  # to the first byte of the answer to a probe
     ]
     for slot, side in enumerate(MIRROR):
         pulses = run.bench.pulses(run.pins[f"servo {side}"])
@@ -136,8 +121,7 @@ def reactions(run: Run) -> list[Distribution]:
             new = pulses[(pulses[:, 0] > change.arrived) & (off <= SAME_WIDTH), 0]
             if len(new):
                 delays.append(int(new[0]) - change.arrived)
-        meaning = "from a set-point's last byte to the rise of the first pulse of its width"
-        found.append(_of(run, f"set-point to pulse, {side}", meaning, delays, limits.setpoint_to_pulse(slot)))
+        found.append(_of(f"set-point to pulse, {side}", delays, limits.setpoint_to_pulse(slot)))
     return found
 
 
@@ -151,9 +135,9 @@ def observations(run: Run) -> list[Distribution]:
             seen = (one.last for one in telemetry if one.last > closed and one.message.whiskers & bit)
             if closed < run.ended and (last := next(seen, None)) is not None:
                 delays.append(last - closed)
-        found.append(_of(run, f"whisker {side} to observation", "from the pin's fall", delays, limits.WHISKER))
+        found.append(_of(f"whisker {side} to observation", delays, limits.WHISKER))
     echoes = [heard.last - fall for (_, fall), heard in echoes_told(run)]
-    found.append(_of(run, "echo to observation", "from the echo's end", echoes, limits.NEXT_TICK))
+    found.append(_of("echo to observation", echoes, limits.NEXT_TICK))
     for side, wheel in zip(MIRROR, run.encoders, strict=False):
         if not wheel:
             continue
@@ -162,10 +146,10 @@ def observations(run: Run) -> list[Distribution]:
         order = np.searchsorted(counts, np.arange(1, len(edges) + 1))  # the first telemetry with that count
         ends = np.array([one.last for one in telemetry])
         delays = [int(ends[at] - edge) for at, edge in zip(order, edges, strict=True) if at < len(ends)]
-        found.append(_of(run, f"encoder {side} to observation", "from the edge at the pin", delays, limits.NEXT_TICK))
+        found.append(_of(f"encoder {side} to observation", delays, limits.NEXT_TICK))
     return found
 
 
 def lost(run: Run) -> Losses:
     """What got lost in a run. Lets time pass until the board reports it."""
-    return losses(run.line, run.encoders, run.load.name)
+    return losses(run.line, run.encoders)
