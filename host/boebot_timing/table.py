@@ -9,7 +9,7 @@ from pathlib import Path
 
 from boebot.errors import TimingError
 from boebot.files import regular
-from boebot.image.section import section_of
+from boebot.image import section_of
 
 SECTION = ".boebot.timing"
 MOST = 0xFFFFFFFF  # of any number in a row

@@ -11,7 +11,7 @@ import re
 import struct
 
 from boebot.errors import AnalysisError
-from boebot.image.section import HEADER, MAGIC, section_of
+from boebot.image import HEADER, MAGIC, section_of
 
 CHIP = "ATmega328P"
 SAME_PROGRAM = (CHIP, "ATmega328")  # one data sheet; they differ in the signature and the brown-out detector's switch

@@ -18,8 +18,8 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from boebot.errors import AnalysisError
+from boebot.image import section_of
 from boebot.image.chip import assumed_chip
-from boebot.image.section import section_of
 from boebot.image.source_lines import source_lines
 
 LOOPS = ".boebot.loops"  # section of the loop bounds, as boebot's bounds.h writes it in any firmware
