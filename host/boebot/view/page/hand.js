@@ -21,7 +21,7 @@ let padStops = false; // its button for that is down
 
 // Motor signals for what is held, by keys or arrows or else by the gamepad.
 function wanted() {
-  const power = Number($("power")?.value ?? 60) / 100;
+  const power = Number($("power").value) / 100;
   let ahead = held.has("ahead") - held.has("back"),
     turn = held.has("left") - held.has("right");
   if (!held.size) [ahead, turn] = padSticks();
@@ -84,18 +84,9 @@ addEventListener("gamepaddisconnected", () => {
 });
 
 // ---- the panel ----
-const WAYS = [
-  ["ahead", "▲", "Ahead"],
-  ["left", "◀", "Left"],
-  ["right", "▶", "Right"],
-  ["back", "▼", "Back"],
-];
-function makeDrive() {
-  hide("drive", !can.has("hand"));
-  if (!can.has("hand")) return;
-  const arrows = WAYS.map(([name, sign, label]) => {
-    const it = element("button", { className: "way " + name, textContent: sign, ariaLabel: label + ", while held" });
-    it.dataset.way = name;
+function listenToHand() {
+  for (const it of document.querySelectorAll("[data-way]")) {
+    const name = it.dataset.way;
     it.onpointerdown = event => {
       it.setPointerCapture(event.pointerId);
       hold(name, true);
@@ -111,41 +102,12 @@ function makeDrive() {
       if (event.key === "Enter") hold(name, false);
     };
     it.oncontextmenu = event => event.preventDefault(); // of a long press
-    return it;
-  });
-  const halt = element("button", { className: "alert halt", textContent: "Stop", onclick: stopRobot });
-  const power = element("input", {
-    type: "range",
-    id: "power",
-    min: 10,
-    max: 100,
-    value: $("power")?.value ?? 60,
-    ariaLabel: "Speed by hand, in percent",
-  });
-  $("drive").replaceChildren(
-    element("h2", { textContent: "Drive by hand" }),
-    element("div", { className: "pad" }, ...arrows, halt),
-    element("label", { className: "power" }, "speed ", power),
-    element("p", { id: "driver" }),
-    element(
-      "div",
-      { className: "buttons" },
-      element("button", {
-        id: "release",
-        textContent: "Let the brain drive",
-        onclick: () => {
-          letGo();
-          send({ type: "release", robot: runs.indexOf(run) });
-        },
-      }),
-      element("button", {
-        id: "arm",
-        textContent: "Let the motors go again",
-        onclick: () => send({ type: "arm", robot: runs.indexOf(run) }),
-      }),
-    ),
-    element("p", { className: "hint", textContent: "W A S D, arrow keys or a gamepad drive; space stops." }),
-  );
+  }
+  $("release").onclick = () => {
+    letGo();
+    send({ type: "release", robot: runs.indexOf(run) });
+  };
+  $("arm").onclick = () => send({ type: "arm", robot: runs.indexOf(run) });
 }
 function tellDrive() {
   if (!can.has("hand")) return;

@@ -375,81 +375,24 @@ function pinText(pin, t) {
   return word + " for " + (us < 1e4 ? us.toFixed(us < 100 ? 2 : 0) + " µs" : (us / 1e3).toFixed(1) + " ms");
 }
 
-// ---- events: a mark each, another form for each kind ----
-const EVENT_KINDS = {
-  switch: "switch",
-  contact: "true contact",
-  touch: "touch",
-  fault: "fault",
-  lost: "lost frames",
-  reset: "restart",
-  intervention: "intervention",
+// ---- events: a mark each, another form for each kind; its colour in the palette, and its words in the legend ----
+const EVENTS = {
+  switch: ["│", "faint", "switch"],
+  contact: ["✕", "contact", "true contact"],
+  touch: ["○", "touch", "touch"],
+  fault: ["▲", "alert", "fault"],
+  lost: ["╍", "alert", "lost frames"],
+  reset: ["↻", "alert", "restart"],
+  intervention: ["▼", "accent", "intervention"],
 };
-function eventColour(event) {
-  const behavior = event.kind === "switch" && run.mind && run.mind.behaviors.find(one => one.name === event.on);
-  if (behavior) return readable(behavior.colour);
-  return (
-    {
-      contact: colours.contact,
-      touch: colours.touch,
-      fault: colours.alert,
-      lost: colours.alert,
-      reset: colours.alert,
-      intervention: colours.accent,
-    }[event.kind] || colours.faint
-  );
-}
-// Adds its form to a path of its own; true: to be filled.
-function eventMark(c, kind, x, y, r) {
-  c.beginPath();
-  if (kind === "switch") {
-    c.moveTo(x, y - r);
-    c.lineTo(x, y + r);
-    return false;
-  }
-  if (kind === "contact") {
-    c.moveTo(x - r, y - r);
-    c.lineTo(x + r, y + r);
-    c.moveTo(x + r, y - r);
-    c.lineTo(x - r, y + r);
-    return false;
-  }
-  if (kind === "touch") {
-    c.arc(x, y, 0.8 * r, 0, 7);
-    return false;
-  }
-  if (kind === "lost") {
-    c.moveTo(x - r, y);
-    c.lineTo(x - r / 3, y);
-    c.moveTo(x + r / 3, y);
-    c.lineTo(x + r, y);
-    return false;
-  }
-  if (kind === "intervention") {
-    c.moveTo(x, y - r);
-    c.lineTo(x + r, y);
-    c.lineTo(x, y + r);
-    c.lineTo(x - r, y);
-    c.closePath();
-    return true;
-  }
-  if (kind === "reset") {
-    c.arc(x, y, 0.8 * r, 0.8, 6);
-    return false;
-  }
-  c.moveTo(x, y - r);
-  c.lineTo(x + r, y + r);
-  c.lineTo(x - r, y + r);
-  c.closePath();
-  return true; // a fault
-}
 function drawEvents(c, box) {
-  c.lineWidth = 1.6 * ratio;
-  for (const event of run.events) {
-    if (event.time < box.from || event.time > box.to) continue;
-    c.strokeStyle = c.fillStyle = eventColour(event);
-    if (eventMark(c, event.kind, box.px(event.time), box.middle, 5 * ratio)) c.fill();
-    else c.stroke();
+  font(c, 14);
+  c.textAlign = "center";
+  for (const { time, kind, on } of run.events) {
+    if (time < box.from || time > box.to) continue;
+    const behavior = on && run.mind?.behaviors.find(one => one.name === on);
+    c.fillStyle = behavior ? readable(behavior.colour) : colours[EVENTS[kind][1]];
+    c.fillText(EVENTS[kind][0], box.px(time), box.middle);
   }
 }
 const eventText = event => event.time.toFixed(2) + " s: " + (event.kind === "switch" ? "switch to " : "") + event.text;

@@ -51,13 +51,6 @@ function disconnected(event) {
 function send(message) {
   if (socket && socket.readyState === 1) socket.send(JSON.stringify(message));
 }
-function listenToVisibility() {
-  document.addEventListener("visibilitychange", () => {
-    letGo();
-    send({ type: "visible", visible: !document.hidden });
-  });
-}
-
 const receive = {
   run(content) {
     const chosen = run ? runs.indexOf(run) : 0;
@@ -198,43 +191,32 @@ function growBounds() {
 
 // ---- controls: only what can be done ----
 function makeControls() {
-  const make = (id, text, title, onclick, more = {}) =>
-    element("button", { id, textContent: text, title, onclick, className: "live", ...more });
-  document.querySelectorAll("#controls .live, #tools .live").forEach(it => it.remove());
+  document.querySelectorAll("[data-can]").forEach(it => {
+    it.hidden = !can.has(it.dataset.can);
+  });
+  hide("newest", false);
   hide("play", true);
   hide("wholeLabel", true);
   hide("speedLabel", !can.has("speed"));
-  const buttons = [];
-  if (can.has("hand"))
-    buttons.push(make("stop", "Stop", "Emergency stop of this robot (space)", stopRobot, { className: "live alert" }));
-  if (can.has("pause"))
-    buttons.push(
-      make(
-        "pause",
-        "Pause",
-        "Pause the run, or go on",
-        () => send({ type: state && state.paused ? "resume" : "pause" }),
-        { className: "live main" },
-      ),
-    );
-  if (can.has("step"))
-    buttons.push(
-      make("step", "Step", "One step of the brain, then pause", () => {
-        setNewest(true);
-        send({ type: "step" });
-      }),
-    );
-  if (can.has("restart")) buttons.push(make("restart", "Restart …", "Begin the run anew", askRestart));
-  $("controls").prepend(...buttons);
-  $("clock").after(
-    make("newest", "Live", "Show the newest moment (End)", () => setNewest(true), { ariaPressed: "true" }),
-  );
-  if (can.has("drag"))
-    $("tools").append(
-      make("move", "move", "Move a robot or a shape (M); or drag it, and turn it by the wheel", pickUp),
-    );
   if (can.has("speed")) makeSpeeds();
-  makeDrive();
+}
+function listenToControls() {
+  $("stop").onclick = $("halt").onclick = stopRobot;
+  $("pause").onclick = () => send({ type: state && state.paused ? "resume" : "pause" });
+  $("step").onclick = () => {
+    setNewest(true);
+    send({ type: "step" });
+  };
+  $("restart").onclick = askRestart;
+  $("anotherSeed").onclick = () => ($("seed").value = Math.floor(Math.random() * 1e6));
+  $("cancel").onclick = () => $("restartDialog").close();
+  $("restartDialog").querySelector("form").onsubmit = restart;
+  $("newest").onclick = () => setNewest(true);
+  $("move").onclick = pickUp;
+  document.addEventListener("visibilitychange", () => {
+    letGo();
+    send({ type: "visible", visible: !document.hidden });
+  });
 }
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 function makeSpeeds() {
@@ -260,34 +242,28 @@ function setControls(on) {
 }
 
 // ---- another run ----
-const RESTART = `<form><h2>Begin the run anew</h2>
-  <div class="seed"><label for="seed">seed</label><input type="number" id="seed" min="0" step="1">
-    <button type="button" id="anotherSeed">another</button></div>
-  <div id="choices"><h3>Imperfections of the simulated robot, and what is so without each</h3><div class="choices"></div></div>
-  <div class="buttons"><button type="button" id="cancel">Cancel</button><button class="main">Restart</button></div></form>`;
 function askRestart() {
-  const dialog = element("dialog", { id: "restartDialog", ariaLabel: "Restart", innerHTML: RESTART });
-  document.body.append(dialog);
   const imperfections = live.imperfections || [];
-  const boxes = imperfections.map(one => element("input", { type: "checkbox", name: one.name, checked: !one.off }));
-  dialog.querySelector(".choices").append(...imperfections.map((one, k) => choice(one, boxes[k])));
-  hide("choices", !boxes.length);
+  $("restartDialog")
+    .querySelector(".choices")
+    .replaceChildren(
+      ...imperfections.map(({ name, text, off }) =>
+        element(
+          "label",
+          { className: "choice" },
+          element("input", { type: "checkbox", name, checked: !off }),
+          element("span", {}, element("b", { textContent: name }), " " + (text || "")),
+        ),
+      ),
+    );
+  hide("choices", !imperfections.length);
   $("seed").value = live.seed ?? 0;
-  $("anotherSeed").onclick = () => ($("seed").value = Math.floor(Math.random() * 1e6));
-  $("cancel").onclick = () => dialog.close();
-  dialog.onclose = () => dialog.remove();
-  dialog.querySelector("form").onsubmit = event => {
-    event.preventDefault();
-    const seed = Math.max(0, Math.round(Number($("seed").value) || 0));
-    send({ type: "restart", seed, without: boxes.filter(box => !box.checked).map(box => box.name) });
-    dialog.close();
-  };
-  dialog.showModal();
+  $("restartDialog").showModal();
   $("seed").select();
 }
-function choice(imperfection, box) {
-  const text = element("span", {}, element("b", { textContent: imperfection.name }), " " + (imperfection.text || ""));
-  return element("label", { className: "choice" }, box, text);
+function restart() {
+  const off = [...$("restartDialog").querySelectorAll("input[type=checkbox]:not(:checked)")].map(box => box.name);
+  send({ type: "restart", seed: Math.max(0, Math.round(Number($("seed").value) || 0)), without: off });
 }
 
 // ---- what is told of the run ----
@@ -313,10 +289,7 @@ function tellState() {
     );
   }
   if (!state) return;
-  if ($("pause")) {
-    const text = state.paused ? "Resume" : "Pause";
-    if ($("pause").textContent !== text) $("pause").textContent = text;
-  }
+  say("pause", state.paused ? "Resume" : "Pause");
   tellSpeed();
   tellDrive();
   tellParameters();
@@ -343,43 +316,26 @@ function tellPrinted(text) {
 function robotState() {
   return (state && state.robots && state.robots[runs.indexOf(run)]) || {};
 }
-let linkCells = null;
+const percent = share => (share == null ? null : (100 * share).toFixed(share < 0.2 ? 1 : 0) + " %");
+let linkTold = "";
 function tellLink() {
-  const { link } = robotState(),
-    load = robotState().load ?? (run.load && run.load.length ? run.load.last : null);
-  hide("linkCard", !link && load == null);
-  if (!link && load == null) return;
-  if (!linkCells) {
-    linkCells = Object.fromEntries(
-      [
-        "lost frames",
-        "damaged frames",
-        "round trip",
-        "sessions lost",
-        "resets",
-        "load of the bus",
-        "errors on the bus",
-        "lost on the bus",
-        "load of the tick",
-      ].map(name => [name, row(name, " ")]),
-    );
-    $("linkCard").append(...Object.values(linkCells).map(([it]) => it));
-  }
+  const { link } = robotState();
   const values = {
     "lost frames": link?.lost,
     "damaged frames": link?.bad,
     "round trip": link?.round_trip_s == null ? null : (1000 * link.round_trip_s).toFixed(1) + " ms",
     "sessions lost": link?.sessions_lost,
     resets: link?.resets,
-    "load of the bus": link?.bus?.load == null ? null : (100 * link.bus.load).toFixed(1) + " %",
+    "load of the bus": percent(link?.bus?.load),
     "errors on the bus": link?.bus?.errors,
     "lost on the bus": link?.bus?.lost,
-    "load of the tick": load == null ? null : (100 * load).toFixed(0) + " %",
+    "load of the tick": percent(robotState().load ?? run.load?.last),
   };
-  for (const [name, [it, cell]] of Object.entries(linkCells)) {
-    it.hidden = values[name] == null;
-    cell.textContent = values[name] ?? "";
-  }
+  const known = Object.entries(values).filter(([, value]) => value != null);
+  if (linkTold === String(known)) return;
+  linkTold = String(known);
+  hide("linkCard", !known.length);
+  $("link").replaceChildren(...known.map(([name, value]) => row(name, value)[0]));
 }
 
 // ---- a brain's parameters ----
@@ -388,10 +344,10 @@ function makeParameters() {
   const list = (live && live.robots[runs.indexOf(run)]?.parameters) || [];
   hide("parameters", !can.has("parameters") || !list.length);
   sliders = list.map(makeSlider);
-  const utilities = element("details", {}, element("summary", { textContent: "Utilities" }));
-  $("parameters").replaceChildren($("parameters").querySelector("h2"));
-  for (const { parameter, whole } of sliders) (parameter.name.includes(".utility.") ? utilities : $("parameters")).append(whole);
-  $("parameters").append(utilities);
+  const isUtility = ({ parameter }) => parameter.name.includes(".utility."),
+    own = sliders.filter(one => !isUtility(one));
+  $("ownParameters").replaceChildren(...own.map(({ whole }) => whole));
+  $("utilityParameters").replaceChildren(...sliders.filter(isUtility).map(({ whole }) => whole));
 }
 function makeSlider(parameter) {
   const range = parameter.least != null && parameter.most != null,

@@ -106,42 +106,25 @@ function makeRobots() {
 // ---- the legend: only what there is ----
 function makeLegend() {
   const entries = runs.map((one, i) => [
-    swatch("line", readable(one.colour)),
-    runs.length > 1 ? "robot " + (i + 1) : run.known ? "true path" : "path by odometry",
+    "━",
+    one.colour,
+    runs.length > 1 ? "robot " + (i + 1) : run.known ? "true path (the simulator's truth)" : "path by odometry",
   ]);
-  if (run.known && runs.length === 1) entries[0][1] += " (the simulator's truth)";
-  if (run.estimate) entries.push([swatch("dashed", colours.estimate), "odometry"]);
-  if (run.known) entries.push([swatch("contact", colours.contact), "true contact"]);
-  if (run.has("whisker_left") || run.has("whisker_right"))
-    entries.push([swatch("touch", colours.touch), "whisker touch"]);
-  if (run.mind) for (const one of run.mind.behaviors) entries.push([swatch("block", readable(one.colour)), one.name]);
-  if (run.mind && run.mind.cognitive.length) entries.push([swatch("line", colours.faint), "cognitive process"]);
-  for (const kind of ["switch", "fault", "lost", "reset", "intervention"])
-    if (run.events.some(event => event.kind === kind))
-      entries.push([swatch(kind, eventColour({ kind })), EVENT_KINDS[kind]]);
+  if (run.estimate) entries.push(["╍", colours.estimate, "odometry"]);
+  const kinds = new Set(run.events.map(event => event.kind));
+  if (run.known) kinds.add("contact");
+  if (run.has("whisker_left") || run.has("whisker_right")) kinds.add("touch");
+  for (const one of run.mind?.behaviors ?? []) entries.push(["■", one.colour, one.name]);
+  if (run.mind?.cognitive.length) entries.push(["━", colours.faint, "cognitive process"]);
+  for (const [kind, [mark, colour, words]] of Object.entries(EVENTS))
+    if (kinds.has(kind)) entries.push([mark, colours[colour], words]);
   $("legend").replaceChildren(
-    ...entries.map(([mark, text]) =>
-      element("div", { className: "entry" }, mark, element("span", { textContent: text })),
-    ),
+    ...entries.map(([mark, colour, words]) => {
+      const sign = element("span", { className: "mark", textContent: mark, ariaHidden: "true" });
+      sign.style.color = inText(colour);
+      return element("div", { className: "entry" }, sign, element("span", { textContent: words }));
+    }),
   );
-}
-// A small canvas.
-function swatch(form, colour) {
-  const canvas = element("canvas", { width: 22 * ratio, height: 14 * ratio, ariaHidden: "true" }),
-    c = canvas.getContext("2d"),
-    y = 7 * ratio;
-  c.strokeStyle = c.fillStyle = colour;
-  c.lineWidth = 2 * ratio;
-  if (form === "block") c.fillRect(3 * ratio, 2 * ratio, 16 * ratio, 10 * ratio);
-  else if (form === "line" || form === "dashed") {
-    if (form === "dashed") c.setLineDash([5 * ratio, 3 * ratio]);
-    c.beginPath();
-    c.moveTo(ratio, y);
-    c.lineTo(21 * ratio, y);
-    c.stroke();
-  } else if (eventMark(c, form, 11 * ratio, y, 4.5 * ratio)) c.fill();
-  else c.stroke();
-  return canvas;
 }
 
 // ---- one moment ----

@@ -153,7 +153,8 @@ function start() {
     }
   });
   if (pageIsLive) {
-    listenToVisibility();
+    listenToControls();
+    listenToHand();
     connect();
   } else show(page);
 }
