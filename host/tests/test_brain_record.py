@@ -20,7 +20,7 @@ from boebot.record.brain_record import BrainNames, BrainRecord, append_brain, re
 from boebot.record.record import Record
 from boebot.result import RunResult, read_run
 from boebot.robot import Robot
-from boebot.view import style, utility_panel
+from boebot.view import picture, style
 from steps import Stepped
 
 PULSE = (2.0, 4.0)  # s; when z is 1
@@ -189,7 +189,7 @@ def test_share_is_of_time_and_not_of_steps(most: int | None) -> None:
     assert kept.behavior_switches == 2
     assert len(kept) == (most or 3) and kept.time[-1] == 3.0
     if most is None:
-        assert utility_panel.segments(kept, 4.0) == [(0, 0.0, 1.0), (1, 1.0, 3.0), (0, 3.0, 4.0)]
+        assert picture.segments(kept, 4.0) == [(0, 0.0, 1.0), (1, 1.0, 3.0), (0, 3.0, 4.0)]
 
 
 def test_few_of_the_steps_are_shown_with_all_shares(result: RunResult) -> None:

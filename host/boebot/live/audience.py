@@ -12,7 +12,7 @@ from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.outbox import Message, merged
 from boebot.live.page_server import LOOPBACK, Page, PageServer
-from boebot.view import page_data, web_page
+from boebot.view import page_data, replay
 
 PAST = 1_200  # chunks that are kept for pages that come later
 BYE_S = 0.5  # for the last messages
@@ -54,7 +54,7 @@ class Audience:
         self._past: deque[Message] = deque()
         self._state: Message = {}  # the newest
         self._layers: list[dict[str, Message]] = []  # of each robot the newest sketches
-        self._server = PageServer(web_page.live, self, host=host, port=port)
+        self._server = PageServer(replay.live_page, self, host=host, port=port)
         self.url = self._server.url
 
     @property

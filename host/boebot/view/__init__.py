@@ -165,6 +165,6 @@ def _write_page(results: Sequence[Run], path: Path) -> None:
 
 
 def _write_common_picture(robots: Sequence[Run], error: BaseException | None, path: Path) -> None:
-    from boebot.view import together_picture
+    from boebot.view import picture
 
-    together_picture.write(robots, error, path)
+    picture.write_together(robots, error, path)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
-from boebot.view import picture, replay, together_picture
+from boebot.view import picture, replay
 from boebot.view.display import has_display, kernel_shell
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def drawn_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
         BoebotError: as `drawn`.
     """
     _check(robots)
-    return together_picture.draw(robots, error)
+    return picture.draw_together(robots, error)
 
 
 def play(results: Sequence[Run]) -> Path | None:

@@ -1,9 +1,11 @@
 """run.png: the run seen from above. Arena, true path, path by odometry, true contacts, the robot at start and end with
 what its sensors look at. What the robot does not have is neither drawn nor named. Of a brain of processes, the path has
-the colour of the active motor behavior, and its utilities stand below."""
+the colour of the active motor behavior, and its utilities stand below (as in Fig. 8.3 of the notes): a line for each
+process, and a band that says which motor behavior was active. Of several robots each path has the robot's colour."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +15,17 @@ from matplotlib.lines import Line2D
 
 from boebot.errors import brief
 from boebot.record.figures import counted
-from boebot.view import scene, style, utility_panel
-from boebot.view.painter import draw_arena, draw_layers, draw_robot, draw_swept, layer_entries, legend_entries, paint
+from boebot.view import scene, style
+from boebot.view.painter import (
+    draw_arena,
+    draw_layers,
+    draw_robot,
+    draw_swept,
+    layer_entries,
+    legend_entries,
+    paint,
+    quiet,
+)
 from boebot.view.sheet import Sheet
 
 if TYPE_CHECKING:
@@ -29,6 +40,11 @@ if TYPE_CHECKING:
 
 SEGMENTS_MAXIMUM = 6000  # of a path as it is drawn
 SPOT_M = 0.03  # a shorter stretch would hardly be seen
+BAND = (-1.42, -1.12)  # where the band of active behaviors lies, below the utilities' -1
+LOW, HIGH = -1.55, 1.15  # ends of the utilities' axis
+LEGEND_COLUMNS = 5
+
+Shown = tuple[int, "Run", scene.View]
 
 
 def write(result: Run, path: Path) -> Path:
@@ -41,7 +57,7 @@ def draw(result: Run) -> Sheet:
     view = scene.view(result)
     low, high = scene.bounds(view)
     record = result.overview.brain if result.overview.brain else None
-    rows = utility_panel.legend_rows(record) if record is not None else 0
+    rows = _legend_rows(record) if record is not None else 0
     sheet = Sheet(low, high, _title(result, view), _caption(result), _legend(result, view), rows)
     axes = sheet.axes
     draw_arena(axes, view.plan)
@@ -51,13 +67,13 @@ def draw(result: Run) -> Sheet:
         assert sheet.panel is not None
         _draw_behaviors(axes, view.path, result.overview.columns.time, record)
         with rc_context({"text.parse_math": False}):
-            utility_panel.draw(sheet.panel, record, result.run_time)
+            _draw_utilities(sheet.panel, record, result.run_time)
     if view.estimate is not None:
         thin = slice(None, None, max(1, len(view.estimate.x) // SEGMENTS_MAXIMUM))  # each dash takes memory
         axes.plot(view.estimate.x[thin], view.estimate.y[thin], color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
         paint(axes, scene.ghost_items(result.robot), pose=view.estimate.at(-1))
     draw_layers(axes, view)
-    draw_marks(axes, view)
+    _draw_marks(axes, view)
     for index, colour in ((0, style.START), (-1, style.END)):
         turret = float(view.turret[index])
         draw_swept(axes, view.swept, index, colour)
@@ -81,7 +97,7 @@ def _draw_path(axes: Axes, path: Pose, time: Floats) -> None:
 
 def _draw_behaviors(axes: Axes, path: Pose, time: Floats, record: BrainRecord) -> None:
     """The path, each stretch in the colour of the motor behavior that was active; a turn on the spot as a dot."""
-    for behavior, begun, until in utility_panel.segments(record, float(time[-1])):
+    for behavior, begun, until in segments(record, float(time[-1])):
         first, last = np.searchsorted(time, (begun, until))
         there = slice(int(first), int(last) + 1)  # up to where the next one begins
         x, y, colour = path.x[there], path.y[there], style.behavior(behavior)
@@ -90,7 +106,7 @@ def _draw_behaviors(axes: Axes, path: Pose, time: Floats, record: BrainRecord) -
             axes.plot(x[0], y[0], "o", ms=5.5, color=colour, mec=style.FLOOR, mew=0.6, zorder=8)
 
 
-def draw_marks(axes: Axes, view: scene.View) -> None:
+def _draw_marks(axes: Axes, view: scene.View) -> None:
     """Where a whisker was pressed (circles) and where the body touched something (crosses)."""
     if len(view.touches):
         axes.scatter(
@@ -136,10 +152,129 @@ def _legend(result: Run, view: scene.View) -> list[Artist]:
         entries.append(Line2D([], [], color=style.ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="path by odometry"))
     for label, colour in (("start", style.START), ("end", style.END)):
         entries.append(Line2D([], [], ls="", marker="o", mfc=style.BODY, mec=colour, mew=1.8, ms=8, label=label))
-    if len(view.touches):
+    return entries + _legend_marks([view]) + layer_entries(view) + legend_entries(view.plan)
+
+
+def _legend_marks(views: Sequence[scene.View]) -> list[Artist]:
+    """Entries of touches and contacts, where there are any."""
+    entries: list[Artist] = []
+    if any(len(view.touches) for view in views):
         entries.append(
             Line2D([], [], ls="", marker="o", mfc=style.FLOOR, mec=style.TOUCH, mew=1.6, ms=6, label="whisker touch")
         )
-    if len(view.true_contacts):
+    if any(len(view.true_contacts) for view in views):
         entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="true contact"))
-    return entries + layer_entries(view) + legend_entries(view.plan)
+    return entries
+
+
+# ---- the utilities of a brain of processes ---------------------------------------------------------------------------
+
+
+def segments(record: BrainRecord, end: float) -> list[tuple[int, float, float]]:
+    """Which motor behavior (its index) was active from when to when (s), to the `end` of the run."""
+    if not len(record.motor):
+        return []
+    changes = np.flatnonzero(np.diff(record.motor)) + 1
+    begins = [0, *changes.tolist()]
+    ends = [*record.time[changes].tolist(), max(end, float(record.time[-1]))]
+    return [(int(record.motor[i]), float(record.time[i]), until) for i, until in zip(begins, ends, strict=True)]
+
+
+def _draw_utilities(axes: Axes, record: BrainRecord, end: float) -> None:
+    """Draws the panel; `end` of the run in s."""
+    low, high = BAND
+    for behavior, begun, until in segments(record, end):
+        colour = style.behavior(behavior)
+        axes.fill_between((begun, until), low, high, facecolor=colour, edgecolor="none", zorder=3)
+        axes.axvspan(begun, until, ymin=(-1.05 - LOW) / (HIGH - LOW), color=colour, alpha=0.07, lw=0, zorder=0)
+    for name in scene.shown_cognitive(record):
+        axes.plot(record.time, record.utility_of(name), color=style.FAINT, lw=0.8, ls=_dashes(record, name), zorder=4)
+    for index, name in enumerate(record.names.behaviors):
+        axes.plot(record.time, record.utility_of(name), color=style.behavior(index), lw=1.7, zorder=5)
+    axes.set_xlim(0.0, max(end, 1e-3))
+    axes.set_ylim(LOW, HIGH)
+    axes.set_yticks((sum(BAND) / 2, -1.0, -0.5, 0.0, 0.5, 1.0), ("active", "−1", "−0.5", "0", "0.5", "1"))
+    quiet(axes, "time (s)", "utility (1)")
+    axes.set_facecolor(style.FLOOR)
+    axes.legend(
+        handles=_utility_entries(record, end), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=LEGEND_COLUMNS,
+        frameon=False, fontsize=8.5, labelcolor=style.INK, handletextpad=0.5, columnspacing=1.6, borderaxespad=0.1,
+    )  # fmt: skip
+
+
+def _legend_rows(record: BrainRecord) -> int:
+    """Of the legend above the panel."""
+    return -(-(len(record.names.behaviors) + len(scene.shown_cognitive(record))) // LEGEND_COLUMNS)
+
+
+def _dashes(record: BrainRecord, name: str) -> tuple[int, tuple[float, ...]]:
+    return style.DASHES[record.names.cognitive.index(name) % len(style.DASHES)]
+
+
+def _utility_entries(record: BrainRecord, end: float) -> list[Artist]:
+    shares = record.shares(end)
+    entries: list[Artist] = [
+        Line2D([], [], color=style.behavior(index), lw=2.4, label=f"{name} {100 * shares[name]:.0f} %")
+        for index, name in enumerate(record.names.behaviors)
+    ]
+    entries += [
+        Line2D([], [], color=style.FAINT, lw=0.8, ls=_dashes(record, name), label=name)
+        for name in scene.shown_cognitive(record)
+    ]
+    return entries
+
+
+# ---- several robots --------------------------------------------------------------------------------------------------
+
+
+def write_together(robots: Sequence[Run], error: BaseException | None, path: Path) -> Path:
+    """Draws all robots of a run into a PNG file."""
+    return draw_together(robots, error).save(path)
+
+
+def draw_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
+    """Draws all robots of a run; `error`: why it ended before its time, or None."""
+    shown: list[Shown] = [(n, robot, scene.view(robot)) for n, robot in enumerate(robots, 1) if robot.ticks]
+    plan = shown[0][2].plan
+    low, high = scene.bounds(*(view for _, _, view in shown))
+    sheet = Sheet(low, high, _title_together(robots), _caption_together(robots, error), _legend_together(shown))
+    axes = sheet.axes
+    draw_arena(axes, plan)
+    for number, robot, view in shown:
+        colour = style.colour(number)
+        axes.plot(view.path.x, view.path.y, color=colour, lw=1.9, ls=style.dashes(number), zorder=7)
+        axes.plot(view.path.x[0], view.path.y[0], "o", mfc=style.PAPER, mec=colour, mew=1.8, ms=6, zorder=8)
+        draw_layers(axes, view, colour)
+        _draw_marks(axes, view)
+        draw_swept(axes, view.swept, -1, colour)
+        draw_robot(axes, robot.robot, view.pose(-1), colour, plan=plan, turret=float(view.turret[-1]))
+        axes.annotate(
+            str(number), view.pose(-1)[:2], color=style.INK, fontsize=8, weight="bold", ha="center", va="center",
+            zorder=13,
+        )  # fmt: skip
+    return sheet
+
+
+def _title_together(robots: Sequence[Run]) -> str:
+    first = robots[0]
+    return f"{len(robots)} robots on {first.board} in {first.table()['arena']}"
+
+
+def _caption_together(robots: Sequence[Run], error: BaseException | None) -> list[str]:
+    return [
+        f"{max(robot.run_time for robot in robots):.1f} s",
+        f"true distance {sum(robot.true_distance or 0.0 for robot in robots):.2f} m in all",
+        counted(sum(robot.true_contacts or 0 for robot in robots), "true contact", "true contacts"),
+        *brief(error),
+    ]
+
+
+def _legend_together(shown: list[Shown]) -> list[Artist]:
+    entries: list[Artist] = [
+        Line2D(
+            [], [], color=style.colour(n), lw=2.2, ls=style.dashes(n), label=f"{n}: {robot.brain}, {robot.robot.name}"
+        )
+        for n, robot, _ in shown
+    ]
+    entries.append(Line2D([], [], ls="", marker="o", mfc=style.PAPER, mec=style.INK, mew=1.6, ms=6, label="start"))
+    return entries + _legend_marks([view for _, _, view in shown]) + legend_entries(shown[0][2].plan)

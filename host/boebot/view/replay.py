@@ -1,22 +1,41 @@
-"""replay.html: one page, offline, that plays and scrubs a run, of one robot or of several. The page is that of the live
-view (boebot.view.web_page), with the data of the whole run in it (boebot.view.page_data)."""
+"""The page of a run, of one robot or of several: the files of the folder `page` in one text, which needs nothing else.
+
+replay.html has the data of the whole run in it (boebot.view.page_data); it needs no network and is allowed none. The
+page of the live view asks for its data, and may reach the server that it came from.
+"""
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Sequence
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boebot.record.interventions import STREAM, in_words
-from boebot.view import page_data, scene, web_page
-from boebot.view.utility_panel import shown_cognitive
+from boebot.view import page_data, scene, style
 
 if TYPE_CHECKING:
     from boebot.record.run import Run
 
 STEPS_AT_MOST = 6_000  # of a brain of processes
 SWEPT_AT_MOST = 1_000_000  # numbers of two bytes, of all sweeps of all robots: 2.7 MB of the page
+
+
+FOLDER = Path(__file__).with_name("page")
+SCRIPTS = (
+    "base.js",  # elements, numbers, colours
+    "model.js",  # a robot's run, which grows
+    "camera.js",  # which part of the arena is seen
+    "arena.js",  # the painter; arena, robots, paths from above
+    "lanes.js",  # signals over time
+    "panels.js",  # signals at a moment, values under the pointer
+    "live.js",  # of a run that goes on: the connection, the newest moment, controls
+    "hand.js",  # driving it, moving what is in it
+    "time.js",  # the moment that is shown: playing, scrubbing; the beginning
+)
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 
 
 def write(results: Sequence[Run], path: Path) -> Path:
@@ -27,7 +46,7 @@ def write(results: Sequence[Run], path: Path) -> Path:
 
 def page_text(results: Sequence[Run]) -> str:
     """The page of the robots of one run."""
-    return web_page.replay(content(results))
+    return joined(content(results))
 
 
 def content(results: Sequence[Run]) -> dict[str, Any]:
@@ -52,7 +71,7 @@ def content(results: Sequence[Run]) -> dict[str, Any]:
 def run_data(result: Run, view: scene.View, number: int = 1, room: int | None = None) -> dict[str, Any]:
     """What the page shows of one robot, with its whole run. `number`: of the robot, from 1; `room`: of its sweeps."""
     brain = result.overview.brain
-    cognitive = () if brain is None else shown_cognitive(brain)
+    cognitive = () if brain is None else scene.shown_cognitive(brain)
     about = page_data.robot_data(
         result.robot,
         result.overview.columns,
@@ -95,3 +114,47 @@ def stretch(result: Run, view: scene.View) -> page_data.Stretch:
         events=sorted(page_data.events(few.columns, result.whiskers) + _deeds(result), key=itemgetter(0)),
         pins=page_data.pins(result.record.block("pins"), result.robot, result.clock_offset),
     )
+
+
+# ---- the page's text -------------------------------------------------------------------------------------------------
+
+
+def live_page(server: str) -> str:
+    """The page of a run that goes on, which asks for its data. `server`: as in ws://127.0.0.1:8080."""
+    return joined(None, f"{POLICY}; connect-src 'self' {server}")
+
+
+def joined(content: dict[str, Any] | None, policy: str = POLICY) -> str:
+    """All of it; the data may hold any text."""
+    data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {
+        "POLICY": policy,
+        "COLOURS": colours(),
+        "STYLE": _read("style.css"),
+        "SCRIPT": "\n".join(map(_read, SCRIPTS)),
+        "DATA": data,
+        "LAYERS": json.dumps(style.LAYERS),
+    }
+    # DATA and LAYERS stand in SCRIPT, so that is filled in before; nothing is looked for in the data
+    page = _filled(_read("page.html"), {name: parts[name] for name in ("POLICY", "COLOURS", "STYLE", "SCRIPT")})
+    return _filled(page, {name: parts[name] for name in ("DATA", "LAYERS")})
+
+
+def colours() -> str:
+    """The palette as CSS variables; the page's scripts read these, too."""
+    light = {name: style.paint(name) for name in style.DARK}
+    dark = f"@media (prefers-color-scheme: dark) {{ :root {{ {_variables(style.DARK)} }} }}"
+    return f":root {{ {_variables(light)} }}\n{dark}"
+
+
+def _variables(values: dict[str, str]) -> str:
+    return " ".join(f"--{name}: {value};" for name, value in values.items())
+
+
+def _filled(text: str, parts: dict[str, str]) -> str:
+    """With each part where its name stands, as in /*STYLE*/."""
+    return re.sub(r"/\*([A-Z]+)\*/(null|\[\])?", lambda found: parts.get(found[1], found[0]), text)
+
+
+def _read(name: str) -> str:
+    return (FOLDER / name).read_text(encoding="utf-8")

@@ -15,7 +15,7 @@ import boebot
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
 from boebot.devices.drawing import circle
 from boebot.result import RunResult
-from boebot.view import replay, scene, style, web_page
+from boebot.view import replay, scene, style
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 pytestmark = pytest.mark.skipif(NODE is None, reason="runs the page's script with node, which is not installed")
@@ -120,7 +120,7 @@ def test_truth_is_marked_and_absent_where_nobody_knows_it(
     assert shown[0]["texts"]["poseName"] == "true pose" and "truth" not in shown[0]["hidden"]
     content = replay.content([result])
     content["runs"][0]["known"] = False  # as of a real robot
-    (tmp_path / "page.html").write_text(web_page.replay(content))
+    (tmp_path / "page.html").write_text(replay.joined(content))
     assert NODE is not None
     command = [NODE, str(STAND_INS), str(tmp_path / "page.html"), "1.0"]
     moment = json.loads(subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout)

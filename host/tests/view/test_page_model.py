@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import boebot
-from boebot.view import replay, scene, web_page
+from boebot.view import replay, scene
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 pytestmark = pytest.mark.skipif(NODE is None, reason="runs the page's script with node, which is not installed")
@@ -25,7 +25,7 @@ def answers(about: dict[str, Any], chunks: list[dict[str, Any]], *ask: str) -> l
     assert NODE is not None
     given = json.dumps({"about": about, "chunks": chunks, "ask": ask})
     done = subprocess.run(
-        [NODE, str(MODEL), str(web_page.FOLDER)], input=given, capture_output=True, text=True, timeout=60
+        [NODE, str(MODEL), str(replay.FOLDER)], input=given, capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]
