@@ -21,6 +21,7 @@ from boebot.arenas.description import ArenaDescription
 SCHEMA_URI = "http://json-schema.org/draft-07/schema#"
 LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 BEGIN, END = "<!-- keys: begin -->", "<!-- keys: end -->"
+OF_SHAPES = ("name", "height_m", "infrared_reflectance", "sound_reflectance")  # keys of all that keeps robots out
 UNITS = {"m": "m", "rad": "rad", "s": "s", "w": "W"}  # by a key's last part
 
 
@@ -51,11 +52,15 @@ def page(text: str) -> str:
 def _tables() -> str:
     """One table per kind of table in a file."""
     definitions = msgspec.json.schema(ArenaDescription)["$defs"]
-    sections = [_section("at the top of the file", definitions["ArenaDescription"], top=True)]
+    sections = [_section("at the top of the file", definitions["ArenaDescription"])]
+    titles: dict[str, list[str]] = {}
     for key, value in definitions["ArenaDescription"]["properties"].items():
         if name := _table_of(value):
-            brackets = f"[[{key}]]" if value.get("type") == "array" else f"[{key}]"
-            sections.append(_section(f"`{brackets}`", definitions[name]))
+            titles.setdefault(name, []).append(f"`[[{key}]]`" if value.get("type") == "array" else f"`[{key}]`")
+    sections += [_section(", ".join(keys), definitions[name]) for name, keys in titles.items()]
+    shape = definitions["Disc"] | {"description": "Outlines, obstacles, walls, discs and moving shapes have these, too."}
+    shape["properties"] = {key: shape["properties"][key] for key in OF_SHAPES}
+    sections.append(_section("every shape", shape))
     sections.append(_section("a waypoint of `path`", definitions["Waypoint"]))
     return "\n".join(sections)
 
@@ -67,11 +72,13 @@ def _table_of(value: dict[str, Any]) -> str | None:
     return None if found is None else str(found).rsplit("/", 1)[-1]
 
 
-def _section(title: str, definition: dict[str, Any], top: bool = False) -> str:
+def _section(title: str, definition: dict[str, Any]) -> str:
+    properties = definition["properties"]
+    has_more = set(OF_SHAPES) < set(properties)
     rows = [
         f"| `{key}` | {_unit(key)} | {_values(value)} | {_default(key, value, definition)} | {_meaning(value)} |"
-        for key, value in definition["properties"].items()
-        if not (top and _table_of(value))
+        for key, value in properties.items()
+        if key == "path" or not (_table_of(value) or (has_more and key in OF_SHAPES))
     ]
     text = " ".join(definition.get("description", "").split())
     head = "| key | unit | values | default | meaning |\n|---|---|---|---|---|"
