@@ -8,10 +8,10 @@ robot.accelerometer.value
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
-from boebot.devices.device import Finite, NotNegative, Place, Positive, Reader, Sensor
-from boebot.devices.readings import Readings
+from boebot.devices.device import Finite, NotNegative, Positive, Sensor
 
 
 class Acceleration(NamedTuple):
@@ -40,11 +40,6 @@ class Accelerometer(Sensor, tag="accelerometer", frozen=True, kw_only=True):
     COLUMNS: ClassVar = (("value", "m_s2", 5),)
     SHOWN: ClassVar = ("value", "m/s²", 1.0, 2)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first = place.where.start
-
-        def read(sample: Readings, _: object) -> Acceleration:
-            return Acceleration(sample.values[first], sample.ages[first], True)
-
-        return read
+    def reading(self, values: Sequence[float], age: float) -> Acceleration:
+        """See `VehicleDevice`."""
+        return Acceleration(values[0], age, True)

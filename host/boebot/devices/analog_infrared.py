@@ -14,15 +14,14 @@ Nearer than 10 cm the voltage falls again: things there look farther away than t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.device import ANALOG_PINS, Checkup, Place, Point, Reader, SlowDevice
+from boebot.devices.device import ANALOG_PINS, Checkup, Point, SlowDevice
 from boebot.devices.drawing import Item, ray
-from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
-from boebot.link.messages import DevicesTelemetry
 
 SCALE_V_M = 0.339
 OFFSET_M = 0.0474
@@ -68,6 +67,8 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
     )
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
+    AGE: ClassVar[str] = "analog_infrared_age"
+    PERIOD_TICKS: ClassVar[int] = READ_TICKS
     COLUMNS: ClassVar = (("distance", "m", 4),)
     SHOWN: ClassVar = ("distance", "m", 1.0, 3)
 
@@ -81,19 +82,12 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
         plug = "" if newest.voltage <= VOLTS_MOST else f"is its output plugged to {self.wired_to}?"
         return Checkup(f"{seen}, {newest.voltage:.2f} V", expected, plug)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        fresh, tick_s = fresh_ticks(READ_TICKS, place.message_ticks), place.tick_s
-
-        def read(_: object, slow: Latest) -> AnalogInfrared:
-            message, since = slow.of(DevicesTelemetry)
-            at_pin = voltage(message.analog_infrared, message.supply)
-            if message.analog_infrared_age >= NEVER or at_pin is None:
-                return AnalogInfrared(None, None, float("inf"), False)
-            ticks = message.analog_infrared_age + since
-            return AnalogInfrared(distance(at_pin), at_pin, ticks * tick_s, ticks <= fresh)
-
-        return read
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> AnalogInfrared:
+        """See `SlowDevice`."""
+        at_pin = voltage(message.analog_infrared, message.supply)
+        if age == math.inf or at_pin is None:
+            return AnalogInfrared(None, None, math.inf, False)
+        return AnalogInfrared(distance(at_pin), at_pin, age, fresh)
 
     def drawing(self, name: str) -> list[Item]:
         """Its line of sight."""

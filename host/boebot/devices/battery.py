@@ -14,8 +14,9 @@ In a robot without a board the notes' energy (section 1.9), read as a voltage.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
@@ -24,16 +25,11 @@ from boebot.devices.device import (
     ANALOG_PINS,
     Checkup,
     NotNegative,
-    Place,
     Positive,
-    Reader,
     SlowDevice,
     VehicleDevice,
 )
-from boebot.devices.latest import NEVER, Latest, fresh_ticks
-from boebot.devices.readings import Readings
 from boebot.devices.wiring import GROUND, PACK, Wire
-from boebot.link.messages import DevicesTelemetry
 
 LOWER_KOHM = 10.0  # of the divider: the converter wants a source of 10 kΩ or less (data sheet, 24.6.1)
 LEAST_V = 4.5  # of the pack; with less the servos hardly turn
@@ -61,6 +57,8 @@ class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
+    AGE: ClassVar[str] = "battery_age"
+    PERIOD_TICKS: ClassVar[int] = READ_TICKS
     COLUMNS: ClassVar = (("voltage", "v", 3),)
     SHOWN: ClassVar = ("voltage", "V", 1.0, 2)
 
@@ -80,19 +78,12 @@ class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
         low = f"charge or change the battery; if it is full, look at the divider on {self.wired_to}"
         return Checkup(f"{newest.voltage:.2f} V", expected, "" if newest.voltage >= LEAST_V else low)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        ratio, fresh, tick_s = self.ratio, fresh_ticks(READ_TICKS, place.message_ticks), place.tick_s
-
-        def read(_: object, slow: Latest) -> Battery:
-            message, since = slow.of(DevicesTelemetry)
-            at_pin = voltage(message.battery, message.supply)
-            if message.battery_age >= NEVER or at_pin is None:
-                return Battery(None, float("inf"), False)
-            ticks = message.battery_age + since
-            return Battery(at_pin * ratio, ticks * tick_s, ticks <= fresh)
-
-        return read
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> Battery:
+        """See `SlowDevice`."""
+        at_pin = voltage(message.battery, message.supply)
+        if age == math.inf or at_pin is None:
+            return Battery(None, math.inf, False)
+        return Battery(at_pin * self.ratio, age, fresh)
 
 
 class Energy(VehicleDevice, tag="energy", frozen=True, kw_only=True):
@@ -115,11 +106,6 @@ class Energy(VehicleDevice, tag="energy", frozen=True, kw_only=True):
             return None
         return "full_v", f" is {self.full_v:g}; expected more than empty_v, {self.empty_v:g} V"
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first = place.where.start
-        return lambda sample, _: _of_readings(sample, first)
-
-
-def _of_readings(sample: Readings, first: int) -> Battery:
-    return Battery(sample.values[first], sample.ages[first], True)
+    def reading(self, values: Sequence[float], age: float) -> Battery:
+        """See `VehicleDevice`."""
+        return Battery(values[0], age, True)

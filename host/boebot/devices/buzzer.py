@@ -12,13 +12,11 @@ A message may be lost: it is sent again, unchanged, until devices_telemetry brin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from boebot.devices.device import Checkup, Place, Reader, SlowDevice
-from boebot.devices.latest import Latest, fresh_ticks
+from boebot.devices.device import Checkup, SlowDevice
 from boebot.devices.wiring import GROUND, Wire
 from boebot.link.messages import Buzzer as BuzzerMessage
-from boebot.link.messages import DevicesTelemetry
 
 FREQUENCY_MIN, FREQUENCY_MAX = 40.0, 8000.0  # Hz
 DURATION_SCALE = 0.01  # seconds per count on the wire
@@ -72,12 +70,6 @@ class PiezoBuzzer(SlowDevice, tag="buzzer", frozen=True, kw_only=True):
         """See `Device`."""
         return Checkup("silent" if readings[-1].token == 0 else "a tone has sounded", "silent")
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        fresh, tick_s = fresh_ticks(1, place.message_ticks), place.tick_s
-
-        def read(_: object, slow: Latest) -> Buzzer:
-            message, since = slow.of(DevicesTelemetry)
-            return Buzzer(message.buzzer_token, since * tick_s, since <= fresh)
-
-        return read
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> Buzzer:
+        """See `SlowDevice`."""
+        return Buzzer(message.buzzer_token, age, fresh)

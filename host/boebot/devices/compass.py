@@ -16,15 +16,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Checkup, NotNegative, Place, Reader, Sensor, SlowDevice
-from boebot.devices.latest import NEVER, Latest, fresh_ticks
-from boebot.devices.readings import Readings
+from boebot.devices.device import Checkup, NotNegative, Sensor, SlowDevice
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
-from boebot.link.messages import CompassStatus, DevicesTelemetry
+from boebot.link.messages import CompassStatus
 
 TESLA_PER_COUNT = 1e-4 / 1090  # 1090 counts per gauss (data sheet, gain setting 1)
 OVERFLOW = -4096
@@ -66,6 +64,8 @@ class MagneticCompass(SlowDevice, tag="compass", frozen=True, kw_only=True):
     )
     NEEDS: ClassVar[dict[str, str]] = {"two-wire interface": "two-wire bus"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"sda_pin": (18,), "scl_pin": (19,)}
+    AGE: ClassVar[str] = "compass_age"
+    PERIOD_TICKS: ClassVar[int] = READ_TICKS
     COLUMNS: ClassVar = (("heading", "rad", 5),)
     SHOWN: ClassVar = _SHOWN
 
@@ -85,25 +85,16 @@ class MagneticCompass(SlowDevice, tag="compass", frozen=True, kw_only=True):
         near = "is iron, a magnet or a motor near it? the field of the earth has 22 to 67 µT"
         return Checkup(reads, expected, "" if FIELD_LEAST_UT <= field_ut <= FIELD_MOST_UT else near)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        fresh, tick_s = fresh_ticks(READ_TICKS, place.message_ticks), place.tick_s
-        x0, y0 = self.offset_counts
-
-        def read(_: object, slow: Latest) -> Compass:
-            message, since = slow.of(DevicesTelemetry)
-            status, ticks = CompassStatus(message.compass_status), message.compass_age + since
-            counts = (message.compass_x, message.compass_y, message.compass_z)
-            if message.compass_age >= NEVER or OVERFLOW in counts:
-                age = ticks * tick_s if message.compass_age < NEVER else float("inf")
-                return Compass(None, None, status, age, False)
-            x, y, z = (count * TESLA_PER_COUNT for count in counts)
-            ahead, aside = counts[0] - x0, counts[1] - y0
-            heading = math.atan2(-aside, ahead) if ahead or aside else None
-            known = status == CompassStatus.OK and heading is not None
-            return Compass(heading, (x, y, z), status, ticks * tick_s, known and ticks <= fresh)
-
-        return read
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> Compass:
+        """See `SlowDevice`."""
+        status = CompassStatus(message.compass_status)
+        counts = (message.compass_x, message.compass_y, message.compass_z)
+        if age == math.inf or OVERFLOW in counts:
+            return Compass(None, None, status, age, False)
+        x, y, z = (count * TESLA_PER_COUNT for count in counts)
+        ahead, aside = counts[0] - self.offset_counts[0], counts[1] - self.offset_counts[1]
+        heading = math.atan2(-aside, ahead) if ahead or aside else None
+        return Compass(heading, (x, y, z), status, age, status == CompassStatus.OK and heading is not None and fresh)
 
 
 class HeadingCompass(Sensor, tag="heading_compass", frozen=True, kw_only=True):
@@ -116,11 +107,6 @@ class HeadingCompass(Sensor, tag="heading_compass", frozen=True, kw_only=True):
     COLUMNS: ClassVar = (("heading", "rad", 5),)
     SHOWN: ClassVar = _SHOWN
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first = place.where.start
-
-        def read(sample: Readings, _: object) -> Compass:
-            return Compass(sample.values[first], None, CompassStatus.OK, sample.ages[first], True)
-
-        return read
+    def reading(self, values: Sequence[float], age: float) -> Compass:
+        """See `VehicleDevice`."""
+        return Compass(values[0], None, CompassStatus.OK, age, True)

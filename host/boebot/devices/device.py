@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot import slips
-from boebot.devices.latest import Latest
+from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.devices.wiring import BREADBOARD, Wire
 from boebot.link.messages import DevicesTelemetry
 
@@ -233,6 +233,26 @@ class SlowDevice(Device, frozen=True, kw_only=True):
     """A device of a board whose readings come in a message besides telemetry."""
 
     MESSAGE: ClassVar[type] = DevicesTelemetry
+    AGE: ClassVar[str] = ""  # field of the message: ticks since the device was read; empty: as old as the message
+    PERIOD_TICKS: ClassVar[int] = 1  # from one reading to the next
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        fresh, name, tick_s = fresh_ticks(self.PERIOD_TICKS, place.message_ticks), place.name, place.tick_s
+
+        def read(_: object, slow: Latest) -> Any:
+            message, since = slow.of(self.MESSAGE)
+            before = getattr(message, self.AGE) if self.AGE else 0
+            if before >= NEVER:
+                return self.reading(message, name, math.inf, False)
+            return self.reading(message, name, (before + since) * tick_s, before + since <= fresh)
+
+        return read
+
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> Any:
+        """The reading of the device of that name in a message: so old (s; infinite: never read), and whether that is
+        young enough."""
+        raise NotImplementedError
 
     def has_messages(self, devices: Mapping[str, Device]) -> bool:
         """It does."""
@@ -258,6 +278,15 @@ class SlowDevice(Device, frozen=True, kw_only=True):
 
 class VehicleDevice(Device, frozen=True, kw_only=True):
     """A device of a robot without a board: no pins. `on = false` leaves it out."""
+
+    def reader(self, place: Place) -> Reader:
+        """See `Device`."""
+        where, first = place.where, place.where.start
+        return lambda sample, _: self.reading(sample.values[where], sample.ages[first])
+
+    def reading(self, values: Sequence[float], age: float) -> Any:
+        """Its reading by its values among the robot's readings, so old (s)."""
+        raise NotImplementedError
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """One per entry of COLUMNS, each of which is one number of the device."""

@@ -45,7 +45,6 @@ from boebot.devices.device import (
 )
 from boebot.devices.drawing import Item, cone
 from boebot.devices.latest import NEVER, STALE_PERIODS, Latest
-from boebot.devices.readings import Readings
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import DevicesTelemetry, Telemetry
 from boebot.link.messages import Infrared as Bits
@@ -203,15 +202,9 @@ class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=T
     SIGN: ClassVar = _SIGN
     SHOWN: ClassVar = ("reading", "", 1.0, 2)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first, threshold = place.where.start, self.threshold
-
-        def read(sample: Readings, _: object) -> Infrared:
-            value = sample.values[first]
-            return Infrared(value >= threshold, sample.ages[first], True, None, value)
-
-        return read
+    def reading(self, values: Sequence[float], age: float) -> Infrared:
+        """See `VehicleDevice`."""
+        return Infrared(values[0] >= self.threshold, age, True, None, values[0])
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Detected or not, and the reading."""

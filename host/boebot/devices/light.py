@@ -17,26 +17,22 @@ Capacitor and phototransistor stand side by side (Robotics with the Board of Edu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from boebot.devices.device import (
     ANALOG_PINS,
     Angle,
     Checkup,
     NotNegative,
-    Place,
     Point,
     Positive,
-    Reader,
     Sensor,
     SlowDevice,
 )
 from boebot.devices.drawing import Item, spot
-from boebot.devices.latest import NEVER, Latest, fresh_ticks
-from boebot.devices.readings import Readings
 from boebot.devices.wiring import GROUND, Wire
-from boebot.link.messages import DevicesTelemetry
 
 LONGEST_US = 14_000  # on the wire: this time or longer
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -76,6 +72,8 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
     )
     # Port D has its own pin-change interrupt; on port C the encoders' interrupt stamps the edge, on pin 8 Timer1.
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (*range(9), *ANALOG_PINS)}
+    AGE: ClassVar[str] = "light_age"
+    PERIOD_TICKS: ClassVar[int] = FRAME_TICKS
     COLUMNS: ClassVar = (("decay_time", "s", 6),)
     SHOWN: ClassVar = ("decay_time", "ms", 1e3, 3)
 
@@ -89,20 +87,12 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
             return Checkup(f"dark, {LONGEST_US / 1000:g} ms or longer", expected)
         return Checkup(f"{1000 * newest.decay_time:.3f} ms", expected)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        field = DevicesTelemetry._fields.index(place.name)
-        fresh, tick_s = fresh_ticks(FRAME_TICKS, place.message_ticks), place.tick_s
-
-        def read(_: object, slow: Latest) -> Light:
-            message, since = slow.of(DevicesTelemetry)
-            us, ticks = message[field], message.light_age + since
-            age = ticks * tick_s if message.light_age < NEVER else float("inf")
-            if message.light_age >= NEVER or us == 0:
-                return Light(None, None, False, age, False)
-            return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, ticks <= fresh)
-
-        return read
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> Light:
+        """See `SlowDevice`."""
+        us = getattr(message, name)
+        if age == math.inf or us == 0:
+            return Light(None, None, False, age, False)
+        return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, fresh)
 
     def drawing(self, name: str) -> list[Item]:
         """Where it sits, and which way it looks."""
@@ -124,14 +114,9 @@ class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
     COLUMNS: ClassVar = (("brightness", "w_m2", 5),)
     SHOWN: ClassVar = ("brightness", "W/m²", 1.0, 2)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first = place.where.start
-
-        def read(sample: Readings, _: object) -> Light:
-            return Light(None, sample.values[first], False, sample.ages[first], True)
-
-        return read
+    def reading(self, values: Sequence[float], age: float) -> Light:
+        """See `VehicleDevice`."""
+        return Light(None, values[0], False, age, True)
 
     def drawing(self, name: str) -> list[Item]:
         """Where it sits, and which way it looks."""

@@ -13,15 +13,14 @@ sensor's threshold is a dark floor. In a robot without a board the floor's refle
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Checkup, NotNegative, Place, Point, Reader, Sensor, Share, SlowDevice
+from boebot.devices.device import Checkup, NotNegative, Point, Sensor, Share, SlowDevice
 from boebot.devices.drawing import Item, spot
-from boebot.devices.latest import NEVER, Latest, fresh_ticks
-from boebot.devices.readings import Readings
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import LineTelemetry
 
@@ -62,6 +61,8 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
     NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port D": "line sensors"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": tuple(range(8))}
     MESSAGE: ClassVar[type] = LineTelemetry
+    AGE: ClassVar[str] = "line_age"
+    PERIOD_TICKS: ClassVar[int] = FRAME_TICKS
     COLUMNS: ClassVar = (("decay_time", "s", 6),)
     SHOWN: ClassVar = ("decay_time", "ms", 1e3, 3)
 
@@ -73,20 +74,12 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
             return Checkup("not measured", expected, f"is it plugged in: 5 V, ground, red to {self.wired_to}?")
         return Checkup(f"{1000 * newest.decay_time:.3f} ms, {'dark' if newest.dark else 'bright'}", expected)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        field = LineTelemetry._fields.index(place.name)
-        fresh, tick_s, dark_s = fresh_ticks(FRAME_TICKS, place.message_ticks), place.tick_s, self.dark_s
-
-        def read(_: object, slow: Latest) -> Line:
-            message, since = slow.of(LineTelemetry)
-            us, ticks = message[field], message.line_age + since
-            age = ticks * tick_s if message.line_age < NEVER else float("inf")
-            if message.line_age >= NEVER or us == 0:
-                return Line(None, None, False, age, False)
-            return Line(us * 1e-6, None, us * 1e-6 > dark_s, age, ticks <= fresh)
-
-        return read
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> Line:
+        """See `SlowDevice`."""
+        us = getattr(message, name)
+        if age == math.inf or us == 0:
+            return Line(None, None, False, age, False)
+        return Line(us * 1e-6, None, us * 1e-6 > self.dark_s, age, fresh)
 
     def drawing(self, name: str) -> list[Item]:
         """Where it sits."""
@@ -106,15 +99,9 @@ class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=T
     COLUMNS: ClassVar = (("reflectance", "", 4),)
     SHOWN: ClassVar = ("reflectance", "", 1.0, 2)
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first, dark_below = place.where.start, self.dark_below
-
-        def read(sample: Readings, _: object) -> Line:
-            seen = sample.values[first]
-            return Line(None, seen, seen < dark_below, sample.ages[first], True)
-
-        return read
+    def reading(self, values: Sequence[float], age: float) -> Line:
+        """See `VehicleDevice`."""
+        return Line(None, values[0], values[0] < self.dark_below, age, True)
 
     def drawing(self, name: str) -> list[Item]:
         """Where it sits."""

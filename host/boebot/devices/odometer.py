@@ -8,10 +8,10 @@ robot.odometer.x
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
-from boebot.devices.device import NotNegative, Place, Positive, Reader, Sensor
-from boebot.devices.readings import Readings
+from boebot.devices.device import NotNegative, Positive, Sensor
 
 
 class OdometerPose(NamedTuple):
@@ -46,12 +46,7 @@ class Odometer(Sensor, tag="odometer", frozen=True, kw_only=True):
             return None
         return "period_s", f" is {self.period_s:g}; expected none, as an odometer adds up the way of every step"
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        where, first = place.where, place.where.start
-
-        def read(sample: Readings, _: object) -> OdometerPose:
-            x, y, heading = sample.values[where]
-            return OdometerPose(x, y, heading, sample.ages[first], True)
-
-        return read
+    def reading(self, values: Sequence[float], age: float) -> OdometerPose:
+        """See `VehicleDevice`."""
+        x, y, heading = values
+        return OdometerPose(x, y, heading, age, True)

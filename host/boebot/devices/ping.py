@@ -44,7 +44,6 @@ from boebot.devices.device import (
 )
 from boebot.devices.drawing import Item, arc, cone
 from boebot.devices.latest import NEVER, STALE_PERIODS
-from boebot.devices.readings import Readings
 from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import PingStatus, Telemetry
 
@@ -171,17 +170,11 @@ class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
             return None
         return "range_min_m", f" is {self.range_min_m:g}; expected less than range_max_m, {self.range_max_m:g}"
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first, beyond = place.where.start, self.range_max_m
-
-        def read(sample: Readings, _: object) -> Ping:
-            value = sample.values[first]
-            if value < beyond:
-                return Ping(value, sample.ages[first], True, PingStatus.OK)
-            return Ping(None, sample.ages[first], True, PingStatus.NOTHING_NEAR)
-
-        return read
+    def reading(self, values: Sequence[float], age: float) -> Ping:
+        """See `VehicleDevice`."""
+        if values[0] < self.range_max_m:
+            return Ping(values[0], age, True, PingStatus.OK)
+        return Ping(None, age, True, PingStatus.NOTHING_NEAR)
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Distance; NaN: nothing heard."""

@@ -17,16 +17,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Checkup, Place, Point, Reader, SlowDevice
+from boebot.devices.device import Checkup, Point, SlowDevice
 from boebot.devices.drawing import Item, spot
-from boebot.devices.latest import Latest, fresh_ticks
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.devices.wiring import SERVO_CABLE, Wire, servo_socket
-from boebot.link.messages import DevicesTelemetry
 from boebot.link.messages import Turret as TurretMessage
 
 ANGLE_SCALE = 1e-4  # radians per count on the wire
@@ -96,20 +94,13 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
             return Checkup("no pulses", expected)
         return Checkup(f"{readings[-1].pulse_us:.0f} µs", expected, "something turns it: the board's own brain?")
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        fresh, tick_s = fresh_ticks(1, place.message_ticks), place.tick_s
-        centre_us, gain = self.centre_us, self.gain_us_per_rad
-
-        def read(_: object, slow: Latest) -> Turret:
-            message, since = slow.of(DevicesTelemetry)
-            age, valid = since * tick_s, since <= fresh
-            if message.turret_pulse == 0:
-                return Turret(None, None, age, valid)
-            pulse_us = message.turret_pulse * PULSE_SCALE_US
-            return Turret((pulse_us - centre_us) / gain if gain else None, pulse_us, age, valid)
-
-        return read
+    def reading(self, message: Any, name: str, age: float, fresh: bool) -> Turret:
+        """See `SlowDevice`."""
+        if message.turret_pulse == 0:
+            return Turret(None, None, age, fresh)
+        pulse_us = message.turret_pulse * PULSE_SCALE_US
+        gain = self.gain_us_per_rad
+        return Turret((pulse_us - self.centre_us) / gain if gain else None, pulse_us, age, fresh)
 
     def drawing(self, name: str) -> list[Item]:
         """Its axis."""

@@ -101,10 +101,9 @@ class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True
             return None
         return "tip_m", " is where root_m is; expected a whisker that has a length"
 
-    def reader(self, place: Place) -> Reader:
-        """See `Device`."""
-        first = place.where.start
-        return lambda sample, _: _PRESSED if sample.values[first] else _FREE
+    def reading(self, values: Sequence[float], age: float) -> Whisker:
+        """See `VehicleDevice`."""
+        return _PRESSED if values[0] else _FREE
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Pressed or not."""
