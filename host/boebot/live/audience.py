@@ -8,11 +8,14 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Any, Protocol
 
+from boebot.arenas.floor_plan import FloorPlan, Moving
 from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.outbox import Message, merged
 from boebot.live.page_server import LOOPBACK, Page, PageServer
-from boebot.view import page_data, replay
+from boebot.view import page_data, replay, scene
+
+Placed = tuple[float, float, float]
 
 PAST = 1_200  # chunks that are kept for pages that come later
 BYE_S = 0.5  # for the last messages
@@ -63,9 +66,6 @@ class Audience:
         return bool(self._pages)
 
     # ---- in the server's thread ------------------------------------------------------------------------------------
-
-    def came(self, page: Page) -> None:
-        """See `page_server.Listener`. It gets nothing before it has said hello."""
 
     def heard(self, page: Page, data: str) -> str | None:
         """See `page_server.Listener`."""
@@ -120,12 +120,28 @@ class Audience:
         """What `begin` tells is told."""
         return self._run is not None
 
-    def begin(self, run: Message) -> None:
-        """What pages know of a run from its start; they get it with the first chunk."""
-        self._run = run
+    def begin(self, plan: FloorPlan, poses: Iterable[Placed], runs: list[Message], live: Message) -> None:
+        """What pages know of a run from its start; they get it with the first chunk.
 
-    def add(self, chunk: Message) -> None:
-        """What has happened since the last one."""
+        Args:
+            plan: of its arena. poses: of the robots (m, m, rad). runs: of each robot what does not change.
+            live: what can be done to it: `can`, `seed`, `imperfections`, and of each of the `robots` its `parameters`.
+        """
+        low, high = scene.plan_bounds(plan, [(x, y) for x, y, _ in poses])
+        bounds, data = [*low.tolist(), *high.tolist()], page_data.plan_data(plan)
+        self._run = {
+            "type": "run",
+            "format": page_data.FORMAT,
+            "plan": data,
+            "bounds": bounds,
+            "runs": runs,
+            "live": live,
+        }
+
+    def add(self, runs: list[Message], moving: list[Moving], state: Message, printed: str) -> None:
+        """What has happened since the last chunk: rows of each robot, where moving shapes are, how the run is now."""
+        rows_of = page_data.moving_data(moving)
+        chunk: Message = {"type": "chunk", "runs": runs, "moving": rows_of, "state": state, "printed": printed}
         with self._lock:
             for known, rows in zip(self._layers, chunk["runs"], strict=True):
                 known.update((layer["name"], layer) for layer in rows["layers"])
@@ -200,4 +216,4 @@ def _as_seen_by(page: Page, message: Message) -> Message:
         return message
     words = {None: None, page.number: "you"}
     robots = [robot | {"driver": words.get(robot["driver"], "another")} for robot in state["robots"]]
-    return message | {"state": state | {"robots": robots, "driver": robots[0]["driver"]}}
+    return message | {"state": state | {"robots": robots}}

@@ -27,7 +27,6 @@ from boebot.record.interventions import Deed
 from boebot.record.run import Run
 from boebot.running.brain_parameters import bounds, meaning, sliders
 from boebot.running.hands import Hands
-from boebot.view import page_data, scene
 
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
@@ -171,32 +170,13 @@ class LiveView:
             return  # nothing is new
         self._rates.append((time.perf_counter(), time_s))
         if not self._audience.knows_run:
-            self._audience.begin(self._first_message())
+            poses = [pose for pose in map(_pose_now, self._robots) if pose is not None] or [(0.0, 0.0, 0.0)]
+            contents = [chunks.content for chunks in self._chunks if chunks.content is not None]
+            self._audience.begin(self._plan, poses, contents, self._live())
         with self._printing:
             printed, self._printed = self._printed, ""
-        self._audience.add(
-            {
-                "type": "chunk",
-                "number": self._number,
-                "runs": [one or chunks.nothing() for one, chunks in zip(rows, self._chunks, strict=True)],
-                "moving": page_data.moving_data(self._chunks[0].moving(self._plan)),
-                "state": self._state(time_s),
-                "printed": printed,
-            }
-        )
-
-    def _first_message(self) -> Message:
-        poses = [pose for pose in map(_pose_now, self._robots) if pose is not None]
-        low, high = scene.plan_bounds(self._plan, [(x, y) for x, y, _ in poses or [(0.0, 0.0, 0.0)]])
-        return {
-            "type": "run",
-            "number": self._number,
-            "format": page_data.FORMAT,
-            "plan": page_data.plan_data(self._plan),
-            "bounds": [*low.tolist(), *high.tolist()],
-            "runs": [chunks.content for chunks in self._chunks],
-            "live": self._live(),
-        }
+        runs = [one or chunks.nothing() for one, chunks in zip(rows, self._chunks, strict=True)]
+        self._audience.add(runs, self._chunks[0].moving(self._plan), self._state(time_s), printed)
 
     def _live(self) -> Message:
         assert self._controls is not None
@@ -205,7 +185,6 @@ class LiveView:
         return {
             "can": sorted(self._controls.can),
             "seed": request.seed,
-            "seconds": None if self._robots[0].task.seconds == float("inf") else self._robots[0].task.seconds,
             "imperfections": [{"name": name, "text": text, "off": name in off} for name, text in switches().items()],
             "robots": [{"parameters": _sliders(robot)} for robot in self._robots],
         }
@@ -218,7 +197,6 @@ class LiveView:
             "rate": self._rate(),
             "time": time_s,
             "touched": sum(robot.count for robot in self._robots),
-            "driver": None,
             "robots": [
                 {
                     "parameters": sliders(robot.task.brain),
@@ -334,7 +312,7 @@ def _sliders(robot: Hands) -> list[Message]:
     for name, value in sliders(brain).items():
         least, most = bounds(brain, name)
         text = meaning(brain, name)
-        made.append({"name": name, "value": value, "least": least, "most": most, "unit": "", "text": text})
+        made.append({"name": name, "value": value, "least": least, "most": most, "text": text})
     return made
 
 

@@ -55,9 +55,6 @@ class Page:
 class Listener(Protocol):
     """Who is told of pages; called in the server's thread, and must return at once."""
 
-    def came(self, page: Page) -> None:
-        """A page is open."""
-
     def heard(self, page: Page, data: str) -> str | None:
         """It has sent a message. Returns why it is to be let go, in a sentence, or None."""
 
@@ -177,7 +174,6 @@ class PageServer:
         self._count += 1
         self._open += 1
         page = Page(self._count, Outbox())
-        self._listener.came(page)
         sender = asyncio.create_task(self._send(connection, page))
         try:
             await self._receive(connection, page)

@@ -20,7 +20,6 @@ from boebot.record.blocks import Group
 from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.running.driver import TICK_S
-from boebot.view import page_data, scene
 
 _SILENT_S = 0.2  # after so long a time without telemetry nobody listens to the board
 _NOTHING = bytes(Telemetry.LENGTH)  # telemetry of a board that says nothing
@@ -124,18 +123,13 @@ class ServedView:
         if rows is None:
             return
         if not self._audience.knows_run:
-            self._audience.begin(self._first_message(self._chunks, session))
+            assert self._chunks.content is not None
+            now = session.truth_now()
+            live = {"can": [], "seed": self._request.seed, "imperfections": [], "robots": [{"parameters": []}]}
+            self._audience.begin(self._plan, [] if now is None else [now.pose], [self._chunks.content], live)
         printed, self._printed = self._printed, ""
-        self._audience.add(
-            {
-                "type": "chunk",
-                "number": 1,
-                "runs": [rows],
-                "moving": page_data.moving_data(self._chunks.moving(self._plan)),
-                "state": _state(session.counters()["time_s"]),
-                "printed": printed,
-            }
-        )
+        moving, state = self._chunks.moving(self._plan), _state(session.counters()["time_s"])
+        self._audience.add([rows], moving, state, printed)
 
     def close(self) -> None:
         """No pages any more."""
@@ -163,22 +157,8 @@ class ServedView:
             imperfections=request.imperfections,
         )
 
-    def _first_message(self, chunks: Chunks, session: BoardSession) -> dict[str, Any]:
-        now = session.truth_now()
-        low, high = scene.plan_bounds(self._plan, [] if now is None else [now.pose[:2]])
-        none = {"can": [], "seed": self._request.seed, "seconds": None, "imperfections": []}
-        return {
-            "type": "run",
-            "number": 1,
-            "format": page_data.FORMAT,
-            "plan": page_data.plan_data(self._plan),
-            "bounds": [*low.tolist(), *high.tolist()],
-            "runs": [chunks.content],
-            "live": none | {"robots": [{"parameters": []}]},
-        }
-
 
 def _state(time_s: float) -> dict[str, Any]:
     robot = {"parameters": {}, "latched": False, "driver": None, "pose": None, "link": None}
-    run = {"paused": False, "speed": 1.0, "rate": 1.0, "time": time_s, "touched": 0, "driver": None}
+    run = {"paused": False, "speed": 1.0, "rate": 1.0, "time": time_s, "touched": 0}
     return run | {"robots": [robot]}

@@ -179,12 +179,12 @@ def test_two_pages_one_drives(endless: Run) -> None:
     with endless.stream() as one, endless.stream() as two:
         pages = Page(one), Page(two)
         pages[0].say(type="hand", robot=0, left=0.4, right=0.4)
-        assert pages[0].state(lambda state: state["driver"])["driver"] == "you"
-        assert pages[1].state(lambda state: state["driver"])["driver"] == "another"
+        assert pages[0].state(lambda state: state["robots"][0]["driver"])["robots"][0]["driver"] == "you"
+        assert pages[1].state(lambda state: state["robots"][0]["driver"])["robots"][0]["driver"] == "another"
         pages[1].say(type="hand", robot=0, left=-1, right=-1)
         assert "another page drives" in pages[1].until("refused")["sentence"]
         pages[0].say(type="release", robot=0)
-        pages[0].state(lambda state: not state["driver"])
+        pages[0].state(lambda state: not state["robots"][0]["driver"])
 
 
 def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

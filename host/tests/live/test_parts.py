@@ -212,8 +212,8 @@ def test_every_slider_of_the_bundled_brain_stays_within_what_its_process_takes()
 
 def test_first_chunk_has_all_robots_from_their_beginning(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Also where one begins later: a board by its clock, after a robot without one has stepped already."""
-    chunks: list[dict[str, Any]] = []
-    monkeypatch.setattr(Audience, "add", lambda _, chunk: chunks.append(chunk))
+    chunks: list[list[dict[str, Any]]] = []
+    monkeypatch.setattr(Audience, "add", lambda _, runs, *rest: chunks.append(runs))
     brain = tmp_path / "once.py"
     brain.write_text("def step(robot):\n    if robot.time == 0:\n        robot.sketch('once', points=[(0, 0)])\n")
     members = [Member(brain=str(brain), robot="roller", pose=(-0.8, 0.0, 0.0)), Member(brain="wander")]
@@ -221,9 +221,9 @@ def test_first_chunk_has_all_robots_from_their_beginning(monkeypatch: pytest.Mon
     result = execute_together(Request(members=members, arena="room", seconds=2.0), onlooker=view)
     view.close()
     assert result.error is None
-    for rows in chunks[0]["runs"]:
+    for rows in chunks[0]:
         assert np.frombuffer(base64.b64decode(rows["time"]), "<f4")[0] == 0.0
-    assert [layer["name"] for layer in chunks[0]["runs"][0]["layers"]] == ["once"]
+    assert [layer["name"] for layer in chunks[0][0]["layers"]] == ["once"]
 
 
 def test_interventions_are_counted_as_people_count_them() -> None:

@@ -111,8 +111,7 @@ function listenToHand() {
 }
 function tellDrive() {
   if (!can.has("hand")) return;
-  const { latched } = robotState(),
-    driver = robotState().driver ?? state.driver;
+  const { latched, driver } = robotState();
   say(
     "driver",
     latched

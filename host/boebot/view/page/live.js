@@ -358,7 +358,7 @@ function makeSlider(parameter) {
   );
   const one = { parameter, input, output, changed: -Infinity, due: null };
   input.value = parameter.value;
-  input.ariaLabel = parameter.name + (parameter.unit ? ", " + parameter.unit : "");
+  input.ariaLabel = parameter.name;
   input.oninput = () => {
     one.changed = performance.now();
     tellSlider(one);
@@ -374,8 +374,8 @@ function makeSlider(parameter) {
   tellSlider(one);
   return one;
 }
-function tellSlider({ parameter, input, output }) {
-  output.textContent = short(Number(input.value)) + (parameter.unit ? " " + parameter.unit : "");
+function tellSlider({ input, output }) {
+  output.textContent = short(Number(input.value));
 }
 // Ten times a second at most, and the last value surely.
 function sendSoon(one) {
