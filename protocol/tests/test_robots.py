@@ -55,7 +55,10 @@ def test_the_basic_shieldbot_is_wired_as_in_the_book() -> None:
 def test_the_page_has_the_pins_of_every_map() -> None:
     page = (Path(__file__).parents[2] / "docs" / "reference" / "robots.md").read_text()
     section = page[page.index("| device | `shieldbot`") :].partition("\n\n")[0].splitlines()
+    before = page.partition("The same in all: ")[2].partition(".\n")[0].replace(", `", "; `").replace("\n", " ")
+    same = [text.strip() for text in before.split(";")]
     head, _, *rows = [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in section]
+    rows += [[text.split("` ")[0].strip(" `"), *[text.split("` ")[1]] * (len(head) - 1)] for text in same]
     for column, name in enumerate(head[1:], start=1):
         devices = {key: device for key, device in load_robot(name).device.items() if device.PINS}
         assert {row[0]: row[column] for row in rows if row[column] != "–"} == {
