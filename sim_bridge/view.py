@@ -18,8 +18,8 @@ from boebot.devices.drawing import circle
 from boebot.errors import BoebotError
 from boebot.view import style
 from boebot.view.painter import draw_arena, frame
+from boebot.view.picture import NotebookFigure
 from boebot.view.scene import moving_item, plan_bounds
-from boebot.view.sheet import NotebookFigure
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicle import Vehicle
 

@@ -14,8 +14,7 @@ from boebot.arenas import load_arena
 from boebot.description.robots import load_robot, robot_names
 from boebot.description.wiring import connections
 from boebot.devices.battery import BatteryDivider
-from boebot.devices.device import kinds
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, PACK, SERVO_POWER
+from boebot.devices.device import FIVE_VOLTS, GROUND, PACK, SERVO_POWER, kinds
 from boebot.view import robot_picture
 from command import boebot
 

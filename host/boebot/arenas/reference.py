@@ -58,7 +58,9 @@ def _tables() -> str:
         if name := _table_of(value):
             titles.setdefault(name, []).append(f"`[[{key}]]`" if value.get("type") == "array" else f"`[{key}]`")
     sections += [_section(", ".join(keys), definitions[name]) for name, keys in titles.items()]
-    shape = definitions["Disc"] | {"description": "Outlines, obstacles, walls, discs and moving shapes have these, too."}
+    shape = definitions["Disc"] | {
+        "description": "Outlines, obstacles, walls, discs and moving shapes have these, too."
+    }
     shape["properties"] = {key: shape["properties"][key] for key in OF_SHAPES}
     sections.append(_section("every shape", shape))
     sections.append(_section("a waypoint of `path`", definitions["Waypoint"]))

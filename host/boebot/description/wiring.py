@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from boebot.devices.device import pin_name, pin_number
-from boebot.devices.wiring import FIVE_VOLTS, PACK, SERVO_POWER
+from boebot.devices.device import FIVE_VOLTS, PACK, SERVO_POWER, pin_name, pin_number
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription

@@ -18,10 +18,9 @@ import math
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from boebot.devices.analog import READ_TICKS, voltage
-from boebot.devices.device import ANALOG_PINS, Checkup, Point, SlowDevice
+from boebot.devices.device import ANALOG_PINS, FIVE_VOLTS, GROUND, Checkup, Point, SlowDevice, Wire
 from boebot.devices.drawing import Item, ray
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
+from boebot.devices.latest import READ_TICKS, voltage
 
 SCALE_V_M = 0.339
 OFFSET_M = 0.0474

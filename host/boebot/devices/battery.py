@@ -20,16 +20,18 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.analog import READ_TICKS, voltage
 from boebot.devices.device import (
     ANALOG_PINS,
+    GROUND,
+    PACK,
     Checkup,
     NotNegative,
     Positive,
     SlowDevice,
     VehicleDevice,
+    Wire,
 )
-from boebot.devices.wiring import GROUND, PACK, Wire
+from boebot.devices.latest import READ_TICKS, voltage
 
 LOWER_KOHM = 10.0  # of the divider: the converter wants a source of 10 kΩ or less (data sheet, 24.6.1)
 LEAST_V = 4.5  # of the pack; with less the servos hardly turn

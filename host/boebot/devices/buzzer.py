@@ -14,8 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from boebot.devices.device import Checkup, SlowDevice
-from boebot.devices.wiring import GROUND, Wire
+from boebot.devices.device import GROUND, Checkup, SlowDevice, Wire
 from boebot.link.messages import Buzzer as BuzzerMessage
 
 FREQUENCY_MIN, FREQUENCY_MAX = 40.0, 8000.0  # Hz

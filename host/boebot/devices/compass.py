@@ -20,8 +20,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Checkup, NotNegative, Sensor, SlowDevice
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
+from boebot.devices.device import FIVE_VOLTS, GROUND, Checkup, NotNegative, Sensor, SlowDevice, Wire
 from boebot.link.messages import CompassStatus
 
 TESLA_PER_COUNT = 1e-4 / 1090  # 1090 counts per gauss (data sheet, gain setting 1)

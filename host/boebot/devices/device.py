@@ -13,7 +13,7 @@ import math
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple, Protocol
 
 import msgspec
 import numpy as np
@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from boebot import slips
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
-from boebot.devices.wiring import BREADBOARD, Wire
 from boebot.link.messages import DevicesTelemetry
 
 if TYPE_CHECKING:
@@ -38,6 +37,40 @@ Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
 Point = tuple[Finite, Finite]
 
 ANALOG_PINS = tuple(range(14, 20))
+
+FIVE_VOLTS: Final = "5 V"
+GROUND: Final = "ground"
+PACK: Final = "pack +"
+SERVO_POWER: Final = "servo power"  # 5 V, or the pack's plus: by the robot's supply
+
+BREADBOARD: Final = "breadboard"
+SERVO_PORTS: Final = range(10, 14)  # pins that the Board of Education Shield has three-pin sockets for
+
+
+class Wire(NamedTuple):
+    """One wire between a board and a device."""
+
+    pin: str
+    """Where it begins: the key of a pin in the robot's file, such as "led_pin", or one of the supplies above."""
+    to: str
+    """The terminal of the device where it ends."""
+    colour: str = ""
+    """In the device's own cable; empty: the wire is yours, and so is its colour."""
+    part: str = ""
+    """What is in it, such as "220 Ω"; empty: nothing."""
+
+
+SERVO_CABLE: Final = (
+    Wire("pin", "signal", "white"),
+    Wire(SERVO_POWER, "power", "red"),
+    Wire(GROUND, "ground", "black"),
+)
+
+
+def servo_socket(pin: int) -> str:
+    """What a servo's plug goes into."""
+    return f"servo port {pin}" if pin in SERVO_PORTS else "three-pin header on the breadboard"
+
 
 Reader = Callable[[Any, Any], Any]
 """Makes a reading of an observation's `sample` and `slow`."""

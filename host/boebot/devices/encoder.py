@@ -21,8 +21,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import ANALOG_PINS, Checkup, Column, Device, Place, Reader, Run
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
+from boebot.devices.device import ANALOG_PINS, FIVE_VOLTS, GROUND, Checkup, Column, Device, Place, Reader, Run, Wire
 from boebot.link.messages import Status, Telemetry
 
 EDGE_PERIOD_SCALE = 16e-6  # seconds per count of the edge periods on the wire

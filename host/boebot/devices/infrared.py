@@ -27,6 +27,8 @@ import msgspec
 import numpy as np
 
 from boebot.devices.device import (
+    FIVE_VOLTS,
+    GROUND,
     Angle,
     BeamRays,
     Checkup,
@@ -42,10 +44,10 @@ from boebot.devices.device import (
     Run,
     Sensor,
     Share,
+    Wire,
 )
 from boebot.devices.drawing import Item, cone
 from boebot.devices.latest import NEVER, STALE_PERIODS, Latest
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import DevicesTelemetry, Telemetry
 from boebot.link.messages import Infrared as Bits
 

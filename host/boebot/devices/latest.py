@@ -43,3 +43,15 @@ def fresh_ticks(period_ticks: int, message_ticks: int) -> int:
     """Up to which age (ticks) a reading is fresh: three of its periods, or of those of the messages if these are
     longer."""
     return STALE_PERIODS * max(period_ticks, message_ticks)
+
+
+# ---- analog inputs: the converter's result is a ratio of the supply (data sheet of the ATmega328P, 24.7) -------------
+
+STEPS: Final = 1024
+READ_TICKS: Final = 2  # from one reading of an input to the next, when both are on
+VOLTS: Final = 0.001  # per count of the supply on the wire
+
+
+def voltage(result: int, supply: int) -> float | None:
+    """Voltage at the pin (V) for a result and the supply in mV; None while the supply is not known."""
+    return result / STEPS * supply * VOLTS if supply else None

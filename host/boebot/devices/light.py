@@ -23,6 +23,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from boebot.devices.device import (
     ANALOG_PINS,
+    GROUND,
     Angle,
     Checkup,
     NotNegative,
@@ -30,9 +31,9 @@ from boebot.devices.device import (
     Positive,
     Sensor,
     SlowDevice,
+    Wire,
 )
 from boebot.devices.drawing import Item, spot
-from boebot.devices.wiring import GROUND, Wire
 
 LONGEST_US = 14_000  # on the wire: this time or longer
 FRAME_TICKS = 2  # one reading in each servo frame

@@ -19,9 +19,8 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Checkup, NotNegative, Point, Sensor, Share, SlowDevice
+from boebot.devices.device import FIVE_VOLTS, GROUND, Checkup, NotNegative, Point, Sensor, Share, SlowDevice, Wire
 from boebot.devices.drawing import Item, spot
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import LineTelemetry
 
 FRAME_TICKS = 2  # one reading in each servo frame

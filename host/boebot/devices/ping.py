@@ -28,6 +28,8 @@ import msgspec
 import numpy as np
 
 from boebot.devices.device import (
+    FIVE_VOLTS,
+    GROUND,
     Angle,
     BeamRays,
     Checkup,
@@ -41,10 +43,10 @@ from boebot.devices.device import (
     Reader,
     Run,
     Sensor,
+    Wire,
 )
 from boebot.devices.drawing import Item, arc, cone
 from boebot.devices.latest import NEVER, STALE_PERIODS
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import PingStatus, Telemetry
 
 TEMPERATURE_C = 20.0

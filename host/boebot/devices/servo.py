@@ -20,8 +20,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Checkup, Column, Device, Place, Reader, Run
-from boebot.devices.wiring import SERVO_CABLE, Wire, servo_socket
+from boebot.devices.device import SERVO_CABLE, Checkup, Column, Device, Place, Reader, Run, Wire, servo_socket
 from boebot.link.messages import Telemetry
 
 PULSE_SCALE_US = 0.0625  # microseconds per count of the pulse widths on the wire

@@ -21,10 +21,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import Checkup, Point, SlowDevice
+from boebot.devices.device import SERVO_CABLE, Checkup, Point, SlowDevice, Wire, servo_socket
 from boebot.devices.drawing import Item, spot
 from boebot.devices.servo import PULSE_SCALE_US
-from boebot.devices.wiring import SERVO_CABLE, Wire, servo_socket
 from boebot.link.messages import Turret as TurretMessage
 
 ANGLE_SCALE = 1e-4  # radians per count on the wire

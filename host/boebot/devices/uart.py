@@ -13,8 +13,7 @@ from typing import Annotated, ClassVar
 
 import msgspec
 
-from boebot.devices.device import Device
-from boebot.devices.wiring import Wire
+from boebot.devices.device import Device, Wire
 
 
 class Uart(Device, tag="uart", frozen=True, kw_only=True):

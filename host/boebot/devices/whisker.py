@@ -18,9 +18,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, Final, NamedTuple
 
-from boebot.devices.device import Checkup, Column, Device, Place, Point, Reader, Run, VehicleDevice
+from boebot.devices.device import (
+    FIVE_VOLTS,
+    GROUND,
+    Checkup,
+    Column,
+    Device,
+    Place,
+    Point,
+    Reader,
+    Run,
+    VehicleDevice,
+    Wire,
+)
 from boebot.devices.drawing import PARTS, Item
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, Wire
 from boebot.link.messages import Whiskers
 
 

@@ -16,7 +16,7 @@ from boebot.view.display import has_display, kernel_shell
 
 if TYPE_CHECKING:
     from boebot.record.run import Run
-    from boebot.view.sheet import Sheet
+    from boebot.view.picture import Sheet
 
 FRAME_HEIGHT = 680  # pixels: the page fills what it is given
 

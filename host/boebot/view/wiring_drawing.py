@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.patches import FancyBboxPatch, Rectangle
 
-from boebot.devices.wiring import FIVE_VOLTS, GROUND, PACK
+from boebot.devices.device import FIVE_VOLTS, GROUND, PACK
 from boebot.view import style
 
 if TYPE_CHECKING:
