@@ -1,6 +1,5 @@
 // The arena from above. It paints display lists (boebot.devices.drawing), whatever they stand for, and what a run adds to
-// them. Canvas "floor": what stands there, drawn when the view changes; "trail": paths; "stage": all that is different at
-// another moment.
+// them. Canvas "floor": what stands there, drawn when the view changes; "stage": all that is different at another moment.
 
 const FONT = "system-ui, sans-serif";
 const font = (c, size) => {
@@ -158,7 +157,7 @@ function drawFloor() {
   c.setLineDash([5 * ratio, 3 * ratio]);
   c.strokeStyle = colours.moving;
   c.lineWidth = 1.2 * ratio;
-  if (!pageIsLive) for (const one of moving) trace(c, one.time.values, one.pose, 0, one.time.length - 1);
+  if (!pageIsLive) for (const one of moving) trace(c, one.time.values, one.pose, one.time.length - 1);
   c.setLineDash([]);
   drawNumbers(c);
 }
@@ -282,6 +281,7 @@ function drawStage() {
     place = placeOf(run);
   c.clearRect(0, 0, stage.width, stage.height);
   c.lineJoin = c.lineCap = "round";
+  drawTrails(c);
   drawSwept(c, run);
   drawSketches(c, false, place);
   drawMoving(c);
@@ -292,95 +292,57 @@ function drawStage() {
   drawGrabbed(c);
 }
 
-// ---- the canvas "trail": paths so far. While time goes on, only what is new is drawn ----
-const POINTS_AT_MOST = 20000; // of a path that is drawn as a whole
-function trace(c, times, columns, from, to) {
+// ---- paths ----
+const POINTS_AT_MOST = 6000; // of all of them
+function trace(c, times, columns, to) {
   const [xs, ys] = columns.map(column => column.values),
-    step = Math.ceil((to - from + 1) / POINTS_AT_MOST);
+    step = Math.ceil(((to + 1) * runs.length) / POINTS_AT_MOST);
   c.beginPath();
-  for (let i = from, before = -1; before !== to; before = i, i = Math.min(to, i + step)) {
+  for (let i = 0, before = -1; before !== to; before = i, i = Math.min(to, i + step)) {
     if (before < 0 || jumps(times, columns, before, i)) c.moveTo(X(xs[i]), Y(ys[i]));
     else c.lineTo(X(xs[i]), Y(ys[i]));
   }
   c.stroke();
 }
-let drawn = new Map(); // of each robot up to which tick its path is drawn
-let dashAt = 0; // how far the dashes of the estimate have come, in pixels
-let marked = [0, 0]; // how many contacts and touches are drawn
-function trailChanged() {
-  drawn = new Map();
-}
-function drawTrail() {
-  const trail = $("trail"),
-    c = trail.getContext("2d");
-  const back = runs.some(one => drawn.has(one) && tickOf(one) < drawn.get(one));
-  if (back || !drawn.has(run)) {
-    c.clearRect(0, 0, trail.width, trail.height);
-    trailChanged();
-    dashAt = 0;
-    marked = [0, 0];
-    if ($("whole").checked) drawWhole(c);
-  }
-  c.lineJoin = c.lineCap = "round";
-  for (const one of runs) if (one.time.length) drawTrailOf(c, one);
-  if ($("whole").checked) drawMarks(c);
-}
-// The whole paths, faint.
-function drawWhole(c) {
-  c.globalAlpha = 0.18;
-  c.lineWidth = 2 * ratio;
-  c.lineJoin = c.lineCap = "round";
+// So far, and faint the whole ones; where the body touched something, where a whisker did.
+function drawTrails(c) {
+  const isWhole = $("whole").checked;
   for (const one of runs) {
-    c.strokeStyle = readable(one.colour);
-    trace(c, one.time.values, one.path, 0, one.last);
-  }
-  c.globalAlpha = 1;
-}
-function drawTrailOf(c, one) {
-  const from = drawn.get(one) ?? 0,
-    to = tickOf(one);
-  if (to > from || !drawn.has(one)) {
+    if (!one.time.length) continue;
     c.strokeStyle = readable(one.colour);
     c.lineWidth = 2 * ratio;
-    trace(c, one.time.values, one.path, from, to);
-    if (one === run && one.estimate) traceEstimate(c, one, from, to);
+    c.globalAlpha = 0.15;
+    if (isWhole) trace(c, one.time.values, one.path, one.last);
+    c.globalAlpha = 0.85;
+    trace(c, one.time.values, one.path, tickOf(one));
   }
-  drawn.set(one, to);
+  if (run.estimate) {
+    c.strokeStyle = colours.estimate;
+    c.lineWidth = 1.3 * ratio;
+    c.setLineDash([5 * ratio, 3 * ratio]);
+    trace(c, run.time.values, run.estimate, tickOf(run));
+    c.setLineDash([]);
+  }
+  if (isWhole) drawMarks(c);
+  c.globalAlpha = 1;
 }
-// Dashes go on where the last piece ended.
-function traceEstimate(c, one, from, to) {
-  c.strokeStyle = colours.estimate;
-  c.lineWidth = 1.3 * ratio;
-  c.setLineDash([5 * ratio, 3 * ratio]);
-  c.lineCap = "butt";
-  c.lineDashOffset = dashAt;
-  trace(c, one.time.values, one.estimate, from, to);
-  const [xs, ys] = one.estimate.map(column => column.values);
-  for (let i = from + 1; i <= to; i++) dashAt += Math.hypot(xs[i] - xs[i - 1], ys[i] - ys[i - 1]) * scale;
-  dashAt %= 8 * ratio;
-  c.setLineDash([]);
-  c.lineCap = "round";
-  c.lineDashOffset = 0;
-}
-// Where the body touched something, where a whisker did.
 function drawMarks(c) {
   c.strokeStyle = colours.touch;
   c.lineWidth = 1.4 * ratio;
-  for (const [x, y] of run.touches.slice(marked[1])) {
+  for (const [x, y] of run.touches) {
     c.beginPath();
     c.arc(X(x), Y(y), 3.5 * ratio, 0, 7);
     c.stroke();
   }
   c.strokeStyle = colours.contact;
   c.lineWidth = 2 * ratio;
-  for (const [x, y] of run.contacts.slice(marked[0])) {
+  for (const [x, y] of run.contacts) {
     const r = 4 * ratio;
     c.beginPath();
-    c.moveTo(X(x) - r, Y(y) - r);
-    c.lineTo(X(x) + r, Y(y) + r);
-    c.moveTo(X(x) + r, Y(y) - r);
-    c.lineTo(X(x) - r, Y(y) + r);
+    for (const side of [-1, 1]) {
+      c.moveTo(X(x) - r, Y(y) - side * r);
+      c.lineTo(X(x) + r, Y(y) + side * r);
+    }
     c.stroke();
   }
-  marked = [run.contacts.length, run.touches.length];
 }

@@ -1,6 +1,6 @@
 // Which part of the arena is seen: scale in pixels for a metre, where the arena's origin lies, zoom, pan, follow.
 
-const CANVASES = ["floor", "trail", "stage", "tracks", "cursor"];
+const CANVASES = ["floor", "stage", "tracks", "cursor"];
 const NEAREST = 60;
 const FARTHEST = 0.25; // zoom, as a multiple of the scale at which all is seen
 let scale = 1;

@@ -169,7 +169,6 @@ function setNewest(on) {
   if (on) {
     letGoOfDrag();
     now = run.duration;
-    trailChanged();
     requestDraw();
   }
 }

@@ -15,7 +15,6 @@ function requestDraw() {
 }
 function viewChanged() {
   floorDirty = true;
-  trailChanged();
   requestDraw();
 }
 const TELL_MS = 60; // numbers that change faster cannot be read
@@ -28,14 +27,12 @@ function draw(inMotion = false) {
     const [x, y] = placeOf(run);
     centre(x, y);
     floorDirty = true;
-    trailChanged();
   }
   if (floorDirty) {
     drawFloor();
     floorDirty = false;
     $("stage").classList.toggle("zoomed", !fitted);
   }
-  drawTrail();
   drawStage();
   keepCursorInside();
   if (tracksDirty) drawTracks();
@@ -124,10 +121,7 @@ function onKey(e) {
 function listenToTime() {
   $("play").onclick = () => setPlaying(!playing);
   $("slider").oninput = () => seek(run.time.values[$("slider").value]);
-  $("whole").onchange = () => {
-    trailChanged();
-    draw();
-  };
+  $("whole").onchange = () => draw();
   $("before").onclick = () => goToEvent(false);
   $("after").onclick = () => goToEvent(true);
   $("robot").onchange = e => chooseRobot(Number(e.target.value) - 1);
