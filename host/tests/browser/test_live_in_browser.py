@@ -361,6 +361,7 @@ def test_restart_with_another_seed_and_without_an_imperfection(watched: Watched,
     assert page.is_disabled("#pause")
 
 
+@pytest.mark.soak
 def test_what_cannot_be_done_is_absent(watched: Watched, open_page: OpenPage) -> None:
     """A run in real time does not stand still."""
     page = open_page(watched.start("wander", "--arena", "room", "--realtime", "--seconds", "900"))
@@ -382,6 +383,7 @@ def test_lost_connection_is_one_sentence(watched: Watched, browser: Browser) -> 
     page.close()
 
 
+@pytest.mark.soak
 def test_interventions_are_counted(watched: Watched, url: str, page: Page) -> None:
     """The last one of this run: what the page says is what the run says."""
     page.keyboard.press("w")

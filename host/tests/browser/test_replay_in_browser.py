@@ -101,6 +101,7 @@ def test_page_fits_and_can_be_read(size: tuple[int, int], run: tuple[RunResult, 
         assert panel["x"] > arena["x"] + arena["width"]
 
 
+@pytest.mark.soak
 def test_dark_page_is_dark(run: tuple[RunResult, str], open_page: OpenPage) -> None:
     """And is drawn anew when the system changes."""
     page = open_page(run[1], scheme="light")
@@ -151,6 +152,7 @@ def test_wheel_drag_and_keys_move_the_view(page: Page) -> None:
     assert at_robot(page) == pytest.approx((x - 60, y), abs=0.5)
 
 
+@pytest.mark.soak
 def test_view_follows_the_robot(page: Page) -> None:
     page.keyboard.press("f")
     stage = page.locator("#stage").bounding_box()
@@ -164,6 +166,7 @@ def test_view_follows_the_robot(page: Page) -> None:
     assert page.get_attribute("#follow", "aria-pressed") == "false"
 
 
+@pytest.mark.soak
 def test_two_fingers_zoom_on_a_phone(run: tuple[RunResult, str], open_page: OpenPage) -> None:
     page = open_page(run[1], 390, 844)
     before = page.evaluate("scale")
@@ -280,6 +283,7 @@ def test_slider_and_lanes_scrub(page: Page) -> None:
     assert math.isclose(page.evaluate("span()[1] - span()[0]"), SECONDS / 2, rel_tol=0.01)
 
 
+@pytest.mark.soak
 def test_page_needs_no_network(run: tuple[RunResult, str], open_page: OpenPage) -> None:
     """And is allowed none."""
     page = open_page(run[1])

@@ -124,7 +124,8 @@ def test_summary_is_the_table(result: RunResult, folder: Path) -> None:
 def test_picture_shows_something(folder: Path) -> None:
     picture = matplotlib.image.imread(folder / "run.png")
     assert picture.shape[0] > 600 and picture.shape[1] > 600
-    assert len(np.unique((picture[:, :, :3] * 255).astype(int).reshape(-1, 3), axis=0)) > 100
+    red, green, blue = ((picture[::4, ::4, k] * 255).astype(int) for k in range(3))
+    assert len(np.unique(red << 16 | green << 8 | blue)) > 100
 
 
 def test_picture_counts_in_words_that_agree(result: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

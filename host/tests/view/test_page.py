@@ -127,7 +127,13 @@ def test_truth_is_marked_and_absent_where_nobody_knows_it(
     assert moment["texts"]["poseName"] == "odometry" and "truth" in moment["hidden"]
 
 
-@pytest.mark.parametrize("outline", [[], [[-0.08, -0.05], [0.06, -0.05], [0.06, 0.05], [-0.08, 0.05]]])
+CIRCLE: list[list[float]] = []
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [pytest.param(CIRCLE, marks=pytest.mark.soak), [[-0.08, -0.05], [0.06, -0.05], [0.06, 0.05], [-0.08, 0.05]]],
+)
 def test_page_draws_the_body_as_what_meets_things(outline: list[list[float]], tmp_path: Path) -> None:
     """Each of two robots, in its own frame: the outline, or the circle."""
     mine = tmp_path / "mine.toml"
@@ -172,7 +178,7 @@ def bars(moment: dict[str, Any], index: int) -> float:
     return float(sum(row["width"] for row in moment["still"] if row.get("bar") == style.behavior(index)))
 
 
-@pytest.mark.parametrize("most", [6000, 40])
+@pytest.mark.parametrize("most", [pytest.param(6000, marks=pytest.mark.soak), 40])
 def test_page_says_which_behavior_is_active_and_why(
     most: int, composed_run: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
