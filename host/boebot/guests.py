@@ -44,8 +44,8 @@ class ReadRecord(Protocol):
     """Reads a record that others have made, as far as a run shows in it."""
 
     def __call__(self, path: Path, robot: str | None, node: str | None, seed: int) -> Any:
-        """The run of one board (a `boebot.record.run.Run`): of that kind (None: as it says itself), of that name there (None: the only one), with
-        that seed of the brain's chance.
+        """The run of one board (a `boebot.record.run.Run`): of that kind (None: as it says itself), of that name
+        there (None: the only one), with that seed of the brain's chance.
 
         Raises:
             BoebotError: it cannot be read.
