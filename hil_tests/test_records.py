@@ -138,8 +138,8 @@ def test_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path: Path) -> None:
     try:
         done = boebot("run", "wander", "--seconds", "1e6", "--out", str(disk / "run"), "--json")
         figures = json.loads(done.stdout)
-        assert figures["run_time_s"] > 1  # its first second was too much for the disk: nothing is known of it
-        assert all(figures[name] is None for name in ("true_distance_m", "odometry_distance_m", "whisker_touches"))
+        assert figures["run_time_s"] > 1  # its first second was too much for the disk
+        assert figures["true_distance_m"] > 0 and figures["odometry_distance_m"] > 0
         (tmp_path / "slow.py").write_text("import time\ndef step(robot):\n    time.sleep(0.01)\n")
         done = boebot("run", str(tmp_path / "slow.py"), "--seconds", "1e6", "--out", str(disk / "run"))
         assert done.returncode == 1

@@ -18,8 +18,7 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from boebot.record.blocks import Block, Group, Kept, packed, schema, unpacked
-from boebot.record.keepers import InMemory, Shared, Temporary
-from boebot.record.record import Record
+from boebot.record.record import PLAIN, InMemory, Record
 from boebot.record.record_file import RecordError, RecordReader, RecordWriter
 
 ROWS = st.lists(st.tuples(st.floats(allow_nan=False), st.binary(max_size=40)), min_size=1, max_size=40)
@@ -273,33 +272,30 @@ def test_chunk_larger_than_any_of_ours_is_not_unpacked(monkeypatch: pytest.Monke
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
 def test_full_disk_is_one_sentence() -> None:
     with Path("/dev/full").open("wb", buffering=0) as full:
-        writer = RecordWriter(full, "run/record.mcap", sync=False)
+        writer = RecordWriter(full, "run/record.mcap")
         with pytest.raises(RecordError, match=r"cannot be written to run/record\.mcap: No space left on device"):
             write_all(writer, GROUPS * 20)
 
 
-@pytest.mark.parametrize("in_memory_s", [0.0, 60.0])
-def test_record_without_a_folder_is_in_memory_first_and_then_on_disk(
-    in_memory_s: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("boebot.record.keepers.IN_MEMORY_S", in_memory_s)
-    record = Record(Temporary())
-    for group in GROUPS:
+def test_record_in_memory_is_packed_and_read_as_it_came() -> None:
+    record = Record()
+    groups = [GROUPS[k % 6] for k in range(3 * PLAIN)]
+    for group in groups:
         for stream, block in group.items():
             for time_s, data in block.rows():
                 record.append(stream, time_s, data)
         record.keep(0.0)
     record.append("command", 6.0, b"last")
-    assert record.count("command") == 7 and record.count("telemetry") == 120
-    rows = rows_of(GROUPS)
+    assert record.count("command") == 3 * PLAIN + 1 and record.count("telemetry") == 60 * PLAIN
+    rows = rows_of(groups)
     assert record.rows("telemetry") == rows["telemetry"]
     assert record.rows("command") == [*rows["command"], (6.0, b"last")]
-    assert record.span("telemetry") == (0.0, 5.19)
+    assert record.span("command") == (0.0, 6.0)
 
 
 def test_each_of_several_robots_finds_its_own_rows_and_the_worlds() -> None:
     shared = InMemory()
-    one, two = (Record(Shared(shared, number)) for number in (1, 2))
+    one, two = (Record(shared, f"robot-{number}/") for number in (1, 2))
     one.append("command", 1.0, b"one")
     one.append("waits", 1.0, b"world")
     two.append("command", 2.0, b"two")

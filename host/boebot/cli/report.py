@@ -11,8 +11,7 @@ from boebot.can import log
 from boebot.cli import ending, options, output
 from boebot.cli.run_table import Detail, detail, print_run
 from boebot.errors import BoebotError
-from boebot.record.mending import mend
-from boebot.record.reading import CutError
+from boebot.record.reading import CutError, mend
 from boebot.record.run_folder import RECORD, RunFolder
 from boebot.result import Result, read_run, robots_of
 from boebot.view import IncompleteError

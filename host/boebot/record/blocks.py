@@ -44,6 +44,16 @@ class Block:
     def __len__(self) -> int:
         return len(self.times)
 
+    def table(self, dtype: np.dtype[Any]) -> NDArray[Any]:
+        """Its rows, which all have this form, shape (n,).
+
+        Raises:
+            ValueError: they have not.
+        """
+        if len(self) and self.sizes.tolist() != [dtype.itemsize]:
+            raise ValueError(f"rows of other than {dtype.itemsize} B")
+        return np.frombuffer(self.data, dtype=dtype)
+
     def part(self, begin: int, end: int) -> Block:
         """Its rows from `begin` to before `end`."""
         if len(self.sizes) == 1:

@@ -175,7 +175,7 @@ def each_switch(record: Record) -> Iterator[Switch]:
 
 def _parts(record: Record, names: BrainNames) -> Iterator[tuple[Floats, NDArray[np.void]]]:
     for block in record.blocks(STEPS):
-        yield block.times, np.frombuffer(block.data, dtype=names.row)
+        yield block.times, block.table(names.row)
 
 
 def _made(

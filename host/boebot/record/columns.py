@@ -27,7 +27,7 @@ from boebot.devices.servo import ContinuousServo
 from boebot.link.messages import DEVICE_MESSAGES, Telemetry
 from boebot.odometry import WheelDirection, dead_reckoning
 from boebot.record.blocks import EMPTY, Block, Group, joined
-from boebot.record.record import event_of, readings_row
+from boebot.record.record import KINDS, event_of, readings_row
 from boebot.record.truth import Bools, Floats, Pose, Track, track_of
 from boebot.showing import VALUES
 
@@ -427,7 +427,9 @@ class Reader:
 
     def _columns(self, rows: Group, first: int) -> Columns:
         ticks, commands = rows.get(self._ticks, EMPTY), rows.get("command", EMPTY)
-        time, said = ticks.times, np.frombuffer(commands.data, dtype=_COMMAND)
+        time, said = ticks.times, commands.table(_COMMAND)
+        if said["kind"].max(initial=0) >= len(KINDS):
+            raise ValueError("a command of an unknown kind")
         steps = np.searchsorted(time, commands.times, side="right") - 1
         said = np.concatenate((np.zeros(1, dtype=_COMMAND), said))  # before the first one: stop
         robot: Any = {"robot": self._robot, "tick_s": self._tick_s, "layout": self._layout, "first": first}
@@ -439,8 +441,8 @@ class Reader:
             robot |= {"track": track, "true_pose": track.at(at), "contact": track.contact_at(at)}
         if self._layout is not None:
             row = readings_row(max((where.stop for where in self._layout.values()), default=0))
-            return VehicleColumns(raw=np.frombuffer(ticks.data, dtype=row), **robot)
-        raw = np.frombuffer(ticks.data, dtype=_TELEMETRY)
+            return VehicleColumns(raw=ticks.table(row), **robot)
+        raw = ticks.table(_TELEMETRY)
         slow = {
             kind: self._held(kind, rows[name], time, raw["tick"]) for name, kind in MESSAGES.items() if name in rows
         }
@@ -500,7 +502,7 @@ def events(result: Run) -> Iterator[tuple[float, BoardEvent]]:
     for group in result.record.groups():
         if "telemetry" in group:
             times = group["telemetry"].times
-            board = np.frombuffer(group["telemetry"].data, dtype=_TELEMETRY)["tick"] * result.tick
+            board = group["telemetry"].table(_TELEMETRY)["tick"] * result.tick
         for event in map(event_of, group["event"].rows() if "event" in group else ()):
             near = int(np.abs(board - event.time).argmin())
             yield max(0.0, float(times[near] + event.time - board[near])), event

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import errno
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,13 +14,12 @@ import msgspec
 from boebot.arenas import Arena, ArenaDescription
 from boebot.errors import ArenaError
 from boebot.files import regular
-from boebot.record.facts import result_of
-from boebot.record.keepers import Finished, Keeper, Shared
+from boebot.record.blocks import Group
 from boebot.record.record import Record
-from boebot.record.record_file import NoRecordError, RecordError, RecordReader, in_words
-from boebot.record.recording import BEGIN, END
+from boebot.record.record_file import NoRecordError, RecordError, RecordReader, RecordWriter, in_words
+from boebot.record.recording import BEGIN, END, result_of, say
 from boebot.record.run import Run, why
-from boebot.record.run_folder import FORMAT, RECORD
+from boebot.record.run_folder import FORMAT, MENDED, RECORD, write_whole
 
 R = TypeVar("R", bound=Run)
 
@@ -42,6 +42,18 @@ class CutError(RecordError):
         self.brief = "record damaged" if lost else "record cut"
 
 
+@dataclass
+class _Finished:
+    """The groups of a finished record that are sound (`boebot.record.record.Keeper`)."""
+
+    reader: RecordReader
+    up_to_damage: bool
+
+    def groups(self) -> Iterator[Group]:
+        """See `Keeper`."""
+        return (kept.group for kept in self.reader.groups(up_to_damage=self.up_to_damage))
+
+
 def read_robots(path: str | Path, kind: type[R], *, up_to_damage: bool = False) -> list[R]:
     """What came of each robot of a run; arguments but `kind`, a class of runs, as of `boebot.result.read_run`.
 
@@ -50,14 +62,14 @@ def read_robots(path: str | Path, kind: type[R], *, up_to_damage: bool = False) 
     """
     file, reader = _opened(path)
     said = _said(reader, file)
-    keeper = Finished(reader, str(file), up_to_damage=up_to_damage)
+    kept = _Finished(reader, up_to_damage)
     world = None if said["arena"] is None else _arena(said["arena"], file)
     count = len(said["robots"])
-    keepers: list[Keeper] = [keeper] if count == 1 else [Shared(keeper, number) for number in range(1, count + 1)]
+    prefixes = [""] if count == 1 else [f"robot-{number}/" for number in range(1, count + 1)]
     try:
         results = [
-            result_of(kind, facts, Record(kept, is_new=False), world)
-            for facts, kept in zip(said["robots"], keepers, strict=True)
+            result_of(kind, facts, Record(kept, prefix), world)
+            for facts, prefix in zip(said["robots"], prefixes, strict=True)
         ]
     except (ValueError, TypeError) as error:
         raise NoRecordError(f"{file}: {END} in it does not describe a run: {error}") from None
@@ -138,3 +150,33 @@ def _lack(result: Run, lost: Sequence[str], cut: str, *, ends_there: bool) -> No
     parts += [cut] if cut else []
     parts += [] if other is None else [f"the run ended early: {why(other)}"]
     result.error = CutError("; ".join(parts), lost, cut, other)
+
+
+def mend(path: Path, robots: Sequence[Run]) -> Path:
+    """Makes a record that is cut or damaged whole: what can be read of it, in a new file beside it that has an end.
+    `robots`: what was read of it, with a `CutError`. Returns the new file. What was damaged, and where it was cut,
+    stays said in it, and groups keep their numbers: so who reads it finds where something is missing.
+
+    Raises:
+        BoebotError: it cannot be written.
+    """
+    mended = path.with_name(MENDED)
+    errors = [one.error for one in robots if isinstance(one.error, CutError)]
+    end = say(
+        [replace(one, error=error.other) for one, error in zip(robots, errors, strict=True)],
+        lost=errors[0].lost,
+        cut=errors[0].cut,
+    )
+
+    def write(part: Path) -> None:
+        with path.open("rb") as old, part.open("wb", buffering=0) as file:
+            reader, writer = RecordReader(old, str(path)).read(), RecordWriter(file, str(mended))
+            for name, data in reader.found.attachments.items():
+                if name != END:
+                    writer.attach(name, data)
+            for kept in reader.groups():
+                writer.write(kept.group, kept.end_s, kept.begin_s, kept.number)
+            writer.attach(END, end)
+            writer.finish()
+
+    return write_whole(mended, write)

@@ -28,25 +28,31 @@ from __future__ import annotations
 
 import bisect
 import hashlib
+import pickle
 import time as wall
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from struct import Struct
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
+import zstandard
 from numpy.typing import NDArray
 
 from boebot.devices.readings import Readings
 from boebot.link.delivery import BoardEvent
 from boebot.record.blocks import EMPTY, Block, Group, Row, Rows, chain, group_of, joined
-from boebot.record.keepers import InMemory, Keeper
+
+if TYPE_CHECKING:
+    from boebot.record.record_file import RecordWriter
 
 Append = Callable[[str, float, bytes], None]
 Decoded = TypeVar("Decoded")
 
 EACH_S = 1.0  # wall time that a group spans at most
 STEPS_AT_MOST = 5_000  # steps of the brain in a group: a fast run takes no more memory than a slow one
+PLAIN = 8  # groups in memory that are not packed
+WORLD = ("waits", "shifts")  # streams of a world, not of one of its robots
 KINDS = ("stop", "signal", "speed")  # of commands
 _STAMP = Struct("<dd")
 _COMMAND = Struct("<Bdd")
@@ -61,18 +67,55 @@ def readings_row(count: int) -> np.dtype[np.void]:
     return np.dtype([("tick", "<u4"), ("status", "<u2"), *numbers])
 
 
+class Keeper(Protocol):
+    """Has the groups of a record."""
+
+    def groups(self) -> Iterator[Group]:
+        """All of them, oldest first."""
+
+
+class InMemory:
+    """In this process: the newest groups as they are, older ones packed. What is `written` goes to a file, too."""
+
+    def __init__(self) -> None:
+        self.written: RecordWriter | None = None
+        self._groups: list[Group | bytes] = []
+
+    def write(self, rows: Rows, time_s: float) -> None:
+        """Keeps rows that end at that time of the run (s), as a group.
+
+        Raises:
+            RecordError: they cannot be written.
+        """
+        group = group_of(rows)
+        self._groups.append(group)
+        if len(self._groups) > PLAIN:
+            self._groups[-PLAIN - 1] = zstandard.compress(pickle.dumps(self._groups[-PLAIN - 1]))
+        if self.written is not None:
+            self.written.write(group, time_s)
+
+    def groups(self) -> Iterator[Group]:
+        """See `Keeper`."""
+        for group in self._groups:
+            yield pickle.loads(zstandard.decompress(group)) if isinstance(group, bytes) else group
+
+
 class Record:
     """A record: written row by row while the run goes on, read by stream afterwards."""
 
-    def __init__(self, keeper: Keeper | None = None, *, is_new: bool = True) -> None:
-        """Kept there; None: in memory. `is_new`: nothing is kept there yet."""
-        self._keeper: Keeper = InMemory() if keeper is None else keeper
+    def __init__(self, kept: Keeper | None = None, prefix: str = "") -> None:
+        """Kept there; None: in memory. `prefix`: of the names of its streams there, as "robot-2/" of one of several
+        robots; those of the world have none, and are every robot's."""
+        self._kept = InMemory() if kept is None else kept
+        self._prefix = prefix
         self._rows: defaultdict[str, list[Row]] = defaultdict(list)
         self._blocks: dict[str, Block] = {}  # of other streams, that wait with those rows
         self._room = STEPS_AT_MOST  # steps of the brain until rows are due
         self._told: Counter[str] | None = None  # how many of those that wait `news` has given; None: nobody asks
         self._untold: dict[str, Block] = {}  # that were kept before somebody asked again
-        self._counts: Counter[str] | None = Counter() if is_new else None  # of the rows that are kept; None: not known
+        self._counts: Counter[str] | None = (
+            Counter() if kept is None else None
+        )  # of the rows that are kept; None: not known
         self._due_s = wall.perf_counter() + EACH_S
         self._decoded: dict[str, tuple[int, Any]] = {}
 
@@ -93,16 +136,6 @@ class Record:
         """A row at the end of a stream."""
         self._rows[stream].append((time_s, data))
 
-    def keep_in(self, keeper: Keeper) -> None:
-        """Where rows are kept from now on, those so far included.
-
-        Raises:
-            RecordError: they cannot be kept there.
-        """
-        for group in self._keeper.groups():
-            keeper.write(group, 0.0)
-        self._keeper = keeper
-
     def is_due(self) -> bool:
         """A second of the wall clock has passed since rows were last handed over to be kept, or there are many."""
         return wall.perf_counter() >= self._due_s or len(self._rows["command"]) >= self._room
@@ -120,7 +153,9 @@ class Record:
         self._rows, self._blocks, self._room = defaultdict(list), {}, STEPS_AT_MOST
         if any(rows.values()):
             self._counted(rows)
-            self._keeper.write(rows, time_s)
+            assert isinstance(self._kept, InMemory)
+            named = {name if name in WORLD else self._prefix + name: some for name, some in rows.items()}
+            self._kept.write(named, time_s)
 
     def put(self, group: Group) -> None:
         """Rows of streams that come in blocks: they wait to be kept with the others."""
@@ -139,10 +174,6 @@ class Record:
                 found[stream] = joined(found.get(stream), block.part(told[stream], len(block)))
                 told[stream] = len(block)
         return found
-
-    def recount(self) -> None:
-        """Some of the rows that were handed over could not be kept; they do not count."""
-        self._counts = None
 
     def _counted(self, rows: Rows) -> None:
         if self._counts is not None:
@@ -173,18 +204,24 @@ class Record:
 
     def groups(self) -> Iterator[Group]:
         """What is kept, and what waits to be, oldest first; each group by itself is small."""
-        yield from self._keeper.groups()
+        yield from self._kept_groups()
         waiting = dict(self._blocks)
         for stream, block in group_of(self._rows).items():
             waiting[stream] = joined(waiting.get(stream), block)
         if waiting:
             yield waiting
 
+    def _kept_groups(self) -> Iterator[Group]:
+        for group in self._kept.groups():
+            own = [name for name in group if name in WORLD or name.startswith(self._prefix)]
+            if own:
+                yield {name.removeprefix(self._prefix): group[name] for name in own}
+
     def count(self, stream: str) -> int:
         """Rows of a stream."""
         if self._counts is None:
             self._counts = Counter()
-            for group in self._keeper.groups():
+            for group in self._kept_groups():
                 self._counted(group)
         return self._counts[stream] + len(self._rows.get(stream, ())) + len(self._blocks.get(stream, ()))
 
@@ -203,7 +240,7 @@ class Record:
 
     def table(self, stream: str, dtype: np.dtype[Any]) -> NDArray[Any]:
         """The rows of a stream whose rows all have this form, shape (rows,)."""
-        return np.frombuffer(b"".join(block.data for block in self.blocks(stream)), dtype=dtype)
+        return self.block(stream).table(dtype)
 
     def times_of(self, stream: str) -> NDArray[np.float64]:
         """Of each row of a stream (s), shape (rows,)."""
@@ -327,9 +364,6 @@ class Unrecorded(Record):
     def keep(self, time_s: float) -> None:
         """Nothing is kept."""
         self._due_s = wall.perf_counter() + EACH_S
-
-    def keep_in(self, keeper: Keeper) -> None:
-        """Nothing is kept there."""
 
 
 def event_of(row: Row) -> BoardEvent:

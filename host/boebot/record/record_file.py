@@ -22,15 +22,19 @@ import re
 import struct
 import sys
 import threading
+import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import islice
 from typing import IO, Any, NamedTuple, cast
 
 from boebot.errors import BoebotError
-from boebot.record.blocks import SCHEMA, Kept, Rows, group_of, packed, schema
+from boebot.record.blocks import SCHEMA, Kept, Rows, group_of, packed, schema, unpacked
 
+WAITING = 4  # groups at most that wait for a disk, where time can stand still
+PAUSE_S = 0.005  # between two looks whether it is done
 LARGEST_CHUNK = 1 << 28  # B, that is read; a second of a run has a hundredth of it
 PIECE = 1 << 16  # B, that are read at a time
 TRIES, SPARE = 8, 1 << 26  # times its size, and B more, that a file is looked at for what is sound
@@ -52,11 +56,12 @@ class NoRecordError(RecordError):
 class RecordWriter:
     """Writes a record. A second thread packs, compresses and waits for the disk."""
 
-    def __init__(self, file: IO[bytes], name: str, *, sync: bool = True) -> None:
-        """Into an open and empty file; `name`: as errors call it. `sync`: wait until the disk has each group."""
+    def __init__(self, file: IO[bytes], name: str, *, waits: bool = False) -> None:
+        """Into an open and empty file; `name`: as errors call it. `waits`: for a slow disk; else groups wait for it in
+        memory, as on a robot that must not wait."""
         from mcap.writer import Writer
 
-        self._file, self._name, self._sync = file.fileno(), name, sync
+        self._file, self._name, self._waits = file, name, waits
         self._tail = _Tail()
         self._writer: Any = Writer(cast(IO[bytes], self._tail), chunk_size=sys.maxsize, enable_data_crcs=True)
         self._channels: dict[str, int] = {}
@@ -68,11 +73,6 @@ class RecordWriter:
         self._thread.start()
         self._put(self._start)
 
-    @property
-    def waiting(self) -> int:
-        """Groups and attachments that wait for the disk."""
-        return self._work.qsize()
-
     def check(self) -> None:
         """Raises RecordError where something could not be written."""
         if self._failure is not None:
@@ -83,6 +83,8 @@ class RecordWriter:
     def write(self, rows: Rows, time_s: float, begin_s: float | None = None, number: int | None = None) -> None:
         """A group, up to that time of the run (s). Raises as `check`. `begin_s`, `number`: of one that was read from
         another record; None: it follows the last one."""
+        while self._waits and self._work.qsize() >= WAITING:
+            time.sleep(PAUSE_S)
         number = self._groups if number is None else number
         times = (self._until_s if begin_s is None else begin_s, time_s)
         self._groups, self._until_s = number + 1, time_s
@@ -98,7 +100,7 @@ class RecordWriter:
             self._work.put(None)
             self._thread.join()
         self.check()
-        if self._sync and os.fstat(self._file).st_nlink == 0:
+        if os.fstat(self._file.fileno()).st_nlink == 0:
             raise RecordError(f"the record {self._name} was deleted while the run went on")
 
     def _put(self, work: Callable[[], None]) -> None:
@@ -122,13 +124,12 @@ class RecordWriter:
             self._writer.flush()
             data = self._tail.take()
             while data:
-                data = data[os.write(self._file, data) :]
-            if self._sync:
-                os.fsync(self._file)
+                data = data[os.write(self._file.fileno(), data) :]
+            os.fsync(self._file.fileno())
         except Exception as error:  # of any kind: the run is to end by it, not this thread alone
             self._failure = error
             with contextlib.suppress(OSError):
-                os.ftruncate(self._file, whole)
+                os.ftruncate(self._file.fileno(), whole)
 
     def _start(self) -> None:
         self._writer.start(profile="boebot", library="boebot")
@@ -323,10 +324,7 @@ class RecordReader:
         end = begin + _HEAD.size + length
         if end > limit or length > 2 * LARGEST_CHUNK or kind not in (_CHUNK, _ATTACHMENT):
             return min(end, limit), None
-        from boebot.record import checked  # here, as MCAP's library takes a while: no other command should wait for it
-
-        body = self._at(begin + _HEAD.size, length)
-        return end, checked.group(body, LARGEST_CHUNK) if kind == _CHUNK else checked.attachment(body)
+        return end, _sound(kind, self._at(begin + _HEAD.size, length))
 
     def _damage(self, begin: int, end: int, after_s: float, before_s: float) -> Damage:
         """What begins there, as far as its bytes can be believed."""
@@ -334,6 +332,35 @@ class RecordReader:
         name = head[29 : 29 + int.from_bytes(head[25:29], "little")].decode(errors="replace")
         is_attachment = begin < end and head[:1] == bytes([_ATTACHMENT])
         return Damage(begin, end, after_s, before_s, f"attachment {name!r} is lost" if is_attachment else "")
+
+
+def _sound(kind: int, body: bytes) -> Kept | dict[str, bytes] | None:
+    """The group of a chunk, or an attachment by its name, as its checksum proves that it was written; None: it is not
+    sound (mcap.dev/spec)."""
+    from mcap.data_stream import ReadDataStream  # here, as this library takes a while: no other command should wait
+    from mcap.exceptions import McapError
+    from mcap.records import Attachment, Chunk, Message
+    from mcap.stream_reader import breakup_chunk
+    from zstandard import ZstdDecompressor, ZstdError
+
+    stream = ReadDataStream(io.BytesIO(body))
+    try:
+        if kind == _ATTACHMENT:
+            found = Attachment.read(stream)
+            is_whole = stream.count == len(body) and zlib.crc32(body[:-4]) == int.from_bytes(body[-4:], "little")
+            return {found.name: found.data} if is_whole else None
+        chunk = Chunk.read(stream)
+        with ZstdDecompressor().stream_reader(chunk.data) as parts:  # piece by piece, whatever size it claims
+            data = b"".join(islice(iter(partial(parts.read, PIECE), b""), LARGEST_CHUNK // PIECE))
+        is_whole = (stream.count, len(data), chunk.compression) == (len(body), chunk.uncompressed_size, "zstd")
+        if not is_whole or zlib.crc32(data) != chunk.uncompressed_crc:
+            return None
+        chunk.compression, chunk.data = "", data
+        messages = [record for record in breakup_chunk(chunk) if isinstance(record, Message)]
+        ((number, begin_ns, end_ns),) = {(one.sequence, one.publish_time, one.log_time) for one in messages}
+        return Kept(number, begin_ns / 1e9, end_ns / 1e9, dict(unpacked(one.data) for one in messages))
+    except (McapError, ZstdError, struct.error, ValueError, LookupError, OverflowError, EOFError):
+        return None
 
 
 _MAGIC = b"\x89MCAP0\r\n"

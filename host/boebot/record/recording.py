@@ -1,4 +1,5 @@
-"""A run on its way into its record: where its rows go, and what the record says of the run itself."""
+"""A run on its way into its record: where its rows go, and what the record says of the run itself: who ran where, and
+what was counted, as JSON in attachments."""
 
 from __future__ import annotations
 
@@ -8,20 +9,24 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import msgspec
 
+from boebot.arenas import Arena
 from boebot.arguments import plain
+from boebot.boards import WatchdogReset
+from boebot.brain.composition import MadeOf
+from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError, as_utf8
-from boebot.record.keepers import Keeper, OnDisk, Shared, Temporary
-from boebot.record.record import Record, Unrecorded
-from boebot.record.record_file import RecordError
+from boebot.link.messages import Identity
+from boebot.record.brain_record import BrainNames
+from boebot.record.record import InMemory, Record, Unrecorded
+from boebot.record.record_file import RecordWriter
+from boebot.record.run import Run, why
 from boebot.record.run_folder import FORMAT, RECORD, RunFolder
 
-if TYPE_CHECKING:
-    from boebot.record.run import Run
-
+R = TypeVar("R", bound=Run)
 BEGIN, END = "begin.json", "end.json"
 JSON = "application/json"
 
@@ -35,8 +40,9 @@ class Recording:
 
     def __init__(self, robots: int, *, recorded: bool = True) -> None:
         """`recorded`: else nothing is kept."""
-        self._disk: OnDisk | None = None
-        self.records: list[Record] = [Record() if recorded else Unrecorded() for _ in range(robots)]
+        self._kept = InMemory()
+        prefixes = [""] if robots == 1 else [f"robot-{number}/" for number in range(1, robots + 1)]
+        self.records: list[Record] = [Record(self._kept, one) if recorded else Unrecorded() for one in prefixes]
 
     def begin(
         self,
@@ -47,7 +53,7 @@ class Recording:
         *,
         waits: bool,
     ) -> None:
-        """From now on rows go into that folder; None: into a temporary file, once a second of the wall clock is over.
+        """From now on rows go into that folder, too; None: they are kept in memory.
 
         Args:
             results: what is known of the run as it begins.
@@ -58,35 +64,29 @@ class Recording:
         Raises:
             BoebotError: the folder cannot be written to.
         """
-        keeper: Keeper = Temporary(waits=waits)
         if folder is not None:
-            keeper = self._disk = OnDisk(folder.new_record(), str(folder.path / RECORD), waits=waits)
+            writer = RecordWriter(folder.new_record(), str(folder.path / RECORD), waits=waits)
             for name, data in sources.items():
-                self._disk.writer.attach(as_utf8(name), data)
-            self._disk.writer.attach(BEGIN, say(results, request=requested), JSON)
-        for number, record in enumerate(self.records, 1):
-            record.keep_in(keeper if len(self.records) == 1 else Shared(keeper, number))
+                writer.attach(as_utf8(name), data)
+            writer.attach(BEGIN, say(results, request=requested), JSON)
+            for group in self._kept.groups():
+                writer.write(group, 0.0)
+            self._kept.written = writer
 
     def end(self, results: Sequence[Run]) -> BoebotError | None:
-        """Nothing comes any more. Returns why the record is not whole. `results`: what is known at the run's end."""
-        failure: BoebotError | None = None
-        if self._disk is not None:
+        """Nothing comes any more. Returns why the file is not whole. `results`: what is known at the run's end."""
+        if self._kept.written is not None:
             try:
-                self._disk.writer.attach(END, say(results), JSON)
-                self._disk.finish()
+                self._kept.written.attach(END, say(results), JSON)
+                self._kept.written.finish()
             except BoebotError as error:
-                failure = error
-        if failure is not None or any(isinstance(result.error, RecordError) for result in results):
-            for record in self.records:
-                record.recount()
-        return failure
+                return error
+        return None
 
 
 def say(results: Sequence[Run], **more: Any) -> bytes:
     """What a record says of a run, as JSON. `more`: as it begins, the `request`; of a record that is mended, what is
     `lost` of the one before and where that is `cut`."""
-    from boebot.record.facts import facts_of
-
     said: dict[str, Any] = {
         "format": FORMAT,
         "versions": {"boebot": version("boebot"), "python": platform.python_version()},
@@ -96,3 +96,99 @@ def say(results: Sequence[Run], **more: Any) -> bytes:
         "robots": [facts_of(result) for result in results],
     } | more
     return json.dumps(msgspec.to_builtins(said, enc_hook=plain), indent=1).encode()
+
+
+class RecordedError(BoebotError):
+    """Why a run ended before its time, as its record says."""
+
+
+class Facts(msgspec.Struct, frozen=True, kw_only=True):
+    """Of one robot's run; what is not said here is as in `Run`.
+
+    Attributes:
+        error: in words.
+        identity: the message, in hexadecimal digits.
+        layout: first reading, and the one after the last, of each device.
+        processes, behaviors, variables: names, of a brain of processes.
+    """
+
+    brain: str
+    robot: RobotDescription
+    board: str
+    description: str
+    arena: str | None
+    seed: int
+    period: float
+    tick: float
+    clock_offset: float
+    steps: int
+    late_steps: int | None
+    resets: int | None
+    lost_frames: int | None
+    bad_frames: int | None
+    run_time: float
+    wall_time: float | None
+    sessions_lost: int | None
+    link: dict[str, dict[str, int]]
+    notices: list[str]
+    watchdog_resets: list[WatchdogReset]
+    counters: dict[str, int | float | None]
+    without: list[str]
+    imperfections: dict[str, float]
+    odometry_source: str | None
+    long_steps: int | None
+    longest_step: float | None
+    unrealisable: str | None
+    error: str | None
+    interrupted: bool
+    identity: str | None
+    layout: dict[str, tuple[int, int]] | None
+    processes: list[str] | None
+    behaviors: list[str]
+    variables: list[str]
+    parameters: dict[str, Any]
+    made_of: MadeOf | None
+
+
+_CHANGED = ("error", "interrupted", "identity", "layout", "processes", "behaviors", "variables")
+_SAME = [name for name in Facts.__struct_fields__ if name not in _CHANGED]
+
+
+def facts_of(result: Run) -> Facts:
+    """Of a result."""
+    brain, layout = result.brain_names, result.layout
+    same: dict[str, Any] = {name: getattr(result, name) for name in _SAME}
+    return Facts(
+        **same | {name: list(same[name]) for name in ("notices", "watchdog_resets", "without")},
+        error=None if result.error is None else why(result.error),
+        interrupted=isinstance(result.error, KeyboardInterrupt),
+        identity=None if result.identity is None else result.identity.pack().hex(),
+        layout=None if layout is None else {name: (part.start, part.stop) for name, part in layout.items()},
+        processes=None if brain is None else list(brain.processes),
+        behaviors=[] if brain is None else list(brain.behaviors),
+        variables=[] if brain is None else list(brain.variables),
+    )
+
+
+def result_of(kind: type[R], data: Mapping[str, Any], record: Record, world: Arena | None) -> R:
+    """The result of that JSON, its record and the arena, as a run of that class.
+
+    Raises:
+        ValueError: it is not what `facts_of` makes.
+    """
+    facts = msgspec.convert(data, Facts)
+    error: BaseException | None = None
+    if facts.error is not None:
+        error = KeyboardInterrupt() if facts.interrupted else RecordedError(facts.error)
+    processes = facts.processes
+    return kind(
+        **{name: getattr(facts, name) for name in _SAME},
+        record=record,
+        world=world,
+        error=error,
+        identity=None if facts.identity is None else Identity.unpack(bytes.fromhex(facts.identity)),
+        layout=None if facts.layout is None else {name: slice(*part) for name, part in facts.layout.items()},
+        brain_names=None
+        if processes is None
+        else BrainNames(tuple(processes), tuple(facts.behaviors), tuple(facts.variables)),
+    )

@@ -110,7 +110,7 @@ class Track:
 
 def track_of(block: Block) -> Track:
     """Of rows of the stream "truth"; it may be empty."""
-    rows = np.frombuffer(block.data, dtype=_ROW)
+    rows = block.table(_ROW)
     return Track(block.times, Pose(rows["x"], rows["y"], rows["heading"]), rows["contact"] > 0)
 
 

@@ -18,7 +18,6 @@ from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
 from boebot.link.transport import BusFigures
 from boebot.record.brain_record import BrainNames, append_brain
-from boebot.record.keepers import Temporary
 from boebot.record.record import Record
 from boebot.result import RunResult
 from boebot.robot import Robot
@@ -43,7 +42,7 @@ class Task:
     seconds: float
     """may be infinite"""
     period_s: float
-    record: Record = field(default_factory=lambda: Record(Temporary()))
+    record: Record = field(default_factory=Record)
     """where what happens goes"""
     progress: Progress | None = None
     step_timeout_s: float | None = None

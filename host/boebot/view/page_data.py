@@ -279,7 +279,7 @@ def events(series: Columns, whiskers: Sequence[str]) -> list[Event]:
 def pins(block: Block, robot: robots.RobotDescription, begin: float) -> dict[str, tuple[Floats, NDArray[np.uint8]]]:
     """Output edges of a record, rows of its stream "pins", by the name of the pin: on the run's clock, which begins at
     `begin` (s)."""
-    times, rows = block.times, np.frombuffer(block.data, dtype=[("pin", "u1"), ("level", "u1")])
+    times, rows = block.times, block.table(np.dtype([("pin", "u1"), ("level", "u1")]))
     devices: dict[int, list[str]] = {}
     for name, device in robot.device.items():
         for pin in device.pins().values() if device.on else ():
