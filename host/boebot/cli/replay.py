@@ -14,8 +14,6 @@ import typer
 from boebot.can.log import as_on_the_wire, is_log, read_log
 from boebot.cli import completion, ending, options, output, streams
 from boebot.errors import BoebotError
-from boebot.link.frame import reader
-from boebot.link.messages import Telemetry
 from boebot.record.reading import CutError
 from boebot.record.run import Run
 from boebot.result import read_run, robots_of
@@ -23,7 +21,6 @@ from boebot.robot import Command
 from boebot.running.replayed import replayed
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
-_TICK = reader(Telemetry, "tick")
 
 
 @ending.of_sensible_rows()
@@ -104,6 +101,6 @@ def _recorded(run: Path, number: int | None) -> Run:
 
 def _place(result: Run, step: int) -> str:
     """A step of the brain in words, with the board's tick that it answered, if there is a board."""
-    index = result.record.steps[step][0]
-    tick = f"tick {_TICK(result.record.telemetry[index])[0]}, " if result.layout is None else ""
-    return f"step {step} ({tick}{result.record.times[index]:.2f} s)"
+    series, index = result.series, result.series.steps[step]
+    tick = f"tick {series.raw['tick'][index]}, " if result.layout is None else ""
+    return f"step {step} ({tick}{series.time[index]:.2f} s)"

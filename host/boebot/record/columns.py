@@ -27,7 +27,7 @@ from boebot.devices.servo import ContinuousServo
 from boebot.link.messages import DEVICE_MESSAGES, Telemetry
 from boebot.odometry import WheelDirection, dead_reckoning
 from boebot.record.blocks import EMPTY, Block, Group, joined
-from boebot.record.record import KINDS, event_of, readings_row
+from boebot.record.record import COMMAND, KINDS, event_of, readings_row
 from boebot.record.truth import Bools, Floats, Pose, Track, track_of
 from boebot.showing import VALUES
 
@@ -50,7 +50,6 @@ _TELEMETRY = np.dtype(
     ]
     + [("host", "<f8"), ("bound", "<f8")]  # the stamp
 )
-_COMMAND = np.dtype([("kind", "u1"), ("left", "<f8"), ("right", "<f8")])
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -258,6 +257,10 @@ class BoardColumns(Columns):
         """See `Columns`: what the pulses in force stand for; 0 without pulses."""
         return self._signal("servo_left"), self._signal("servo_right")
 
+    def telemetry(self, index: int) -> Telemetry:
+        """The message of that tick."""
+        return Telemetry(*self.raw[index].item()[:-2])
+
     def own_columns(self) -> list[Column]:
         """See `Columns`."""
         raw = self.raw
@@ -427,11 +430,11 @@ class Reader:
 
     def _columns(self, rows: Group, first: int) -> Columns:
         ticks, commands = rows.get(self._ticks, EMPTY), rows.get("command", EMPTY)
-        time, said = ticks.times, commands.table(_COMMAND)
+        time, said = ticks.times, commands.table(COMMAND)
         if said["kind"].max(initial=0) >= len(KINDS):
             raise ValueError("a command of an unknown kind")
         steps = np.searchsorted(time, commands.times, side="right") - 1
-        said = np.concatenate((np.zeros(1, dtype=_COMMAND), said))  # before the first one: stop
+        said = np.concatenate((np.zeros(1, dtype=COMMAND), said))  # before the first one: stop
         robot: Any = {"robot": self._robot, "tick_s": self._tick_s, "layout": self._layout, "first": first}
         robot |= {"time": time, "steps": steps, "showing": rows.get(VALUES, EMPTY)}
         robot["command"] = said[np.searchsorted(steps, np.arange(len(time)), side="right")]

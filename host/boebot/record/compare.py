@@ -15,6 +15,7 @@ from itertools import zip_longest
 from boebot.errors import BoebotError
 from boebot.link.messages import Telemetry
 from boebot.record.blocks import Row
+from boebot.record.columns import BoardColumns
 from boebot.record.run import Run
 from boebot.robot import Command
 
@@ -61,7 +62,7 @@ def telemetry_difference(one: Run, other: Run, fields: tuple[str, ...] = ()) -> 
     for step, (a, b) in enumerate(zip(*rows, strict=False)):
         for name in a._fields:
             if (name in fields or (not fields and name not in NOT_SEEN)) and getattr(a, name) != getattr(b, name):
-                return Difference(step, one.record.steps[step][0], name, getattr(a, name), getattr(b, name))
+                return Difference(step, int(one.series.steps[step]), name, getattr(a, name), getattr(b, name))
     return None
 
 
@@ -122,4 +123,5 @@ def _in_words(one: Row | None, other: Row | None) -> str:
 def _seen(run: Run) -> list[Telemetry]:
     if run.layout is not None:
         raise BoebotError(f"robot {run.robot.name!r} has no board, and no telemetry to compare")
-    return [Telemetry.unpack(run.record.telemetry[index]) for index, *_ in run.record.steps]
+    assert isinstance(run.series, BoardColumns)
+    return [run.series.telemetry(index) for index in run.series.steps.tolist()]

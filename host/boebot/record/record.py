@@ -26,7 +26,6 @@ vehicle, movers     the run's, of the step      of a vehicle stepped by hand
 
 from __future__ import annotations
 
-import bisect
 import hashlib
 import pickle
 import time as wall
@@ -55,6 +54,7 @@ PLAIN = 8  # groups in memory that are not packed
 WORLD = ("waits", "shifts")  # streams of a world, not of one of its robots
 KINDS = ("stop", "signal", "speed")  # of commands
 _STAMP = Struct("<dd")
+COMMAND = np.dtype([("kind", "u1"), ("left", "<f8"), ("right", "<f8")])
 _COMMAND = Struct("<Bdd")
 _EVENT = Struct("<BIB")
 _CLOCK = Struct("<d")
@@ -117,7 +117,6 @@ class Record:
             Counter() if kept is None else None
         )  # of the rows that are kept; None: not known
         self._due_s = wall.perf_counter() + EACH_S
-        self._decoded: dict[str, tuple[int, Any]] = {}
 
     @classmethod
     def of(cls, group: Group) -> Record:
@@ -280,35 +279,26 @@ class Record:
     @property
     def times(self) -> list[float]:
         """The run's time (s) of each tick or step, by the board's clock."""
-        return self._each("times", self.tick_stream, lambda row: row[0])
+        times: list[float] = self.times_of(self.tick_stream).tolist()
+        return times
 
     @property
     def telemetry(self) -> list[bytes]:
         """A board's payloads."""
-        return self._each("telemetry", "telemetry", lambda row: row[1][: -_STAMP.size])
-
-    @property
-    def stamps(self) -> list[tuple[float, float]]:
-        """(host time of the tick in s, its error bound in s) of each telemetry."""
-        return self._each("stamps", "telemetry", lambda row: _STAMP.unpack(row[1][-_STAMP.size :]))
-
-    def readings(self, count: int) -> NDArray[np.void]:
-        """Steps of a robot without a board that has `count` readings, with the motor signals in force."""
-        return self.table("readings", readings_row(count))
+        return [data[: -_STAMP.size] for _, data in self.each_row("telemetry")]
 
     @property
     def events(self) -> list[BoardEvent]:
         """What the board sent exactly once."""
-        return self._each("event", "event", event_of)
+        return [event_of(row) for row in self.each_row("event")]
 
     @property
     def steps(self) -> list[tuple[int, str, float, float]]:
         """(index of the tick of the observation, command kind, left, right), one per step of the brain."""
-        return self._each("command", "command", self._step)
-
-    def messages(self, kind: Any) -> list[tuple[int, Any]]:
-        """(index of the newest tick when it came, message) of each message of slow devices of that kind."""
-        return [(self._index(time_s), kind.unpack(data)) for time_s, data in self.rows(kind.NAME)]
+        block = self.block("command")
+        ticks = np.searchsorted(self.times_of(self.tick_stream), block.times, side="right") - 1
+        rows = zip(ticks.tolist(), block.table(COMMAND).tolist(), strict=True)
+        return [(tick, KINDS[kind], left, right) for tick, (kind, left, right) in rows]
 
     @property
     def tick_stream(self) -> str:
@@ -323,23 +313,6 @@ class Record:
         """All of them in one block."""
         blocks = list(self.blocks(stream))
         return joined(*blocks) if blocks else EMPTY
-
-    def _index(self, time_s: float) -> int:
-        return bisect.bisect_right(self.times, time_s) - 1
-
-    def _step(self, row: Row) -> tuple[int, str, float, float]:
-        kind, left, right = _COMMAND.unpack(row[1])
-        return self._index(row[0]), KINDS[kind], left, right
-
-    def _each(self, name: str, stream: str, decode: Callable[[Row], Decoded]) -> list[Decoded]:
-        """Each row of a stream decoded; kept until there are more."""
-        count, found = self._decoded.get(name, (-1, []))
-        if count == self.count(stream):
-            known: list[Decoded] = found
-            return known
-        new = [decode(row) for row in self.rows(stream)]
-        self._decoded[name] = (len(new), new)
-        return new
 
 
 class Unrecorded(Record):

@@ -8,16 +8,14 @@ import platform
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from importlib.metadata import version
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 import msgspec
 
 from boebot.arenas import Arena
 from boebot.arguments import plain
-from boebot.boards import WatchdogReset
-from boebot.brain.composition import MadeOf
-from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError, as_utf8
 from boebot.link.messages import Identity
 from boebot.record.brain_record import BrainNames
@@ -102,8 +100,8 @@ class RecordedError(BoebotError):
     """Why a run ended before its time, as its record says."""
 
 
-class Facts(msgspec.Struct, frozen=True, kw_only=True):
-    """Of one robot's run; what is not said here is as in `Run`.
+class _Facts(msgspec.Struct, frozen=True, kw_only=True):
+    """What is said otherwise of one robot's run than `Run` has it.
 
     Attributes:
         error: in words.
@@ -112,33 +110,6 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
         processes, behaviors, variables: names, of a brain of processes.
     """
 
-    brain: str
-    robot: RobotDescription
-    board: str
-    description: str
-    arena: str | None
-    seed: int
-    period: float
-    tick: float
-    clock_offset: float
-    steps: int
-    late_steps: int | None
-    resets: int | None
-    lost_frames: int | None
-    bad_frames: int | None
-    run_time: float
-    wall_time: float | None
-    sessions_lost: int | None
-    link: dict[str, dict[str, int]]
-    notices: list[str]
-    watchdog_resets: list[WatchdogReset]
-    counters: dict[str, int | float | None]
-    without: list[str]
-    imperfections: dict[str, float]
-    odometry_source: str | None
-    long_steps: int | None
-    longest_step: float | None
-    unrealisable: str | None
     error: str | None
     interrupted: bool
     identity: str | None
@@ -146,20 +117,20 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     processes: list[str] | None
     behaviors: list[str]
     variables: list[str]
-    parameters: dict[str, Any]
-    made_of: MadeOf | None
 
 
-_CHANGED = ("error", "interrupted", "identity", "layout", "processes", "behaviors", "variables")
-_SAME = [name for name in Facts.__struct_fields__ if name not in _CHANGED]
+_SAME = [
+    one.name for one in fields(Run) if one.name not in ("record", "world", "error", "identity", "layout", "brain_names")
+]
+_HINTS = get_type_hints(Run)
+Facts = msgspec.defstruct("Facts", [(name, _HINTS[name]) for name in _SAME], bases=(_Facts,), frozen=True, kw_only=True)
 
 
-def facts_of(result: Run) -> Facts:
-    """Of a result."""
+def facts_of(result: Run) -> msgspec.Struct:
+    """Of a result: `Facts`."""
     brain, layout = result.brain_names, result.layout
-    same: dict[str, Any] = {name: getattr(result, name) for name in _SAME}
     return Facts(
-        **same | {name: list(same[name]) for name in ("notices", "watchdog_resets", "without")},
+        **{name: getattr(result, name) for name in _SAME},
         error=None if result.error is None else why(result.error),
         interrupted=isinstance(result.error, KeyboardInterrupt),
         identity=None if result.identity is None else result.identity.pack().hex(),
@@ -176,7 +147,7 @@ def result_of(kind: type[R], data: Mapping[str, Any], record: Record, world: Are
     Raises:
         ValueError: it is not what `facts_of` makes.
     """
-    facts = msgspec.convert(data, Facts)
+    facts: Any = msgspec.convert(data, Facts)
     error: BaseException | None = None
     if facts.error is not None:
         error = KeyboardInterrupt() if facts.interrupted else RecordedError(facts.error)

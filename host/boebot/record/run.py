@@ -90,7 +90,7 @@ class Run:
     link: dict[str, dict[str, int]] = field(default_factory=dict)
     notices: list[str] = field(default_factory=list)
     watchdog_resets: Sequence[WatchdogReset] = ()
-    counters: dict[str, float] = field(default_factory=dict)
+    counters: dict[str, int | float | None] = field(default_factory=dict)
     layout: Layout | None = None
     without: Sequence[str] = ()
     imperfections: Mapping[str, float] = field(default_factory=dict)

@@ -12,7 +12,7 @@ from boebot.devices.device import SlowDevice
 from boebot.devices.latest import Latest
 from boebot.devices.readings import Readings
 from boebot.errors import BoebotError, BrainError
-from boebot.link.messages import Telemetry
+from boebot.record.columns import BoardColumns
 from boebot.record.compare import EXPECTED
 from boebot.record.interventions import Arm, Deed, Hand, Parameter, Release, Stop, interventions
 from boebot.record.run import Run
@@ -78,13 +78,12 @@ def _done_again(deed: Deed, robot: Robot, brain: brains.LoadedBrain, held: Hand 
 def _observations(result: Run) -> Iterator[Observation]:
     """What the brain saw at each of its steps."""
     record = result.record
-    times = record.times
+    series = result.series
+    times: list[float] = series.time.tolist()
     if result.layout is not None:
         equipment = Equipment(result.robot, result.tick, result.layout)
-        count = max((part.stop for part in result.layout.values()), default=0)
-        rows = record.readings(count)
-        for index, *_ in record.steps:
-            row = rows[index]
+        for index in series.steps.tolist():
+            row = series.raw[index]
             ages, values = tuple(row["ages"].tolist()), tuple(row["values"].tolist())
             sample = Readings(int(row["tick"]), int(row["status"]), ages, values)
             time_s = times[index]
@@ -96,13 +95,14 @@ def _observations(result: Run) -> Iterator[Observation]:
     slow.sort(key=lambda row: row[0])
     newest: dict[type, Any] = {}
     seen = 0
-    payloads, stamps = record.telemetry, record.stamps
-    for index, *_ in record.steps:
+    assert isinstance(series, BoardColumns)
+    for index in series.steps.tolist():
         while seen < len(slow) and slow[seen][0] <= times[index]:
             _, kind, data = slow[seen]
             newest = {**newest, kind: kind.unpack(data)}
             seen += 1
-        telemetry = Telemetry.unpack(payloads[index])
+        telemetry = series.telemetry(index)
         board_s = telemetry.tick * result.tick
         latest = Latest(newest, telemetry.tick)
-        yield Observation(telemetry, equipment, times[index], board_s, *stamps[index], latest)
+        host_s, bound_s = float(series.raw["host"][index]), float(series.raw["bound"][index])
+        yield Observation(telemetry, equipment, times[index], board_s, host_s, bound_s, latest)

@@ -183,7 +183,7 @@ def _draw(figure: Figure, drawn: list[tuple[str, list[RunResult], list[Differenc
     for row, (name, runs, differences) in zip(grid, drawn, strict=True):
         for side, axes in enumerate(row):
             for run, style in zip(runs, ("-", "--"), strict=True):
-                times = [run.record.times[step[0]] for step in run.record.steps]
+                times = run.series.time[run.series.steps].tolist()
                 axes.step(times, [step[2 + side] for step in run.record.steps], style, where="post", label=run.board)
             axes.set(ylim=(-1.05, 1.05))
             for difference, (label, color) in zip(differences, FIRSTS.items(), strict=True):
