@@ -230,7 +230,7 @@ build/avr8js/.done: tools/fetch_avr8js.py hil_tests/calibration/avr8js.py $(VENV
 	@$(PYTHON_VENV) -m tools.fetch_avr8js
 	@touch $@
 
-# Another program's reader of records (host/tests/test_record_elsewhere.py), with the hashes of its lock file.
+# Another program's reader of records (host/tests/record/test_blocks.py), with the hashes of its lock file.
 build/mcap-core/.done: $(addprefix host/tests/mcap_core/,package.json package-lock.json) $(VENV)/.done-bench
 	@mkdir -p $(@D) && cp $(filter %.json,$^) $(@D)
 	@PATH="$(VENV)/bin:$$PATH" npm ci --prefix $(@D) --ignore-scripts --no-audit --no-fund --silent

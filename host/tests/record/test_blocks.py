@@ -17,9 +17,9 @@ from boebot.record.record_file import RecordReader
 from boebot.record.run_folder import RECORD
 from hil_tests.calibration.avr8js import find_tool
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ROOT / "build" / "mcap-core"  # from package-lock.json in mcap_core
-READER = Path(__file__).with_name("mcap_core") / "read_record.cjs"
+READER = Path(__file__).parents[1] / "mcap_core" / "read_record.cjs"
 NODE = find_tool("node")
 pytestmark = pytest.mark.skipif(
     NODE is None or not (PACKAGES / "node_modules").is_dir(), reason="@mcap/core comes with make bench"

@@ -26,7 +26,7 @@ from boebot.view import painter, scene
 START = (1.0, -2.0, math.pi / 2)
 LINE = [(0.0, 0.0), (0.5, 0.25)]
 NODE = shutil.which("node") or shutil.which("nodejs")
-PAGE = Path(__file__).parent / "view" / "replay_page.js"
+PAGE = Path(__file__).parents[1] / "view" / "replay_page.js"
 
 
 def step(robot: boebot.Robot) -> None:
