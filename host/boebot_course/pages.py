@@ -44,7 +44,7 @@ def page(chapter: str, experiments: Iterable[Experiment], measured: Mapping[str,
         if one.on:
             parts.append(f"### On {one.on}")
         parts += [
-            f"{capital('computed' if one.robot == 'none' else one.robot)}. {plain(one.criterion)}",
+            plain(one.criterion) if one.on == one.robot else f"{capital(robot(one))}. {plain(one.criterion)}",
             f"![{one.name}]({one.name}.png)",
             "\n".join(["figure | measured", "---|---", *map(row, measured.get(one.name, ()))]),
         ]
@@ -56,6 +56,11 @@ def row(one: Measured) -> str:
     expected = "" if one.expected == "no criterion" else f" ({one.expected})"
     value = f"{one.text} {one.unit}".strip() + expected
     return f"{plain(one.name)} | {value if one.is_met else f'**{value}, missed**'}"
+
+
+def robot(experiment: Experiment) -> str:
+    """The robot in words."""
+    return "computed" if experiment.robot == "none" else experiment.robot
 
 
 def capital(text: str) -> str:

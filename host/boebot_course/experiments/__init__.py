@@ -9,7 +9,8 @@ __all__ = ["Experiment", "Measured", "Outcome", "all_experiments"]
 
 
 def all_experiments() -> dict[str, Experiment]:
-    """All of them, by name, in the order of their names."""
+    """All of them, by name, in the order of their names; those of one name as its file has its robots."""
     for module in iter_modules(__path__):
         import_module(f"{__name__}.{module.name}")
-    return dict(sorted(EXPERIMENTS.items(), key=lambda item: (not item[0].startswith("E"), item[0])))
+    found = sorted(EXPERIMENTS.values(), key=lambda one: (not one.name.startswith("E"), one.bare_name))
+    return {one.name: one for one in found}

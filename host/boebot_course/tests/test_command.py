@@ -75,7 +75,7 @@ def test_list_names_all(capsys: pytest.CaptureFixture[str]) -> None:
     listed = {one["name"]: one for one in json.loads(out)["experiments"]}
     assert set(listed) == names
     assert listed["E29"]["robot"] == "none" and listed["E29"]["section"] == "4.4.2"
-    assert listed["E21"]["on"] == "arsim, avr, shieldbot"
+    assert listed["E21"]["on"] == "arsim, shieldbot, avr"
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_figure_is_said_so_that_its_verdict_can_be_seen(
         (("E299",), "there is no experiment 'E299'; did you mean 'E29'"),
         (("qqqqqq",), "there is no experiment 'qqqqqq'; `boebot list experiments` names all"),
         (("E29", "Z*"), "there is no experiment 'Z*'"),
-        (("E22", "--on", "arv"), "no such experiment runs on 'arv'; expected arsim, avr, shieldbot"),
+        (("E22", "--on", "arv"), "no such experiment runs on 'arv'; expected arsim, shieldbot, avr"),
         (("E29", "--seed", "-1"), "--seed"),
         (("--all", "--jobs", "0"), "--jobs"),
     ],
@@ -191,7 +191,7 @@ def test_experiments_that_miss_or_fail_are_named_and_the_others_go_on(
     assert "Criterion: Of our own." in out
     assert re.search(r"gain, in one +1.2 +0.9 to 1.1 +m +missed", out)
     assert "the board has gone" in out
-    assert re.search(r"ZeroDivisionError: by nothing \(test_experiment_command.py, line \d+\)", out)
+    assert re.search(r"ZeroDivisionError: by nothing \(test_command.py, line \d+\)", out)
     assert {path.name for path in tmp_path.glob("*.png")} == {"X1.png", "X2.png"}
     check_page(tmp_path / "index.html", list(four_experiments.values()))
 
