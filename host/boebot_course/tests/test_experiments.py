@@ -116,7 +116,7 @@ def test_page_of_a_chapter_is_as_the_kit_writes_it(chapter: str) -> None:
     text = pages.page(chapter, EXPERIMENTS.values(), measured)
     assert without_rows(shown) == without_rows(text), "stale: make pictures"
     there, now = rows_of(shown), rows_of(text)
-    for name in now.keys() & set(QUICK):
+    for name in now.keys() & set(QUICK) - {"E66"}:  # it counts kinds of objects inside the kit
         assert numbers(there[name]) == pytest.approx(numbers(now[name]), rel=SAME, abs=NOTHING, nan_ok=True), name
 
 
