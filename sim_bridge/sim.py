@@ -23,11 +23,9 @@ from boebot.record.blocks import Block, Group, group_of
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
-from sim_bridge.robots.imperfections import Draw, applied, body_parameters
-from sim_bridge.robots.outline import collision_outline
+from sim_bridge.robots.imperfections import Draw, applied, body_parameters, collision_outline
 from sim_bridge.robots.wiring import done, join
-from sim_bridge.vehicle import ENDS, VehicleModel
-from sim_bridge.vehicles.model_file import vehicle_model
+from sim_bridge.vehicles import ENDS
 
 TICK_CYCLES = 160_000  # of the firmware; a world step divides it
 STEP_CYCLES = 16_000  # 1 ms
@@ -68,8 +66,8 @@ class Member:
     board: EmulatedBoard | None
     description: robots.RobotDescription
     """with the imperfections that it was added with"""
-    model: VehicleModel | None
-    """of a robot without a board"""
+    model: Any
+    """the VehicleModel of a robot without a board"""
 
 
 _kept: dict[int, tuple[object, ...]] = {}
@@ -216,6 +214,8 @@ class Sim:
         join(self.handle, number, description, draw)
 
     def _add_vehicle(self, number: int, description: robots.RobotDescription, pose: Pose) -> None:
+        from sim_bridge.vehicles.model_file import vehicle_model
+
         model = vehicle_model(description, dt=self._step_cycles / CLOCK_HZ, noise=self.noise)
         status = lib.sim_add_vehicle(self.handle, number, model.handle, *pose)
         self._check_place(status, pose)

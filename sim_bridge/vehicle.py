@@ -15,7 +15,7 @@ from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.vehicles import worlds
+from sim_bridge.vehicles import ENDS, worlds
 from sim_bridge.vehicles.model import VehicleModel as VehicleModel
 from sim_bridge.vehicles.model import beam as beam
 from sim_bridge.vehicles.model_file import ARSIM_BODY as ARSIM_BODY
@@ -26,12 +26,6 @@ Brain = Callable[["Vehicle"], tuple[float, float]]
 Stage = Callable[[str, "Vehicle"], None]
 
 STAGES: Final = ("sense", "process", "send", "move", "arena", "check")  # of a step, Fig. 3.1
-ENDS: Final[dict[int, str]] = {
-    lib.VEHICLE_RUNS: "",
-    lib.VEHICLE_COLLIDED: "collision",
-    lib.VEHICLE_EXHAUSTED: "battery empty",
-    lib.VEHICLE_BRAIN_FAILED: "brain failed",
-}
 SPEED_MAXIMUM: Final = 99.9  # m/s, at the start
 TURN_RATE_MAXIMUM: Final = 999.9  # rad/s
 

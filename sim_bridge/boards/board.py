@@ -7,7 +7,7 @@ Works on every kind of board: the extension that made it lends its `board_access
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.boards import WatchdogReset
 from boebot.errors import BoardError
-from sim_bridge.boards.code_places import with_place
 
 CLOCK_HZ = 16_000_000
 DATA_SIZE = 0x900
@@ -301,3 +301,55 @@ class BoardAccess(BoardMemory):
             self._lib.board_access_close(self._access)
             self._access = self._pointer = self._ffi.NULL
             self._owner = None
+
+
+# ---- places in the program: its ELF file is read only where something went wrong ------------------------------------
+
+PROLOGUE = "__prologue_saves__"  # of libgcc, without source lines: -mcall-prologues
+
+
+def places(elf: Path | None, addresses: Iterable[int]) -> dict[int, str]:
+    """Function and source line of each address; empty where there is no file that can be read."""
+    if elf is None:
+        return {}
+    from boebot.errors import AnalysisError
+    from boebot.image.elf import read_image
+    from boebot.image.places import place
+
+    try:
+        image = read_image(elf)
+    except AnalysisError:
+        return {}
+    return {address: place(image, address) for address in addresses}
+
+
+def with_place(fault: str, elf: Path | None, address: int, z: int = 0) -> str:
+    """What went wrong, with the place of that address behind it, by the image's file; without where there is none.
+
+    `z`: the register Z then, by which a function says where it goes on to the code that saves registers for all.
+    """
+    if address < 0:
+        return fault
+    found = places(elf, (address, 2 * z))
+    where = found.get(address, "")
+    if where == f"in {PROLOGUE}" and (caller := found[2 * z]):
+        where += f" of {caller.removeprefix('in ')}"
+    return f"{fault} {where}".rstrip()
+
+
+def note_sentences(notes: Sequence[tuple[int, int, str, str]], elf: Path | None) -> list[str]:
+    """For people: the notes of a board (`BoardMemory.notes`), with places by the image's file."""
+    found = places(elf, [address for _, address, _, _ in notes]) if notes else {}
+    return [
+        f"the program {does} at address 0x{address:04X} in cycle {cycle} {found.get(address, '')}".rstrip() + f": {why}"
+        for cycle, address, does, why in notes
+    ]
+
+
+def watchdog_resets(log: Sequence[tuple[int, int]], elf: Path | None) -> list[WatchdogReset]:
+    """What the log of a board's watchdog says (`BoardMemory.watchdog_log`), with places by the image's file."""
+    found = places(elf, [address for _, address in log]) if log else {}
+    return [
+        WatchdogReset(cycle=cycle, time_s=cycle / CLOCK_HZ, address=address, place=found.get(address, ""))
+        for cycle, address in log
+    ]

@@ -10,7 +10,7 @@ from typing import Any
 from boebot import resources
 from boebot.errors import BoardError
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.code_places import with_place
+from sim_bridge.boards.board import with_place
 
 
 class EmulatedBoard:

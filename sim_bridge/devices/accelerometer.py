@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from boebot.devices.accelerometer import Accelerometer
-from sim_bridge.devices.catalogue import modelled
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import Model, SensorKind, modelled
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE
-from sim_bridge.vehicles.model import VehicleModel
 
 ACCELEROMETER = SensorKind(
     "accelerometer",
@@ -15,7 +13,7 @@ ACCELEROMETER = SensorKind(
 
 
 @modelled(Accelerometer)
-def accelerometer(device: Accelerometer, name: str, model: VehicleModel) -> None:
+def accelerometer(device: Accelerometer, name: str, model: Model) -> None:
     """A proof mass on a spring."""
     model.sensor(
         "accelerometer",

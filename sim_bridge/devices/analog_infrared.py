@@ -7,10 +7,7 @@ from typing import Any
 
 from boebot.devices.analog_infrared import SharpSensor
 from sim_bridge._core import ffi
-from sim_bridge.devices.beam import beam_of
-from sim_bridge.devices.catalogue import joined
-from sim_bridge.devices.part import At, Part
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import At, Part, SensorKind, beam_of, joined
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE
 

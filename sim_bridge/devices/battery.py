@@ -8,11 +8,9 @@ from typing import Any
 from boebot.description.robots import Supply
 from boebot.devices.battery import Energy
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import modelled
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import Model, SensorKind, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE
-from sim_bridge.vehicles.model import VehicleModel
 
 
 def _order(values: Mapping[str, Any]) -> str:
@@ -24,7 +22,7 @@ CHARGE = SensorKind("charge", {"sigma": NOT_NEGATIVE}, _order, usual={"empty": 5
 
 
 @modelled(Energy)
-def energy(device: Energy, name: str, model: VehicleModel) -> None:
+def energy(device: Energy, name: str, model: Model) -> None:
     """Its voltage."""
     model.battery(
         name,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from boebot.devices.buzzer import PiezoBuzzer
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined
-from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.catalogue import At, Part, joined
 
 
 @joined(PiezoBuzzer)

@@ -6,12 +6,9 @@ from typing import Any
 
 from boebot.devices.compass import HeadingCompass, MagneticCompass
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined, modelled
-from sim_bridge.devices.part import At, Part
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, TURN
-from sim_bridge.vehicles.model import VehicleModel
 
 COMPASS = SensorKind("compass", {"sigma": NOT_NEGATIVE, "bias": TURN})
 
@@ -23,7 +20,7 @@ def part(device: MagneticCompass, at: At) -> Part:
 
 
 @modelled(HeadingCompass)
-def heading(device: HeadingCompass, name: str, model: VehicleModel) -> None:
+def heading(device: HeadingCompass, name: str, model: Model) -> None:
     """A heading."""
     model.sensor("compass", name, period=device.period_s, sigma=device.sigma_rad, bias=device.bias_rad)
 

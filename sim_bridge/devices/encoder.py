@@ -6,8 +6,7 @@ from typing import Any
 
 from boebot.devices.encoder import QuadratureEncoder, SingleEncoder
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined
-from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.catalogue import At, Part, joined
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 
 NO_PIN = 255

@@ -6,13 +6,9 @@ from typing import Any
 
 from boebot.devices.infrared import InfraredPair, InfraredProximity
 from sim_bridge._core import ffi
-from sim_bridge.devices.beam import beam_of
-from sim_bridge.devices.catalogue import joined, modelled
-from sim_bridge.devices.part import At, Part
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, beam_of, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SWITCH
-from sim_bridge.vehicles.model import VehicleModel
 
 INFRARED_PROXIMITY = SensorKind(
     "infrared_proximity",
@@ -29,7 +25,7 @@ def part(device: InfraredPair, at: At) -> Part:
 
 
 @modelled(InfraredProximity)
-def proximity(device: InfraredProximity, name: str, model: VehicleModel) -> None:
+def proximity(device: InfraredProximity, name: str, model: Model) -> None:
     """A reading from 0 to 1."""
     model.sensor(
         "infrared_proximity",

@@ -7,10 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.laser import Laser
-from sim_bridge.devices.catalogue import modelled
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import Model, SensorKind, modelled
 from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE, TURN, Range
-from sim_bridge.vehicles.model import VehicleModel
 
 
 def _fan(values: Mapping[str, Any]) -> str:
@@ -31,7 +29,7 @@ LASER = SensorKind(
 
 
 @modelled(Laser)
-def laser(device: Laser, name: str, model: VehicleModel) -> None:
+def laser(device: Laser, name: str, model: Model) -> None:
     """A fan of rays."""
     x, y = device.position_m
     model.sensor(

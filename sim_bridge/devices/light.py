@@ -6,12 +6,9 @@ from typing import Any
 
 from boebot.devices.light import LightSensor, Phototransistor
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined, modelled
-from sim_bridge.devices.part import At, Part
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE
-from sim_bridge.vehicles.model import VehicleModel
 
 PHOTOTRANSISTOR = SensorKind(
     "phototransistor",
@@ -27,7 +24,7 @@ def part(device: LightSensor, at: At) -> Part:
 
 
 @modelled(Phototransistor)
-def phototransistor(device: Phototransistor, name: str, model: VehicleModel) -> None:
+def phototransistor(device: Phototransistor, name: str, model: Model) -> None:
     """The irradiance."""
     x, y = device.position_m
     model.sensor(

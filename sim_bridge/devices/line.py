@@ -6,12 +6,9 @@ from typing import Any
 
 from boebot.devices.line import LineSensor, ReflectanceSensor
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined, modelled
-from sim_bridge.devices.part import At, Part
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE
-from sim_bridge.vehicles.model import VehicleModel
 
 REFLECTANCE = SensorKind(
     "reflectance", dict.fromkeys(("radius", "dark", "sigma", "gain"), NOT_NEGATIVE), usual={"gain": 1.0}
@@ -25,7 +22,7 @@ def part(device: LineSensor, at: At) -> Part:
 
 
 @modelled(ReflectanceSensor)
-def reflectance(device: ReflectanceSensor, name: str, model: VehicleModel) -> None:
+def reflectance(device: ReflectanceSensor, name: str, model: Model) -> None:
     """The floor's reflectance."""
     x, y = device.position_m
     model.sensor(

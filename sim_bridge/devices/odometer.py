@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from boebot.devices.odometer import Odometer
 from sim_bridge._core import lib
-from sim_bridge.devices.catalogue import modelled
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import Model, SensorKind, modelled
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, Range
-from sim_bridge.vehicles.model import VehicleModel
 
 ODOMETER = SensorKind(
     "odometer",
@@ -21,7 +19,7 @@ ODOMETER = SensorKind(
 
 
 @modelled(Odometer)
-def odometer(device: Odometer, name: str, model: VehicleModel) -> None:
+def odometer(device: Odometer, name: str, model: Model) -> None:
     """Calibrated once at the start. ARSim lays off a whole step at the heading after it."""
     by_arsim = model.robot is not None and model.robot.scheme == "arsim"
     model.sensor(

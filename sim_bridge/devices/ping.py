@@ -8,13 +8,9 @@ from typing import Any
 
 from boebot.devices.ping import PingSensor, Sonar
 from sim_bridge._core import ffi
-from sim_bridge.devices.beam import beam_of
-from sim_bridge.devices.catalogue import joined, modelled
-from sim_bridge.devices.part import At, Part
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, beam_of, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, SWITCH, Range
-from sim_bridge.vehicles.model import VehicleModel
 
 
 def _ranges(values: Mapping[str, Any]) -> str:
@@ -39,7 +35,7 @@ def part(device: PingSensor, at: At) -> Part:
 
 
 @modelled(Sonar)
-def sonar(device: Sonar, name: str, model: VehicleModel) -> None:
+def sonar(device: Sonar, name: str, model: Model) -> None:
     """A distance."""
     model.sensor(
         "sonar",

@@ -11,8 +11,7 @@ from typing import Any
 from boebot.description.robots import Body
 from boebot.devices.servo import ContinuousServo
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined
-from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.catalogue import At, Part, joined
 from sim_bridge.robots.imperfections import Draw
 
 RPM = 2.0 * math.pi / 60.0  # rad/s

@@ -7,8 +7,7 @@ from typing import Any
 
 from boebot.devices.turret import PositionServo
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices.catalogue import joined
-from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.catalogue import At, Part, joined
 from sim_bridge.robots.imperfections import Draw
 
 

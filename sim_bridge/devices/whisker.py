@@ -7,11 +7,8 @@ from typing import Any
 
 from boebot.devices.whisker import TouchWhisker, WhiskerSwitch
 from sim_bridge._core import ffi
-from sim_bridge.devices.catalogue import joined, modelled
-from sim_bridge.devices.part import At, Part
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
-from sim_bridge.vehicles.model import VehicleModel
 
 
 def _length(values: Mapping[str, Any]) -> str:
@@ -29,7 +26,7 @@ def part(device: WhiskerSwitch, at: At) -> Part:
 
 
 @modelled(TouchWhisker)
-def touch(device: TouchWhisker, name: str, model: VehicleModel) -> None:
+def touch(device: TouchWhisker, name: str, model: Model) -> None:
     """A segment that touches."""
     (root_x, root_y), (tip_x, tip_y) = device.root_m, device.tip_m
     model.sensor("touch", name, root_x=root_x, root_y=root_y, tip_x=tip_x, tip_y=tip_y)

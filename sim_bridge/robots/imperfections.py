@@ -7,14 +7,15 @@ docs/reference/imperfections.md, with the sources. Without noise every part is n
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
 from boebot.arguments import shown
 from boebot.description import robots
+from boebot.description.outlines import polygon_fault
 from boebot.description.robots import idle
-from boebot.errors import BoardError
+from boebot.errors import BoardError, RobotError
 from boebot.imperfections import checked, imperfections, switched_off
 from sim_bridge._core import ffi, lib
 
@@ -124,3 +125,27 @@ def body_numbers(body: robots.Body) -> dict[str, float]:
         "angular_damping": body.angular_damping_n_m_s,
         "grip": AS_BUILT["tyre_grip"] if body.tyre_grip is None else body.tyre_grip,
     }
+
+
+# ---- its collision outline -------------------------------------------------------------------------------------------
+
+CORNERS_MAXIMUM: Final[int] = lib.BODY_CORNERS_MAXIMUM
+
+
+def collision_outline(where: str, corners: Sequence[Sequence[float]]) -> Any:
+    """The outline in C of `corners`, (x, y) in m in the body's frame, around the axle's middle; it must outlive bodies.
+
+    Raises:
+        RobotError: it is no such polygon; `where` says whose.
+    """
+    try:
+        points = [(float(x), float(y)) for x, y in corners]
+    except (TypeError, ValueError, OverflowError):
+        raise RobotError(f"{where}: expected a list of corners [x, y] in m") from None
+    fault = polygon_fault(points, CORNERS_MAXIMUM)
+    if fault:
+        raise RobotError(f"{where}{fault}")
+    outline = ffi.new("body_outline *")
+    if lib.body_outline_make(outline, [value for point in points for value in point], len(points)) != lib.OUTLINE_OK:
+        raise RobotError(f"{where}: a place of it is narrower than 0.4 mm; expected room for a core")
+    return outline

@@ -13,8 +13,7 @@ from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError
 from sim_bridge._core import lib
 from sim_bridge.devices.battery import battery_parameters
-from sim_bridge.devices.catalogue import part_of
-from sim_bridge.devices.part import At, Part
+from sim_bridge.devices.catalogue import At, Part, part_of
 from sim_bridge.robots import imperfections
 
 NO_PIN = 255

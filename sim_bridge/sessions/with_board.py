@@ -16,8 +16,7 @@ from boebot.description import robots
 from boebot.devices.uart import Uart
 from boebot.errors import BoardError
 from boebot.record.blocks import Group
-from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.code_places import note_sentences, watchdog_resets
+from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins, PinRecorder
 from sim_bridge.sessions.opening import InWorld, Wait, alone, drain, new_sim

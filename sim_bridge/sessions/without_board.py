@@ -16,7 +16,7 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sessions.opening import InWorld, Wait, alone, drain, new_sim
 from sim_bridge.sessions.together import SimWorld
 from sim_bridge.sim import Sim, SimRobot
-from sim_bridge.vehicles.model_file import STEP_S
+from sim_bridge.vehicles import STEP_S
 
 DEFAULT_ARENA = "arsim"
 

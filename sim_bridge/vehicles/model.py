@@ -15,11 +15,10 @@ from boebot.arguments import shown, switch
 from boebot.description.robots import RobotDescription
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices.catalogue import sensor_kinds
-from sim_bridge.devices.sensor import SensorKind
+from sim_bridge.devices.catalogue import SensorKind, sensor_kinds
 from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
 from sim_bridge.reading_table import ReadingTable
-from sim_bridge.robots.outline import collision_outline
+from sim_bridge.robots.imperfections import collision_outline
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct, values_of
 
 SIDES: Final = ("left", "right")

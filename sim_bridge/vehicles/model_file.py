@@ -21,10 +21,9 @@ from boebot.errors import RobotError
 from sim_bridge.devices.catalogue import add_to
 from sim_bridge.devices.motor import dc_parameters, regulated_parameters
 from sim_bridge.robots.imperfections import applied, body_numbers
+from sim_bridge.vehicles import STEP_S
 from sim_bridge.vehicles.checked_structs import FINITE, number
 from sim_bridge.vehicles.model import SIDES, VehicleModel
-
-STEP_S: Final = 0.01  # notes, section 3.2.6
 
 
 def vehicle_model(

@@ -22,7 +22,7 @@ from boebot_timing.emulated.world_access import WorldAccess
 from boebot_timing.measured import Measurement, merged
 from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards import avr
-from sim_bridge.boards.code_places import watchdog_resets
+from sim_bridge.boards.board import watchdog_resets
 
 SCENARIOS = ("figures", "overload", "faults", "everything")
 HANG = "hang"  # the load of the figures for HANGS_AFTER, then a task never returns; what comes then is the watchdog's

@@ -14,7 +14,7 @@ from boebot.devices.device import pin_name
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_board
-from sim_bridge.devices.part import Part
+from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots.wiring import add_part
 from sim_bridge.sim import Sim
 from sim_bridge.tests.boards.avr.avr_program import assemble

@@ -17,7 +17,7 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.devices import analog_infrared as analog_infrared_model
 from sim_bridge.devices import encoder as encoder_model
 from sim_bridge.devices import light as light_model
-from sim_bridge.devices.part import Part
+from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots import imperfections
 from sim_bridge.robots.wiring import add_part
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, scripts, square

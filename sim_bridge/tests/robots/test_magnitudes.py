@@ -26,8 +26,7 @@ from boebot.result import RunResult, read_run
 from boebot.running.again import again, recorded
 from sim_bridge._core import lib
 from sim_bridge.devices.battery import battery_parameters
-from sim_bridge.devices.catalogue import part_of
-from sim_bridge.devices.part import At
+from sim_bridge.devices.catalogue import At, part_of
 from sim_bridge.robots.imperfections import Draw, applied, body_parameters
 from sim_bridge.tests.simulated import scripted
 
