@@ -12,7 +12,7 @@ from boebot.arguments import number, shown
 from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, COUNTERS, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
+from sim_bridge.boards.board import CLOCK_HZ, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
 from sim_bridge.sim import SimRobot
 
 ECHO_MAXIMUM_US = 1e6
@@ -61,10 +61,6 @@ class BoardPins(BoardMemory):
         log = np.empty(count, dtype=EDGE)
         lib.sim_edges(self._handle, self._number, ffi.from_buffer("sim_edge[]", log, require_writable=True), count)
         return log
-
-    def output(self, pin: int) -> int:
-        """What the firmware does to a pin now: LOW, HIGH, RELEASED or PULLED_UP (3)."""
-        return int(lib.board_output(self._robot.board.address, pin))
 
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:
         """Takes a pin from its part and drives it from `at_cycle` on (now)."""
@@ -161,12 +157,6 @@ class BoardPins(BoardMemory):
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""
         self._robot.line_rate(baud)
-
-    def counters(self) -> dict[str, int]:
-        """What the board counted since power-on."""
-        values = ffi.new("uint64_t[8]")
-        lib.board_read_counters(self._robot.board.address, values)
-        return dict(zip(COUNTERS, (int(value) for value in values), strict=True))
 
     @staticmethod
     def _check(status: int, what: str) -> None:

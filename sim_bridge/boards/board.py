@@ -104,6 +104,16 @@ class BoardMemory(ABC):
             BoardError: the board is closed.
         """
 
+    def output(self, pin: int) -> Level:
+        """What the firmware does to a pin now."""
+        return Level(self._memory_lib.board_output(self._board, pin))
+
+    def counters(self) -> dict[str, int]:
+        """What the board counted since power-on."""
+        out = self._memory_ffi.new("board_counters *")
+        self._memory_lib.board_count(self._board, out)
+        return {name: int(getattr(out, name)) for name in COUNTERS}
+
     def _data(self, address: int, count: int) -> Any:
         board = self._board
         check_range("data", address, count, DATA_SIZE)
@@ -221,10 +231,6 @@ class BoardAccess(BoardMemory):
         `count` times."""
         self._lib.board_access_drive_wave(self._access, first, half, count, pin, level)
 
-    def output(self, pin: int) -> Level:
-        """What the firmware does to `pin` now."""
-        return Level(self._lib.board_access_output(self._access, pin))
-
     def send(self, data: bytes | Iterable[int], at: int = 0) -> None:
         """Puts bytes on the line towards the board, not before cycle `at`."""
         data = bytes(data)
@@ -278,22 +284,10 @@ class BoardAccess(BoardMemory):
         self._access.echo_to = on
         self._access.echo_delay = delay
 
-    def counters(self) -> dict[str, int]:
-        """What the board counted."""
-        out = self._ffi.new("board_counters *")
-        self._lib.board_access_counters(self._access, out)
-        return {name: int(getattr(out, name)) for name in COUNTERS}
-
     @property
     def fault(self) -> str | None:
         """What is wrong after a crash, with function and line where they are known, or None."""
-        text = self._lib.board_access_fault(self._access)
-        if text == self._ffi.NULL:
-            return None
-        data = self._lib.board_memory(self._pointer)
-        z = 0 if data == self._ffi.NULL else data[30] | data[31] << 8
-        address = self._lib.board_access_fault_address(self._access)
-        return with_place(self._ffi.string(text).decode(), self._elf, address, z)
+        return fault_of(self._lib, self._ffi, self._board, self._elf)
 
     def close(self) -> None:
         """Lets go of the board."""
@@ -335,6 +329,16 @@ def with_place(fault: str, elf: Path | None, address: int, z: int = 0) -> str:
     if where == f"in {PROLOGUE}" and (caller := found[2 * z]):
         where += f" of {caller.removeprefix('in ')}"
     return f"{fault} {where}".rstrip()
+
+
+def fault_of(lib: Any, ffi: Any, board: Any, elf: Path | None) -> str | None:
+    """What is wrong with a board (C `board *`) after a crash, or None."""
+    text = lib.board_fault(board)
+    if text == ffi.NULL:
+        return None
+    data = lib.board_memory(board)
+    z = 0 if data == ffi.NULL else data[30] | data[31] << 8
+    return with_place(ffi.string(text).decode(), elf, lib.board_fault_address(board), z)
 
 
 def note_sentences(notes: Sequence[tuple[int, int, str, str]], elf: Path | None) -> list[str]:

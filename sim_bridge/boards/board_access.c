@@ -76,8 +76,6 @@ void board_access_drive_wave(board_access *self, uint64_t first, uint64_t half, 
   }
 }
 
-uint8_t board_access_output(const board_access *self, uint8_t pin) { return self->board->op->output(self->board, pin); }
-
 void board_access_send(board_access *self, uint64_t at, const uint8_t *bytes, size_t count) {
   self->board->op->send(self->board, at, bytes, count);
 }
@@ -92,14 +90,20 @@ void board_access_reset(board_access *self, int cause) {
   self->board->op->reset(self->board, (board_reset_cause)cause);
 }
 
-void board_access_counters(const board_access *self, board_counters *out) {
-  self->board->op->counters(self->board, out);
+/* ---- of any board -------------------------------------------------------------------------------------------------- */
+
+void board_free(board *self) { self->op->destroy(self); }
+
+uint8_t board_output(const board *self, uint8_t pin) {
+  return pin < BOARD_PIN_COUNT ? self->op->output(self, pin) : (uint8_t)BOARD_RELEASED;
 }
 
-const char *board_access_fault(const board_access *self) { return self->board->op->fault(self->board); }
+void board_count(const board *self, board_counters *out) { self->op->counters(self, out); }
 
-int64_t board_access_fault_address(const board_access *self) {
-  const uint32_t *found = self->board->op->extension(self->board, BOARD_FAULT_ADDRESS);
+const char *board_fault(const board *self) { return self->op->fault(self); }
+
+int64_t board_fault_address(board *self) {
+  const uint32_t *found = self->op->extension(self, BOARD_FAULT_ADDRESS);
   return found ? (int64_t)*found : -1;
 }
 

@@ -49,14 +49,18 @@ void board_access_drive(board_access *self, uint64_t at, uint8_t pin, uint8_t le
 /* Drives `pin` to `level` (LOW or HIGH) at `first`, to the other one `half` cycles later, and so on, `count` times. */
 void board_access_drive_wave(board_access *self, uint64_t first, uint64_t half, size_t count, uint8_t pin,
                              uint8_t level);
-uint8_t board_access_output(const board_access *self, uint8_t pin);
 void board_access_send(board_access *self, uint64_t at, const uint8_t *bytes, size_t count);
 size_t board_access_receive(board_access *self, uint8_t *bytes, uint64_t *cycles, size_t capacity);
 void board_access_line_rate(board_access *self, uint32_t baud);
 void board_access_reset(board_access *self, int cause);
-void board_access_counters(const board_access *self, board_counters *out);
-const char *board_access_fault(const board_access *self);
-int64_t board_access_fault_address(const board_access *self); /* see BOARD_FAULT_ADDRESS; -1: not known */
+
+/* ---- of any board */
+
+void board_free(board *self);
+uint8_t board_output(const board *self, uint8_t pin); /* what the program does to a pin now */
+void board_count(const board *self, board_counters *out);
+const char *board_fault(const board *self); /* one sentence about a crash, or NULL */
+int64_t board_fault_address(board *self);   /* see BOARD_FAULT_ADDRESS; -1: not known */
 
 /* Data space of the microcontroller, to be read or written; NULL on a board that has none. */
 uint8_t *board_memory(board *self);

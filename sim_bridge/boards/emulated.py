@@ -10,7 +10,7 @@ from typing import Any
 from boebot import resources
 from boebot.errors import BoardError
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import with_place
+from sim_bridge.boards.board import fault_of
 
 
 class EmulatedBoard:
@@ -27,9 +27,6 @@ class EmulatedBoard:
     ) -> None:
         """`release` frees the board; `elf` is the file that says where in the source an address comes from, `assumed`
         what it does not say and was assumed.
-
-        Raises:
-            BoardError: the board was built for another version of this package.
         """
         self._address = address
         self.description = description
@@ -41,9 +38,6 @@ class EmulatedBoard:
         self._keep = keep
         self.is_in_use: Callable[[], bool] = _in_no_simulation
         """whether a simulation runs it"""
-        if lib.board_check(address) != lib.SIM_OK:
-            self.close()
-            raise BoardError(f"the {description} was built for another version of the simulator; build it again")
 
     @property
     def address(self) -> int:
@@ -58,11 +52,7 @@ class EmulatedBoard:
 
     def fault(self) -> str:
         """What is wrong after a crash, with function and line where they are known."""
-        text = lib.board_fault(self.address)
-        why = "unknown fault" if text == ffi.NULL else ffi.string(text).decode()
-        data = lib.board_memory(ffi.cast("board *", self.address))
-        z = 0 if data == ffi.NULL else data[30] | data[31] << 8
-        return with_place(why, self.elf, lib.board_fault_address(self.address), z)
+        return fault_of(lib, ffi, ffi.cast("board *", self.address), self.elf) or "unknown fault"
 
     def close(self) -> None:
         """Frees the board. May be called twice.
@@ -108,7 +98,7 @@ def native_board(library: Path) -> EmulatedBoard:
     return EmulatedBoard(
         address,
         "emulated native board",
-        lambda: lib.board_destroy(address),
+        lambda: lib.board_free(board),
     )
 
 

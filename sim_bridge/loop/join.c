@@ -120,10 +120,10 @@ void sim_insert(sim *self, robot *r, double x, double y, double heading) {
 
 int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameters *parameters, double x, double y,
                   double heading) {
-  if (board_check(address) != SIM_OK) return SIM_WRONG_BOARD;
+  board *b = (board *)address;
+  if (b == NULL || b->op == NULL || b->op->version != BOARD_INTERFACE_VERSION) return SIM_WRONG_BOARD;
   const int room = sim_has_room(self, number, body_reach_of(parameters), x, y, heading);
   if (room != SIM_OK) return room;
-  board *b = (board *)address;
   robot *r = sim_new_robot(self, number, b);
   if (r == NULL) return SIM_NO_MEMORY;
   body_init(r->body, parameters, 0.0);

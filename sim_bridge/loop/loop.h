@@ -162,14 +162,6 @@ uint32_t sim_brown_outs(const sim *self, int robot, uint32_t *upsets);
 double sim_pack_voltage(const sim *self, int robot);
 double sim_supply_voltage(const sim *self, int robot);
 
-/* Operations of a board by its address, for Python. */
-int board_check(uintptr_t board); /* 0, or SIM_WRONG_BOARD where it was built for another interface */
-uint8_t board_output(uintptr_t board, uint8_t pin);
-void board_destroy(uintptr_t board);
-const char *board_fault(uintptr_t board);
-int64_t board_fault_address(uintptr_t board); /* in flash, of the instruction that crashed it; -1: not known */
-/* executed_cycles, interrupts, bytes_in, bytes_out, overruns, framing_errors, resets, edges_out */
-void board_read_counters(uintptr_t board, uint64_t counters[8]);
 /* python: end */
 
 #endif

@@ -99,13 +99,6 @@ class AvrBoard:
         """The board's operations, for use without a simulated world."""
         return BoardAccess(self._lib, self._ffi, self._ffi.cast("board *", self.pointer), owner=self, elf=self.elf)
 
-    def data(self, address: int, size: int = 1) -> bytes:
-        """Bytes of the data space: registers from 0, I/O registers from 0x20 as last written, RAM from 0x100."""
-        if address < 0 or size < 0 or address + size > 0x900:
-            raise ValueError(f"no data at 0x{address:X}..0x{address + size - 1:X}; the data space ends at 0x8FF")
-        board = self._ffi.cast("board *", self.pointer)
-        return bytes(self._ffi.buffer(self._lib.avr_board_data(board) + address, size))
-
     def hang_at(self, address: int) -> None:
         """From now on the instruction at that byte address of the program jumps to itself."""
         if not 0 <= address < FLASH_SIZE or address % 2:
@@ -164,7 +157,7 @@ class AvrBoard:
     def close(self) -> None:
         """Frees the board."""
         if self._board != self._ffi.NULL:
-            self._lib.avr_board_destroy(self._board)
+            self._lib.board_free(self._board)
             self._board = self._ffi.NULL
 
     def __del__(self) -> None:

@@ -57,8 +57,6 @@ COMPILER_FLAGS = [
 
 DECLARATIONS = """
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
-void avr_board_destroy(board *self);
-uint8_t *avr_board_data(board *self);
 uint8_t *avr_board_flash(board *self);
 void avr_board_one_by_one(board *self);
 typedef struct { uint64_t begin, executed; uint32_t gross, net, latency; uint16_t id, depth; ...; } avr_span;
@@ -82,8 +80,6 @@ PREAMBLE = """
 #include "avr_spans.h"
 #include "../board_access.h"
 
-static void avr_board_destroy(board *self) { self->op->destroy(self); }
-static uint8_t *avr_board_data(board *self) { return self->op->extension(self, BOARD_DATA); }
 static uint8_t *avr_board_flash(board *self) { return self->op->extension(self, AVR_BOARD_FLASH); }
 """
 

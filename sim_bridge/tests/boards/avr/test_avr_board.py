@@ -141,7 +141,7 @@ def test_watchdog_reset_keeps_time_and_levels() -> None:
     board = machine.board
     board.drive(7, Level.LOW)
     board.run(1000)
-    assert machine.avr.data(0x200)[0] == 1  # power-on
+    assert machine.board.read_memory(0x200, 1)[0] == 1  # power-on
     started = edges_of(board.log(), 13)[1]
     board.advance(3 * WATCHDOG_CYCLES + 3000)
     log = board.log()
@@ -151,7 +151,7 @@ def test_watchdog_reset_keeps_time_and_levels() -> None:
     period = released[1] - released[0]
     assert WATCHDOG_CYCLES < period < WATCHDOG_CYCLES + 100  # and the program up to the WDR
     assert released[2] - released[1] == period
-    assert machine.avr.data(0x200)[0] == 8  # watchdog, and only that: the program cleared the rest
+    assert machine.board.read_memory(0x200, 1)[0] == 8  # watchdog, and only that: the program cleared the rest
     assert board.counters()["resets"] == 3
     assert [edge.level for edge in log if edge.pin == 7][:2] == [Level.RELEASED, Level.PULLED_UP]
 
@@ -249,12 +249,12 @@ WDIF, WDIE, WDE = 0x80, 0x40, 0x08
 def test_the_warning_clears_its_own_enable() -> None:
     machine = Machine(WARNED.format(mode=BOTH, again="", enable="sei"))
     machine.board.advance(WATCHDOG_CYCLES + 1000)
-    assert machine.avr.data(0x200, 2) == bytes([WDE, WDE])  # WDIE and WDIF cleared by hardware (11.8.2)
+    assert machine.board.read_memory(0x200, 2) == bytes([WDE, WDE])  # WDIE and WDIF cleared by hardware (11.8.2)
     machine.board.advance(2 * WATCHDOG_CYCLES - 100)
     assert machine.board.counters()["resets"] == 0
     machine.board.run(1000)
     assert machine.board.counters()["resets"] == 1
-    assert machine.avr.data(16)[0] == 8  # MCUSR after it: WDRF
+    assert machine.board.read_memory(16, 1)[0] == 8  # MCUSR after it: WDRF
 
 
 def test_a_warning_that_is_set_again_warns_again() -> None:
@@ -269,11 +269,11 @@ def test_a_program_that_hears_no_warning_is_reset() -> None:
     # interrupts off for ever: the flag stands at the second time-out
     machine = Machine(WARNED.format(mode=BOTH, again="", enable=""))
     machine.board.advance(WATCHDOG_CYCLES + 1000)
-    assert machine.avr.data(0x201)[0] == WDIF | WDIE | WDE
+    assert machine.board.read_memory(0x201, 1)[0] == WDIF | WDIE | WDE
     assert machine.board.counters()["resets"] == 0
     machine.board.advance(2 * WATCHDOG_CYCLES + 1000)
     assert machine.board.counters()["resets"] == 1
-    assert machine.avr.data(16)[0] == 8
+    assert machine.board.read_memory(16, 1)[0] == 8
 
 
 @pytest.mark.parametrize("enable", ["sei", ""])
@@ -332,7 +332,7 @@ def test_reset_causes(cause: ResetCause, flags: int) -> None:
     board.reset(cause)
     board.run(1000)
     assert board.now == before + 1000 or before + 1000 <= board.now < before + 1008
-    status, memory = machine.avr.data(16, 2)
+    status, memory = machine.board.read_memory(16, 2)
     assert status == flags
     assert (memory == 0x77) == (cause != ResetCause.POWER)
 

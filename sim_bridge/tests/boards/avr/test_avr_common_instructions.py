@@ -81,9 +81,9 @@ def test_any_instruction_does_what_it_does_in_simavr(seed: int) -> None:
         ours.board.advance(until)
         simavr.board.advance(until)
         assert ours.board.now == simavr.board.now
-        assert ours.avr.data(0, 0x900) == simavr.avr.data(0, 0x900), until
+        assert ours.board.read_memory(0, 0x900) == simavr.board.read_memory(0, 0x900), until
     assert ours.board.counters() == simavr.board.counters()
-    assert ours.avr.data(16) == b"\xa5"  # it has come to its end
+    assert ours.board.read_memory(16, 1) == b"\xa5"  # it has come to its end
 
 
 CALLS = """
@@ -126,8 +126,8 @@ def test_calls_jumps_skips_and_the_stack_do_what_they_do_in_simavr() -> None:
         ours.board.advance(until)
         simavr.board.advance(until)
         assert ours.board.now == simavr.board.now
-        assert ours.avr.data(0, 0x900) == simavr.avr.data(0, 0x900), until
-    assert ours.avr.data(24)[0] > 20  # it went round
+        assert ours.board.read_memory(0, 0x900) == simavr.board.read_memory(0, 0x900), until
+    assert ours.board.read_memory(24, 1)[0] > 20  # it went round
 
 
 def test_a_stack_in_the_registers_is_a_fault_in_both() -> None:
@@ -147,7 +147,7 @@ def test_a_stack_in_the_registers_is_a_fault_in_both() -> None:
     for machine in (ours, simavr):
         with pytest.raises(BoardError, match="the stack overflows: it reaches 0x0015, variables end below 0x0100"):
             machine.board.run(400)
-    assert ours.avr.data(0, 0x20) == simavr.avr.data(0, 0x20)
+    assert ours.board.read_memory(0, 0x20) == simavr.board.read_memory(0, 0x20)
     assert ours.board.now == simavr.board.now
 
 

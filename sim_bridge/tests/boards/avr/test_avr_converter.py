@@ -50,7 +50,7 @@ def test_a_conversion_takes_13_clocks_and_the_first_25(prescaler: int, divider: 
     for start, end, clocks in ((start_1, end_1, 25), (start_2, end_2, 13)):
         elapsed = end - WAKE_AND_MARK - (start - START_TO_MARK)
         assert clocks * divider < elapsed + 1 and elapsed <= (clocks + 1) * divider + 1
-    assert int.from_bytes(machine.avr.data(16, 2), "little") == int(2.0 * 1024 / 5.0)
+    assert int.from_bytes(machine.board.read_memory(16, 2), "little") == int(2.0 * 1024 / 5.0)
 
 
 @pytest.mark.parametrize("channel", range(6))
@@ -62,7 +62,7 @@ def test_a_channel_reads_its_voltage(channel: int, volts: float) -> None:
         machine.board.analog(other, 1.7)
     machine.board.analog(channel, volts)
     machine.board.run(2000)
-    assert int.from_bytes(machine.avr.data(16, 2), "little") == min(1023, int(volts * 1024 / 5.0))
+    assert int.from_bytes(machine.board.read_memory(16, 2), "little") == min(1023, int(volts * 1024 / 5.0))
 
 
 def test_channel_is_fixed_when_the_conversion_has_begun() -> None:
@@ -89,7 +89,7 @@ def test_channel_is_fixed_when_the_conversion_has_begun() -> None:
     machine.board.analog(1, 1.0)
     machine.board.analog(2, 4.0)
     machine.board.run(4000)
-    assert int.from_bytes(machine.avr.data(16, 2), "little") == 204  # 1 V
+    assert int.from_bytes(machine.board.read_memory(16, 2), "little") == 204  # 1 V
 
 
 def test_free_running_converts_every_13_clocks() -> None:
@@ -123,5 +123,5 @@ def test_other_triggers_are_told_and_never_come(trigger: int, first: str) -> Non
     program = "main:\n" + "".join(f" ldi r24, {values[name]}\n sts {name}, r24\n" for name in order) + "1: rjmp 1b"
     machine = Machine(program.replace("1:", " ldi r24, 0xC1\n sts ADMUX, r24\n1: lds r24, ADCSRA\n"))
     machine.board.run(1000)
-    assert machine.avr.data(24)[0] & 0x50 == 0x10  # one conversion, and no more
+    assert machine.board.read_memory(24, 1)[0] & 0x50 == 0x10  # one conversion, and no more
     assert "writes to ADCSRB" in [does for _, _, does, _ in machine.board.notes()]

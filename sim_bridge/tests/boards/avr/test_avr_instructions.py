@@ -174,7 +174,7 @@ def test_running_straight_off_the_image_is_a_crash_of_its_last_instruction(tmp_p
 
 
 def test_memory_at_power_on_is_not_zero_and_always_the_same() -> None:
-    first, second = (Machine("main: rjmp main").avr.data(0x100, 0x800) for _ in range(2))
+    first, second = (Machine("main: rjmp main").board.read_memory(0x100, 0x800) for _ in range(2))
     assert first == second
     assert len(set(first)) > 200
 
@@ -199,4 +199,4 @@ def test_eeprom_and_program_memory() -> None:
         """
     )
     machine.board.run(200)
-    assert machine.avr.data(16, 2) == b"\x5a\xa5"
+    assert machine.board.read_memory(16, 2) == b"\x5a\xa5"

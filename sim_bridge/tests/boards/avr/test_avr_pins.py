@@ -82,13 +82,13 @@ def test_driven_input_stays_driven(level: Level) -> None:
     machine = Machine(PULL_UP_STEPS.format(step_0=""))
     machine.board.drive(7, level)
     machine.board.run(100)
-    assert [value >> 7 for value in machine.avr.data(16, 4)] == [level] * 4
+    assert [value >> 7 for value in machine.board.read_memory(16, 4)] == [level] * 4
 
 
 def test_pull_up_reads_one_and_a_floating_pin_keeps_its_level() -> None:
     machine = Machine(PULL_UP_STEPS.format(step_0=""))
     machine.board.run(100)
-    assert [value >> 7 for value in machine.avr.data(16, 4)] == [0, 1, 1, 1]
+    assert [value >> 7 for value in machine.board.read_memory(16, 4)] == [0, 1, 1, 1]
 
 
 def test_pull_up_rises_when_the_outside_lets_go() -> None:
@@ -114,7 +114,7 @@ def test_output_is_read_back_one_cycle_late() -> None:
     )
     machine.board.drive(7, Level.LOW)  # an output wins
     machine.board.run(100)
-    assert [value >> 7 for value in machine.avr.data(16, 2)] == [0, 1]
+    assert [value >> 7 for value in machine.board.read_memory(16, 2)] == [0, 1]
 
 
 PIN_CHANGE = """
@@ -257,7 +257,7 @@ def test_analog_conversion() -> None:
     )
     machine.board.analog(2, 3.3)
     machine.board.run(10_000)
-    assert int.from_bytes(machine.avr.data(16, 2), "little") == int(3.3 / 5.0 * 1024)
+    assert int.from_bytes(machine.board.read_memory(16, 2), "little") == int(3.3 / 5.0 * 1024)
     _, start_1, end_1, start_2, end_2 = edges_of(machine.board.log(), 13)
     assert 25 * 128 <= end_1 - start_1 < 26 * 128 + 20
     assert 13 * 128 <= end_2 - start_2 < 14 * 128 + 20
@@ -299,7 +299,7 @@ def converted(channel: int, supply: float | None = None, wait: int = 4 * SETTLED
     if supply is not None:
         machine.board.supply(supply)
     machine.board.run(20_000)
-    return int.from_bytes(machine.avr.data(16, 2), "little")
+    return int.from_bytes(machine.board.read_memory(16, 2), "little")
 
 
 @pytest.mark.parametrize(("supply", "result"), [(None, 225), (5.0, 225), (4.5, 250), (3.3, 341), (2.7, 417)])

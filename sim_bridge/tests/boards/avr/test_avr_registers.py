@@ -203,7 +203,7 @@ def test_spm_outside_of_the_boot_section_is_dropped_and_noted() -> None:
     source += "1: in r24, SPMCSR\n sbrc r24, 0\n rjmp 1b\n lpm r2, Z\n2: rjmp 2b\n .balign 128\npage: .byte 0x5A"
     machine = Machine(source)
     machine.board.run(1000)
-    assert machine.avr.data(2) == b"\x5a"
+    assert machine.board.read_memory(2, 1) == b"\x5a"
     ((_, address, does, _),) = machine.board.notes()
     assert (address, does) == (entry_of(assemble(source), "at"), "executes SPM")
 
@@ -214,12 +214,12 @@ def test_spm_outside_of_the_boot_section_is_dropped_and_noted() -> None:
 def test_a_jump_to_the_start_is_a_soft_reset() -> None:
     source = "main: lds r24, 0x0200\n inc r24\n sts 0x0200, r24\n sbi DDRB, 5\nlast: jmp 0"
     machine = Machine(source)
-    before = machine.avr.data(0x200)[0]
+    before = machine.board.read_memory(0x200, 1)[0]
     machine.board.run(1000)
     ((_, address, does, why),) = machine.board.notes()
     assert (address, does) == (entry_of(assemble(source), "last"), "jumps to its start")
     assert why.startswith("no reset")
-    assert (machine.avr.data(0x200)[0] - before) % 256 > 10
+    assert (machine.board.read_memory(0x200, 1)[0] - before) % 256 > 10
     assert machine.board.counters()["resets"] == 0
 
 
@@ -258,7 +258,7 @@ def test_a_stack_among_the_variables_is_legal() -> None:
     source = COROUTINES.format(set="set: ")
     machine = Machine(source)
     machine.board.run(2000)
-    rounds = machine.avr.data(2, 2)
+    rounds = machine.board.read_memory(2, 2)
     assert rounds[1] > 10 and rounds[0] - rounds[1] in (0, 1)
     ((_, address, does, _),) = machine.board.notes()
     assert (address, does) == (entry_of(assemble(source), "set"), "has a stack among its variables")
@@ -300,10 +300,11 @@ def test_erased_flash_leads_into_the_boot_section(tmp_path: Path) -> None:
     options = ["-nostartfiles", "-Wl,-e,main", "-Wl,--section-start=.text=0x7C00"]
     subprocess.run(["avr-gcc", "-mmcu=atmega328p", *options, "-o", str(image), str(source)], check=True)
     machine = create(image)
-    board, before = machine.access(), machine.data(2)[0]
+    board = machine.access()
+    before = board.read_memory(2, 1)[0]
     rounds, words = 5, 0x7C00 // 2
     board.run(rounds * (words + 1 + 3) + 1)  # a cycle for each word, INC, JMP
-    assert (machine.data(2)[0] - before) % 256 == rounds + 1
+    assert (board.read_memory(2, 1)[0] - before) % 256 == rounds + 1
     assert notes(board) == ["runs through erased flash"]
 
 

@@ -13,7 +13,7 @@ INPUT_LATENCY = 3  # synchronizer and edge detector: 2.5 to 3.5 cycles
 
 def word(machine: Machine, address: int) -> int:
     """A 16-bit value in RAM."""
-    return int.from_bytes(machine.avr.data(address, 2), "little")
+    return int.from_bytes(machine.board.read_memory(address, 2), "little")
 
 
 def words(machine: Machine, address: int, count: int) -> list[int]:
@@ -180,7 +180,7 @@ def test_writing_the_count_holds_the_match_off() -> None:
         """
     )
     machine.board.run(500)
-    before, after = machine.avr.data(16, 2)
+    before, after = machine.board.read_memory(16, 2)
     assert not before & 2
     assert after & 2
 
@@ -211,7 +211,7 @@ def test_clear_on_match_beyond_its_top_overflows_once() -> None:
         """
     )
     machine.board.run(500)
-    assert [flags & 3 for flags in machine.avr.data(16, 4)] == [0, 1, 1, 3]
+    assert [flags & 3 for flags in machine.board.read_memory(16, 4)] == [0, 1, 1, 3]
 
 
 def test_one_flag_is_cleared_at_a_time() -> None:
@@ -237,7 +237,7 @@ def test_one_flag_is_cleared_at_a_time() -> None:
         """
     )
     machine.board.run(500)
-    assert list(machine.avr.data(16, 3)) == [0b111, 0b101, 0b001]
+    assert list(machine.board.read_memory(16, 3)) == [0b111, 0b101, 0b001]
 
 
 # ---- PWM ----
@@ -388,7 +388,7 @@ def test_noise_filter_drops_a_glitch(noise_filter: int, captures: int) -> None:
     machine.board.drive(CAPTURE_PIN, Level.LOW, at=1003)
     machine.board.advance(1200)
     # without the filter the fall comes before the interrupt has turned the edge
-    assert machine.avr.data(26)[0] == 2 * captures
+    assert machine.board.read_memory(26, 1)[0] == 2 * captures
 
 
 # ---- Timer 0 as a tone needs it --------------------------------------------------------------------------
@@ -488,7 +488,7 @@ def turning(
         code += f" .rept {64 - 4 - 3 * len(change)}\n nop\n .endr\n"
     machine = Machine(code + "1: rjmp 1b")
     machine.board.run(64 * (SAMPLES + 2))
-    return list(machine.avr.data(0x200, SAMPLES))
+    return list(machine.board.read_memory(0x200, SAMPLES))
 
 
 SAMPLES = 14

@@ -70,7 +70,7 @@ class Bus:
         return self.machine.board.log()
 
     def results(self, count: int) -> list[int]:
-        return list(self.machine.avr.data(RESULTS, count))
+        return list(self.machine.board.read_memory(RESULTS, count))
 
 
 def falls(log: list[Edge]) -> list[int]:
@@ -248,7 +248,7 @@ def test_data_written_at_the_wrong_time_is_told() -> None:
         600,
     )
     bus.run()
-    collided, kept, clean = bus.machine.avr.data(16, 3)
+    collided, kept, clean = bus.machine.board.read_memory(16, 3)
     assert collided & 0x08 and kept == 0xFF and not clean & 0x08
 
 

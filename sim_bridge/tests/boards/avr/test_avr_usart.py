@@ -230,8 +230,8 @@ FRAMING, OVERRUN = 0x10, 0x08
 
 def received(machine: Machine) -> list[tuple[int, int]]:
     """(error flags, byte) of everything the program read."""
-    end = int.from_bytes(machine.avr.data(26, 2), "little")
-    data = machine.avr.data(0x200, end - 0x200)
+    end = int.from_bytes(machine.board.read_memory(26, 2), "little")
+    data = machine.board.read_memory(0x200, end - 0x200)
     return [(status & (FRAMING | OVERRUN), byte) for status, byte in zip(data[::2], data[1::2], strict=True)]
 
 
