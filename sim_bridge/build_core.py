@@ -18,7 +18,7 @@ from cffi import FFI
 BEFORE = """
 typedef struct part_kind part_kind;
 typedef struct sensor_kind sensor_kind;
-board *native_board_create(const char *library_path, char *error, size_t error_size);
+board *native_board_create(const uint8_t *image, size_t size, char *error, size_t error_size);
 """
 AFTER = """
 static const double WHISKER_HEIGHT_M;

@@ -9,6 +9,7 @@ from typing import Any
 
 from boebot import resources
 from boebot.errors import BoardError
+from boebot.files import regular
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import fault_of
 
@@ -91,7 +92,11 @@ def native_board(library: Path) -> EmulatedBoard:
         BoardError: it is no firmware library.
     """
     error = ffi.new("char[]", 512)
-    board = lib.native_board_create(str(library).encode(), error, 512)
+    try:
+        image = regular(library).read_bytes()
+    except OSError as refused:
+        raise BoardError(f"the firmware library {library} cannot be read: {refused.strerror}") from None
+    board = lib.native_board_create(image, len(image), error, 512)
     if board == ffi.NULL:
         raise BoardError(f"{library.name}: {ffi.string(error).decode(errors='replace')}")
     address = int(ffi.cast("uintptr_t", board))

@@ -14,33 +14,8 @@
 #include <windows.h>
 #else
 #include <dlfcn.h>
-#include <sys/types.h>
 #include <unistd.h>
 #endif
-
-unsigned char *library_read(const char *path, size_t *size, char *error, size_t error_size) {
-  FILE *file = fopen(path, "rb");
-  if (file == NULL) {
-    snprintf(error, error_size, "cannot open the firmware library %s: %s", path, strerror(errno));
-    return NULL;
-  }
-  unsigned char *bytes = NULL;
-  long length = -1;
-  if (fseek(file, 0, SEEK_END) == 0 && (length = ftell(file)) > 0 && fseek(file, 0, SEEK_SET) == 0) {
-    bytes = malloc((size_t)length);
-  }
-  if (bytes != NULL && fread(bytes, 1, (size_t)length, file) != (size_t)length) {
-    free(bytes);
-    bytes = NULL;
-  }
-  fclose(file);
-  if (bytes == NULL) {
-    snprintf(error, error_size, "cannot read the firmware library %s", path);
-    return NULL;
-  }
-  *size = (size_t)length;
-  return bytes;
-}
 
 #ifdef _WIN32
 
@@ -89,20 +64,6 @@ void library_unload(library_copy *library) {
 
 #else
 
-static bool write_all(int file, const unsigned char *bytes, size_t size) {
-  while (size > 0) {
-    const ssize_t written = write(file, bytes, size);
-    if (written < 0 && errno != EINTR) {
-      return false;
-    }
-    if (written > 0) {
-      bytes += written;
-      size -= (size_t)written;
-    }
-  }
-  return true;
-}
-
 bool library_load(library_copy *library, const unsigned char *bytes, size_t size, char *error, size_t error_size) {
   *library = (library_copy){NULL, NULL};
   const char *folder = getenv("TMPDIR");
@@ -113,9 +74,9 @@ bool library_load(library_copy *library, const unsigned char *bytes, size_t size
     snprintf(error, error_size, "cannot make a temporary file %s: %s", path, strerror(errno));
     return false;
   }
-  const bool written = write_all(file, bytes, size);
-  close(file);
-  if (written) {
+  FILE *copy = fdopen(file, "wb");
+  const bool written = copy != NULL && fwrite(bytes, 1, size, copy) == size;
+  if (copy != NULL && fclose(copy) == 0 && written) {
     library->handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (library->handle == NULL) {
       snprintf(error, error_size, "cannot load the firmware library: %s", dlerror());

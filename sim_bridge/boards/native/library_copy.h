@@ -11,9 +11,6 @@ typedef struct {
   char *path; /* the copy, where it cannot be removed while it is loaded; otherwise NULL */
 } library_copy;
 
-/* Reads the whole file; NULL and one sentence in `error` on failure. The caller frees it. */
-unsigned char *library_read(const char *path, size_t *size, char *error, size_t error_size);
-
 /* Loads a library from its bytes. */
 bool library_load(library_copy *library, const unsigned char *bytes, size_t size, char *error, size_t error_size);
 

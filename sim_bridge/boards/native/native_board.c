@@ -395,7 +395,7 @@ static const board_operations operations = {
     .extension = board_extension,
 };
 
-board *native_board_create(const char *library_path, char *error, size_t error_size) {
+board *native_board_create(const uint8_t *image, size_t size, char *error, size_t error_size) {
   native_board *self = calloc(1, sizeof *self);
   if (self == NULL) {
     snprintf(error, error_size, "out of memory");
@@ -415,8 +415,10 @@ board *native_board_create(const char *library_path, char *error, size_t error_s
   self->eeprom.bytes = machine->eeprom;
   memset(machine->output, NATIVE_RELEASED, sizeof machine->output);
   memset(machine->outside, NATIVE_RELEASED, sizeof machine->outside);
-  self->image = library_read(library_path, &self->image_size, error, error_size);
-  if (self->image == NULL || !load(self, error, error_size)) {
+  self->image = grow(NULL, size + 1u, 1);
+  self->image_size = size;
+  memcpy(self->image, image, size);
+  if (!load(self, error, error_size)) {
     board_destroy(&self->face);
     return NULL;
   }

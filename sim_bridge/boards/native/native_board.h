@@ -10,7 +10,8 @@
 
 #include "boards/board.h"
 
-/* A board at cycle 0, just powered on. NULL and one sentence in `error` if the library cannot be used. */
-board *native_board_create(const char *library_path, char *error, size_t error_size);
+/* A board at cycle 0, just powered on, with the firmware library whose file has these bytes. NULL and one sentence in `error`
+ * if it cannot be used. */
+board *native_board_create(const uint8_t *image, size_t size, char *error, size_t error_size);
 
 #endif
