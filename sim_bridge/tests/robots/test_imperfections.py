@@ -24,6 +24,8 @@ from sim_bridge.devices import servo as servo_model
 from sim_bridge.devices import turret as turret_model
 from sim_bridge.robots.imperfections import Draw
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 SHIELDBOT = robots.load_robot("shieldbot")
 SHARP = robots.load_robot("boebot").device["analog_infrared"]
 

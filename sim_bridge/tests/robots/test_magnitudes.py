@@ -30,6 +30,8 @@ from sim_bridge.devices.catalogue import At, part_of
 from sim_bridge.robots.imperfections import Draw, applied, body_parameters
 from sim_bridge.tests.simulated import scripted
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 LEFT, RIGHT = 13, 12
 TABLE = imperfections()
 ROBOTS = [load_robot(name) for name in robot_names()]

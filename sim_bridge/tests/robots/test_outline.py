@@ -24,6 +24,8 @@ from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
 from sim_bridge.vehicles.model_file import vehicle_model
 from sim_bridge.view import View
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 BOX = [[-0.15, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.15, 0.1]]
 
 

@@ -48,6 +48,8 @@ from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted,
 from sim_bridge.vehicle import Vehicle
 from sim_bridge.vehicles.model_file import vehicle_model
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 LEFT, RIGHT = 13, 12
 WHEEL = 0.0331
 TOP = 51.25 * 2 * math.pi / 60  # rad/s

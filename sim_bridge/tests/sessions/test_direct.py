@@ -26,6 +26,8 @@ from boebot.robot import Observation, Robot
 from boebot.running.runner import execute
 from boebot.running.tasks import Request
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 ARSIM = load_robot("arsim")
 
 

@@ -27,6 +27,8 @@ from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
 from sim_bridge.view import View
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 SIDE = 0.4  # of the block
 PINCHED_S, FREE_S = 3.0, 4.0
 

@@ -29,6 +29,8 @@ from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import Vehicle
 from sim_bridge.vehicles.model_file import vehicle_model
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 ARSIM, SHIELDBOT = load_robot("arsim"), load_robot("shieldbot")
 
 

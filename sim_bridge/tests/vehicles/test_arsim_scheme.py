@@ -24,6 +24,8 @@ from sim_bridge.vehicle import Vehicle
 from sim_bridge.vehicles.model import VehicleModel
 from sim_bridge.vehicles.model_file import vehicle_model
 
+pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
+
 DT = 0.01
 M, INERTIA, R, WHEEL = 3.0, 0.2, 0.2, 0.1
 VOLTS, C_T, C_E, OHM, COULOMB, VISCOUS, GEAR, MOST = 12.0, 0.0333, 0.0333, 0.62, 0.008, 0.02, 2.0, 1.0

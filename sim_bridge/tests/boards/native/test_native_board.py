@@ -202,7 +202,7 @@ def test_a_run_does_not_depend_on_how_it_is_cut(make: Maker) -> None:
 
 
 def test_files_that_are_no_firmware(tmp_path: Path) -> None:
-    with pytest.raises(BoardError, match="the firmware library .*missing.so cannot be read"):
+    with pytest.raises(BoardError, match=r"missing\.so cannot be read"):
         native_board(tmp_path / "missing.so")
     (tmp_path / "text.so").write_text("not a library")
     with pytest.raises(BoardError, match="cannot load the firmware library"):
