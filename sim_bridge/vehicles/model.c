@@ -56,18 +56,9 @@ static int check_step(const vehicle_model *self) {
   return self->dt < vehicle_model_euler_limit(self) ? VEHICLE_OK : VEHICLE_BAD_STEP;
 }
 
-static int dc_usable(const motor_dc_parameters *m) {
-  const double sum = m->torque_constant + m->emf_constant + m->resistance_ohm + m->inductance_h + m->coulomb_n_m +
-                     m->viscous_n_m_s + m->gear + m->efficiency + m->torque_maximum_n_m + m->voltage_maximum;
-  return isfinite(sum) && m->resistance_ohm > 0.0 && m->gear > 0.0 && m->efficiency > 0.0 && m->inductance_h >= 0.0 &&
-         m->torque_constant >= 0.0 && m->emf_constant >= 0.0 && m->coulomb_n_m >= 0.0 && m->viscous_n_m_s >= 0.0 &&
-         m->torque_maximum_n_m >= 0.0;
-}
-
 int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,
                            int full) {
   if (self->drive != DRIVE_NONE) return VEHICLE_TOO_MANY;
-  if (!dc_usable(left) || !dc_usable(right)) return VEHICLE_BAD_NUMBER;
   self->drive = DRIVE_DC;
   self->dc[0] = *left;
   self->dc[1] = *right;
@@ -75,32 +66,18 @@ int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left,
   return check_step(self);
 }
 
-static int servo_usable(const servo_motor_parameters *s) {
-  const double sum = s->mount + s->wheel_radius + s->centre_us + s->dead_band_us + s->top_ccw_rad_s + s->scale_ccw_us +
-                     s->top_cw_rad_s + s->scale_cw_us + s->lag_s + s->motor.gain_n_s + s->motor.torque_maximum_n_m +
-                     s->motor.coast_n_s + s->motor.coast_maximum_n_m;
-  return isfinite(sum) && s->wheel_radius > 0.0 && s->scale_ccw_us > 0.0 && s->scale_cw_us > 0.0 && s->lag_s >= 0.0;
-}
-
 int vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters *left,
                               const servo_motor_parameters *right) {
   if (self->drive != DRIVE_NONE) return VEHICLE_TOO_MANY;
-  if (!servo_usable(left) || !servo_usable(right)) return VEHICLE_BAD_NUMBER;
   self->drive = DRIVE_SERVO;
   self->servo[0] = *left;
   self->servo[1] = *right;
   return check_step(self);
 }
 
-static int regulated_usable(const motor_regulated_parameters *m) {
-  const double sum = m->gain_n_s + m->torque_maximum_n_m + m->coast_n_s + m->coast_maximum_n_m + m->speed_maximum_m_s;
-  return isfinite(sum) && m->gain_n_s > 0.0 && m->torque_maximum_n_m >= 0.0 && m->speed_maximum_m_s >= 0.0;
-}
-
 int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
                                   const motor_regulated_parameters *right) {
   if (self->drive != DRIVE_NONE) return VEHICLE_TOO_MANY;
-  if (!regulated_usable(left) || !regulated_usable(right)) return VEHICLE_BAD_NUMBER;
   self->drive = DRIVE_REGULATED;
   self->regulated[0] = *left;
   self->regulated[1] = *right;

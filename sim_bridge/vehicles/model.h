@@ -35,7 +35,7 @@ typedef struct vehicle_model vehicle_model;
 vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt);
 void vehicle_model_destroy(vehicle_model *self);
 
-/* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the current as a state if `full` (a motor
+/* Drives, whose parameters checked_structs.py has checked: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the current as a state if `full` (a motor
  * with inductance 0 is quasi-static nevertheless). Servo: 1500 us +- 200 us s, one pulse every 20 ms. Regulated: (3.15)
  * with the reference s v_max. */
 int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,

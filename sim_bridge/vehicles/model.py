@@ -161,8 +161,6 @@ class VehicleModel:
             )
         if status == lib.VEHICLE_BAD_STEP:
             raise self.bad_step()
-        if status:
-            raise RobotError("vehicle: the drive's numbers are outside of what arithmetic holds; expected usual ones")
 
     # ---- battery and sensors -----------------------------------------------------------------------------------------
 

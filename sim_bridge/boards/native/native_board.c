@@ -47,9 +47,17 @@ static native_board *of_machine(native_machine *machine) {
   return (native_board *)(void *)((char *)machine - offsetof(native_board, machine));
 }
 
-/* Memory for `capacity` items that may not fail: a board that lost edges or bytes would be wrong in silence. */
-static void *grow(void *items, size_t capacity, size_t size) {
-  void *grown = realloc(items, capacity * size);
+/* Room for one more item at the end of a queue, first in, first out. Memory may not fail: a board that lost edges or bytes
+ * would be wrong in silence. */
+static void *room_in(void *items, size_t *first, size_t count, size_t *capacity, size_t size) {
+  if (*first + count < *capacity) return items;
+  if (*first > *capacity / 2) {
+    memmove(items, (char *)items + *first * size, count * size);
+    *first = 0;
+    return items;
+  }
+  *capacity = *capacity == 0 ? 64 : 2 * *capacity;
+  void *grown = realloc(items, *capacity * size);
   if (grown == NULL) {
     fputs("native board: out of memory\n", stderr);
     abort();
@@ -58,28 +66,12 @@ static void *grow(void *items, size_t capacity, size_t size) {
 }
 
 static void push_edge(native_edge_queue *queue, native_edge edge) {
-  if (queue->first + queue->count == queue->capacity) {
-    if (queue->first > queue->capacity / 2) {
-      memmove(queue->edges, queue->edges + queue->first, queue->count * sizeof *queue->edges);
-      queue->first = 0;
-    } else {
-      queue->capacity = queue->capacity == 0 ? 16 : 2 * queue->capacity;
-      queue->edges = grow(queue->edges, queue->capacity, sizeof *queue->edges);
-    }
-  }
+  queue->edges = room_in(queue->edges, &queue->first, queue->count, &queue->capacity, sizeof edge);
   queue->edges[queue->first + queue->count++] = edge;
 }
 
 static void push_byte(native_byte_queue *queue, native_byte byte) {
-  if (queue->first + queue->count == queue->capacity) {
-    if (queue->first > queue->capacity / 2) {
-      memmove(queue->bytes, queue->bytes + queue->first, queue->count * sizeof *queue->bytes);
-      queue->first = 0;
-    } else {
-      queue->capacity = queue->capacity == 0 ? 256 : 2 * queue->capacity;
-      queue->bytes = grow(queue->bytes, queue->capacity, sizeof *queue->bytes);
-    }
-  }
+  queue->bytes = room_in(queue->bytes, &queue->first, queue->count, &queue->capacity, sizeof byte);
   queue->bytes[queue->first + queue->count++] = byte;
 }
 
@@ -415,10 +407,10 @@ board *native_board_create(const uint8_t *image, size_t size, char *error, size_
   self->eeprom.bytes = machine->eeprom;
   memset(machine->output, NATIVE_RELEASED, sizeof machine->output);
   memset(machine->outside, NATIVE_RELEASED, sizeof machine->outside);
-  self->image = grow(NULL, size + 1u, 1);
+  self->image = malloc(size + 1u);
   self->image_size = size;
-  memcpy(self->image, image, size);
-  if (!load(self, error, error_size)) {
+  if (self->image != NULL) memcpy(self->image, image, size);
+  if (self->image == NULL || !load(self, error, error_size)) {
     board_destroy(&self->face);
     return NULL;
   }
