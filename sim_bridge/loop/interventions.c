@@ -6,6 +6,8 @@
 #include "parts/whisker.h"
 #include "state.h"
 
+#define WAVE_EDGES_MAXIMUM 10000000u
+
 static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
 
 static int bad_pose(double x, double y, double heading) {
@@ -61,9 +63,6 @@ int sim_drive(sim *self, int number, uint64_t at, uint8_t pin, uint8_t level) {
   robot *r = sim_robot_with_board(self, number);
   if (r == NULL || bad_pin(pin) || level > BOARD_RELEASED) return SIM_BAD_ARGUMENT;
   const int pulled_up = take_pin(r, pin);
-  for (int i = 0; i < r->waves; i++) {
-    if (r->wave[i].pin == pin) r->wave[i].end = 0;
-  }
   if (level == BOARD_RELEASED && pulled_up) level = BOARD_HIGH;
   r->chassis.driven[pin] = level;
   r->board->op->drive(r->board, at, pin, level);
@@ -72,20 +71,16 @@ int sim_drive(sim *self, int number, uint64_t at, uint8_t pin, uint8_t level) {
 
 int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
   robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || bad_pin(pin) || half_cycles == 0) return SIM_BAD_ARGUMENT;
-  int i = 0; /* the place of this pin's wave, or of one that is over, or a new one */
-  while (i < r->waves && r->wave[i].pin != pin) i++;
-  if (i == r->waves) i = 0;
-  while (i < r->waves && r->wave[i].pin != pin && r->wave[i].next <= r->wave[i].end) i++;
-  if (i == WAVES_MAXIMUM) return SIM_BAD_ARGUMENT;
+  if (r == NULL || bad_pin(pin) || half_cycles == 0 || duration / half_cycles > WAVE_EDGES_MAXIMUM)
+    return SIM_BAD_ARGUMENT;
   take_pin(r, pin);
-  if (i == r->waves) r->waves++;
   const uint64_t start = self->world_at + PART_GUARD; /* edges up to there are queued already */
-  r->wave[i] = (wave){.pin = pin,
-                      .level = r->chassis.driven[pin] == BOARD_HIGH,
-                      .half = half_cycles,
-                      .next = start + half_cycles,
-                      .end = start + duration};
+  uint8_t level = r->chassis.driven[pin];
+  r->board->op->drive(r->board, start, pin, level); /* ends what was queued */
+  for (uint64_t at = start + half_cycles; at <= start + duration; at += half_cycles) {
+    level = level == BOARD_HIGH ? BOARD_LOW : BOARD_HIGH;
+    r->board->op->drive(r->board, at, pin, level);
+  }
   return SIM_OK;
 }
 

@@ -38,13 +38,3 @@ void sim_sense_anew(sim *self) {
     vehicle_sensors_start(v, 0);
   }
 }
-
-void robot_step_waves(robot *self, uint64_t until) {
-  for (int i = 0; i < self->waves; i++) {
-    wave *w = &self->wave[i];
-    for (; w->next <= until && w->next <= w->end; w->next += w->half) {
-      w->level = !w->level;
-      self->board->op->drive(self->board, w->next, w->pin, w->level);
-    }
-  }
-}

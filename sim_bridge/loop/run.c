@@ -84,7 +84,6 @@ static void end_step(void *owner) {
   } else {
     robot_update_supply(r);
     brown_out_step(&r->brown_out, r->board, r->chassis.supply * BOARD_NOMINAL_VOLTS, r->sim->world.dt);
-    robot_step_waves(r, end + PART_GUARD);
   }
   if (!r->body->state.touching) return;
   if (r->contacts == 0 || end - r->last_touch > CONTACT_GAP) r->contacts++;

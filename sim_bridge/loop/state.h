@@ -10,17 +10,7 @@
 #include "vehicles/vehicle.h"
 #include "world/world.h"
 
-#define WAVES_MAXIMUM 4
 #define SIM_NEVER UINT64_MAX
-
-/* A square wave that a test puts on a pin. */
-typedef struct {
-  uint8_t pin;
-  uint8_t level;
-  uint32_t half;
-  uint64_t next;
-  uint64_t end;
-} wave;
 
 /* A moving shape's clock as the record of waits has it. */
 typedef struct {
@@ -43,8 +33,6 @@ typedef struct {
   brown_out brown_out;
   battery *battery;   /* NULL: a supply that never sags */
   double held_supply; /* share of the nominal voltage that a test holds, or 0 */
-  wave wave[WAVES_MAXIMUM];
-  int waves;
   buffer received;
   uint64_t last_byte;   /* cycle of the end of the last byte received */
   uint64_t listen_from; /* bytes end a run from this cycle on */
@@ -94,9 +82,6 @@ void robot_update_supply(robot *self);
 
 /* Sensors of robots without a board begin anew, when another robot has come: they may meet another thing now. */
 void sim_sense_anew(sim *self);
-
-/* Queues the edges of a test's square waves up to `until`. */
-void robot_step_waves(robot *self, uint64_t until);
 
 /* The id of a robot among the movers; never 0. */
 static inline uint32_t robot_mover_id(int number) { return (uint32_t)number + 1u; }

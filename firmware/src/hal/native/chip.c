@@ -63,19 +63,6 @@ static native_event next_event(void) {
   return earliest;
 }
 
-/* Bursts are three thousand edges a second: their own loop, until something else comes. */
-static void run_carrier(uint64_t until) {
-  const uint64_t start = native_next[EVENT_CARRIER];
-  native_next[EVENT_CARRIER] = NATIVE_NEVER;
-  const uint64_t other = native_next[next_event()];
-  native_next[EVENT_CARRIER] = start;
-  do {
-    native->now = native_next[EVENT_CARRIER];
-    native_carrier_toggle();
-  } while (native_next[EVENT_CARRIER] <= until && native_next[EVENT_CARRIER] < other &&
-           native_next[EVENT_CARRIER] < native->next_edge && !native->stop);
-}
-
 /* After an interrupt that may have given the main loop something to do. */
 static void poll_if_due(void) {
   if (firmware_due()) {
@@ -83,7 +70,7 @@ static void poll_if_due(void) {
   }
 }
 
-static void run_event(native_event event, uint64_t until) {
+static void run_event(native_event event) {
   switch (event) {
     case EVENT_PIN: {
       const uint8_t pin = native->next_edge_pin;
@@ -97,7 +84,7 @@ static void run_event(native_event event, uint64_t until) {
       poll_firmware();
       break;
     case EVENT_CARRIER:
-      run_carrier(until);
+      native_carrier_toggle();
       break;
     case EVENT_EDGE:
       native_next[EVENT_EDGE] = NATIVE_NEVER;
@@ -139,7 +126,7 @@ static void run(uint64_t until) {
     if (next > native->now) {
       native->now = next;
     }
-    run_event(event, until);
+    run_event(event);
   }
   if (native->now < until && !native->stop) {
     native->now = until;
