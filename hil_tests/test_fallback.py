@@ -86,7 +86,7 @@ def test_with_whiskers_alone_it_pushes_against_nothing(board_url: str) -> None:
 
 def test_it_waits_first_whatever_is_touched(board_url: str) -> None:
     with circle(board_url, arena_of()) as rig:
-        rig.board.press_whisker(WHISKER, True)
+        rig.board.drive(WHISKER, 0)
         switch_on(rig)
         be_silent(rig, AFTER_S + 0.8 * WAITS_S)
         assert rig.telemetry[-1].status & Status.FALLBACK and len(rig.pulses(LEFT)) == 0

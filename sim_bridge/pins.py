@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from boebot.arguments import number, shown
 from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, EEPROM_SIZE, BoardMemory, Damage, ResetCause, check_range
+from sim_bridge.boards.board import CLOCK_HZ, EDGE, BoardMemory, ResetCause
 from sim_bridge.sim import SimRobot
 
 ECHO_MAXIMUM_US = 1e6
@@ -71,11 +70,6 @@ class BoardPins(BoardMemory):
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
         status = lib.sim_wave(self._handle, self._number, pin, period // 2, round(seconds * CLOCK_HZ))
         self._check(status, f"square wave of {period} cycles on pin {pin}")
-
-    def press_whisker(self, pin: int, pressed: bool | None) -> None:
-        """Holds a whisker pressed or free; None: as the world says."""
-        held = -1 if pressed is None else int(pressed)
-        self._check(lib.sim_hold_whisker(self._handle, self._number, pin, held), f"whisker on pin {pin}")
 
     def answer_ping(self, echo_us: float | None) -> None:
         """Every trigger is answered by a pulse of that length (us), or by none at all."""
@@ -136,23 +130,6 @@ class BoardPins(BoardMemory):
         if cause not in causes:
             raise BoardError(f"reset: there is no cause {shown(cause)}; expected one of {', '.join(causes)}")
         self._check(lib.sim_reset(self._handle, self._number, causes[cause]), f"reset by {cause}")
-
-    def write_memory(self, address: int, data: bytes | Iterable[int]) -> None:
-        """See `BoardMemory`."""
-        data = bytes(data)
-        self._data(address, len(data))
-        self._check(lib.sim_write_memory(self._handle, self._number, address, data, len(data)), "memory")
-
-    def write_eeprom(self, address: int, data: bytes | Iterable[int]) -> None:
-        """See `BoardMemory`."""
-        data = bytes(data)
-        self._eeprom()
-        check_range("EEPROM", address, len(data), EEPROM_SIZE)
-        self._check(lib.sim_write_eeprom(self._handle, self._number, address, data, len(data)), "EEPROM")
-
-    def eeprom_damage(self, damage: Damage, garbage: int = 0x5A) -> None:
-        """See `BoardMemory`."""
-        self._check(lib.sim_damage_eeprom(self._handle, self._number, int(damage), garbage), "EEPROM")
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""

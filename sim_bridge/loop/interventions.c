@@ -1,9 +1,7 @@
 /* interventions.c: see loop.h. Here: what a test does to a simulation, past its parts. */
 #include <math.h>
-#include <string.h>
 
 #include "parts/ping.h"
-#include "parts/whisker.h"
 #include "state.h"
 
 #define WAVE_EDGES_MAXIMUM 10000000u
@@ -84,18 +82,6 @@ int sim_wave(sim *self, int number, uint8_t pin, uint32_t half_cycles, uint64_t 
   return SIM_OK;
 }
 
-int sim_hold_whisker(sim *self, int number, uint8_t pin, int held) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || held < -1 || held > 1) return SIM_BAD_ARGUMENT;
-  for (int i = 0; i < r->part_count; i++) {
-    whisker *w = whisker_of(r->parts[i]);
-    if (w == NULL || w->part.pins[0].pin != pin) continue;
-    whisker_hold(w, held);
-    return SIM_OK;
-  }
-  return SIM_BAD_ARGUMENT;
-}
-
 int sim_answer_ping(sim *self, int number, int64_t echo_cycles) {
   robot *r = sim_robot_with_board(self, number);
   int pings = 0;
@@ -146,37 +132,5 @@ int sim_reset(sim *self, int number, int cause) {
   if (r == NULL || cause < BOARD_RESET_POWER || cause > BOARD_RESET_WATCHDOG) return SIM_BAD_ARGUMENT;
   r->reset_at = self->now;
   r->board->op->reset(r->board, (board_reset_cause)cause);
-  return SIM_OK;
-}
-
-/* ---- memory -------------------------------------------------------------------------------------------------------- */
-
-static int write_cells(uint8_t *cells, size_t size, uint32_t address, const uint8_t *bytes, size_t count) {
-  if (cells == NULL || address > size || count > size - address) return SIM_BAD_ARGUMENT;
-  if (count > 0) memcpy(cells + address, bytes, count);
-  return SIM_OK;
-}
-
-static board_eeprom *eeprom_of(const robot *r) {
-  return r == NULL ? NULL : r->board->op->extension(r->board, BOARD_EEPROM);
-}
-
-int sim_write_eeprom(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
-  const board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
-  uint8_t *cells = eeprom == NULL ? NULL : eeprom->bytes;
-  return write_cells(cells, BOARD_EEPROM_SIZE, address, bytes, count);
-}
-
-int sim_write_memory(sim *self, int number, uint32_t address, const uint8_t *bytes, size_t count) {
-  const robot *r = sim_robot_with_board(self, number);
-  uint8_t *cells = r == NULL ? NULL : r->board->op->extension(r->board, BOARD_DATA);
-  return write_cells(cells, BOARD_DATA_SIZE, address, bytes, count);
-}
-
-int sim_damage_eeprom(sim *self, int number, int damage, uint8_t garbage) {
-  board_eeprom *eeprom = eeprom_of(sim_robot_with_board(self, number));
-  if (eeprom == NULL || damage < BOARD_DAMAGE_ERASED || damage > BOARD_DAMAGE_GARBAGE) return SIM_BAD_ARGUMENT;
-  eeprom->damage = (board_damage)damage;
-  eeprom->garbage = garbage;
   return SIM_OK;
 }

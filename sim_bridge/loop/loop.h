@@ -139,19 +139,14 @@ int sim_place(sim *self, int robot, double x, double y, double heading);
 int sim_place_shape(sim *self, int shape, double x, double y, double heading);
 
 /* For tests: a pin taken from its part and driven at a cycle, or by a square wave of that half period for that long;
- * whisker held (0, 1) or not (-1); length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the
- * plug of the part at a pin pulled out (1) or put in again (0); voltage of the rail that board and servos run on, 0: what
- * the regulator gives; bytes put into the EEPROM, or into the data space of a board that has one; what becomes of a cell
- * whose write is cut short. Return SIM_OK or an error. */
+ * length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part at a pin pulled
+ * out (1) or put in again (0); voltage of the rail that board and servos run on, 0: what the regulator gives. Return SIM_OK
+ * or an error. */
 int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
 int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
-int sim_hold_whisker(sim *self, int robot, uint8_t pin, int held);
 int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
 int sim_unplug(sim *self, int robot, uint8_t pin, int unplugged);
 int sim_set_supply(sim *self, int robot, double volts);
-int sim_write_eeprom(sim *self, int robot, uint32_t address, const uint8_t *bytes, size_t count);
-int sim_write_memory(sim *self, int robot, uint32_t address, const uint8_t *bytes, size_t count);
-int sim_damage_eeprom(sim *self, int robot, int damage, uint8_t garbage);
 
 /* What a weak supply does to a robot's board; by default it is as the data sheet has it, with 2 upsets per second at the
  * worst. Returns SIM_OK or an error. `sim_brown_outs`: resets by the detector, and upsets above it. */

@@ -24,14 +24,10 @@ static void change(whisker *self, uint64_t cycle, uint8_t level) {
 
 static void step(part *base) {
   whisker *self = (whisker *)base;
-  uint8_t pressed;
-  if (self->held >= 0) {
-    pressed = (uint8_t)self->held;
-  } else {
-    const whisker_parameters *p = &self->parameters;
-    const chassis *c = base->chassis;
-    pressed = (uint8_t)body_segment_touches(c->body, c->around, p->root_x, p->root_y, p->tip_x, p->tip_y, p->height);
-  }
+  const whisker_parameters *p = &self->parameters;
+  const chassis *c = base->chassis;
+  const uint8_t pressed =
+      (uint8_t)body_segment_touches(c->body, c->around, p->root_x, p->root_y, p->tip_x, p->tip_y, p->height);
   if (pressed == self->pressed) return;
   self->pressed = pressed;
   change(self, part_step_end(base) + PART_GUARD, pressed ? BOARD_LOW : BOARD_HIGH);
@@ -39,15 +35,10 @@ static void step(part *base) {
 
 static const part_operations OPERATIONS = {.step = step};
 
-whisker *whisker_of(part *base) { return base->op == &OPERATIONS ? (whisker *)base : NULL; }
-
-void whisker_hold(whisker *self, int held) { self->held = held; }
-
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   whisker *self = (whisker *)base;
   part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_DRIVES | PART_PULLED_UP}, 1);
   self->parameters = *(const whisker_parameters *)parameters;
-  self->held = -1;
   body_widen_reach(place->chassis->body, self->parameters.root_x, self->parameters.root_y);
   body_widen_reach(place->chassis->body, self->parameters.tip_x, self->parameters.tip_y);
   part_drive(base, 0, pins[0], BOARD_HIGH);

@@ -19,15 +19,8 @@ typedef struct {
 typedef struct {
   part part;
   whisker_parameters parameters;
-  int held; /* -1: as the world says, 0: held free, 1: held pressed */
   uint8_t pressed;
 } whisker;
-
-/* Holds it pressed (1) or free (0) whatever the world says; -1 ends that. */
-void whisker_hold(whisker *self, int held);
-
-/* The whisker that this part is, or NULL. */
-whisker *whisker_of(part *base);
 
 /* python: begin */
 /* Parameters: whisker_parameters. Pin: the switch. */

@@ -278,16 +278,6 @@ def test_whisker_bounces_and_settles() -> None:
     assert min(flicks) == 0 < max(flicks)
 
 
-def test_whisker_can_be_held() -> None:
-    robot = scripted()
-    robot.pins.press_whisker(5, True)
-    robot.run(0.01)
-    assert robot.inputs(5)[-1][1] == 0
-    robot.pins.press_whisker(5, False)
-    robot.run(0.01)
-    assert robot.inputs(5)[-1][1] == 1
-
-
 # ---- IR pair ---------------------------------------------------------------------------------------------
 
 
