@@ -102,56 +102,49 @@ class Chunks:
             return None
         if self.content is None:
             self._reader.offset_s = self._source.clock_offset_s
-        stretch = self._stretch(self._reader.read(), self._others)
-        self._others = {}
+        columns, news, self._others = self._reader.read(), self._others, {}
+        events = page_data.events(columns, self._result.whiskers)
+        events += [(time_s, "intervention", in_words(data)) for time_s, data in _rows(news, STREAM)]
+        view = self._view(columns, news, events)
         if self.content is None:
-            self.content = self._content(stretch)
-        return page_data.rows_data(stretch, cognitive=self._cognitive())
+            self.content = self._content(view)
+        before, self._counters = self._counters, self._source.session.counters()
+        return page_data.rows_data(
+            view,
+            events=sorted(events, key=itemgetter(0)),
+            pins=page_data.pins(news.get("pins", EMPTY), self._result.robot, self._reader.offset_s),
+            load=load(before, self._counters),
+            cognitive=self._cognitive(),
+        )
 
     def nothing(self) -> dict[str, Any]:
         """The rows of a robot that has ended, beside others that go on."""
         columns = Reader(self._result).read()
-        nowhere = Pose(*np.zeros((3, 0)))
-        estimate = None if columns.odometry is None or self._result.world is None else nowhere
+        true = None if self._result.world is None else Pose(*np.zeros((3, 0)))
         start = self._start or (0.0, 0.0, 0.0)
-        return page_data.rows_data(page_data.Stretch(columns, nowhere, estimate, start, Shown(np.empty(0), {}, {})))
+        view = scene.View(replace(columns, true_pose=true), start, Shown(np.empty(0), {}, {}))
+        return page_data.rows_data(view)
 
-    def _stretch(self, columns: Columns, news: Group) -> page_data.Stretch:
-        result = self._result
+    def _view(self, columns: Columns, news: Group, events: list[page_data.Event]) -> scene.View:
+        """Of a few of these ticks."""
         made_s, self._made_s = self._made_s, time.perf_counter()
         most = int(TICKS_AT_MOST * min(MORE, max(1.0, (self._made_s - made_s) / EACH_S)))
         new = np.arange(columns.first, len(columns))
         kept = new[:: -(-len(new) // most)] if len(new) > most else new
-        few = columns.part(np.unique(np.append(kept, len(columns) - 1)))
-        true = columns.true_pose
-        seen, path = (each.true_pose or each.odometry or Pose(*np.zeros((3, len(each)))) for each in (columns, few))
+        true, seen = columns.true_pose, columns.true_pose or columns.odometry
         if self._start is None:
-            self._start = seen.at(0)
-        events = page_data.events(columns, result.whiskers)
-        events += [(time_s, "intervention", in_words(data)) for time_s, data in _rows(news, STREAM)]
-        mind, names = {name: news[name] for name in (STEPS, SWITCHES) if name in news}, result.brain_names
+            self._start = (0.0, 0.0, 0.0) if true is None else true.at(0)
+        mind, names = {name: news[name] for name in (STEPS, SWITCHES) if name in news}, self._result.brain_names
         showing = columns.showing.rows()
-        return page_data.Stretch(
-            series=few,
-            path=path,
-            estimate=None if true is None or few.odometry is None else few.odometry.placed(*self._start),
-            start=self._start if true is not None else (0.0, 0.0, 0.0),
+        return scene.View(
+            columns=columns.part(np.unique(np.append(kept, len(columns) - 1))),
+            start=self._start,
             shown=shown_in(showing, names_in(showing)),
             layers=read_layers(_rows(news, SKETCH)),
             brain=None if names is None or STEPS not in news else read_brain(Record.of(mind), names),
-            swept=scene.swept(few, path),
             true_contacts=_where(true, events, "contact", columns),
             touches=_where(seen, events, "touch", columns),
-            events=sorted(events, key=itemgetter(0)),
-            load=self._load(len(few)),
-            pins=page_data.pins(news.get("pins", EMPTY), result.robot, self._reader.offset_s),
         )
-
-    def _load(self, ticks: int) -> Floats | None:
-        """At each of so many ticks."""
-        before, self._counters = self._counters, self._source.session.counters()
-        share = load(before, self._counters)
-        return None if share is None else np.full(ticks, share)
 
     def moving(self, plan: FloorPlan) -> list[Moving]:
         """The moving shapes of that plan where they are now."""
@@ -168,17 +161,17 @@ class Chunks:
         names = self._result.brain_names
         return [] if names is None else list(names.cognitive[:COGNITIVE_AT_MOST])
 
-    def _content(self, stretch: page_data.Stretch) -> dict[str, Any]:
+    def _content(self, view: scene.View) -> dict[str, Any]:
         result = self._result
         return page_data.robot_data(
             result.robot,
-            stretch.series,
+            view.columns,
             number=self._number,
             title=self._title,
             brain=result.brain,
             begin=self._reader.offset_s,
             known=self._result.world is not None,
-            has_estimate=stretch.estimate is not None,
+            has_estimate=view.estimate is not None,
             table={
                 "robot": result.robot.name,
                 "arena": result.world.name if result.world else None,

@@ -25,8 +25,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -72,39 +71,6 @@ GAP = 1.5  # usual steps in time from tick to tick: from here on frames are miss
 
 Event = tuple[float, str, str]
 """Time (s), kind, text."""
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """What one robot did in some time.
-
-    Attributes:
-        series: its ticks as arrays.
-        path: the true pose at each of them, where it is known; else by odometry, or zeros.
-        estimate: the odometry as it lies in the arena, at each of them; None: there is no truth, or no odometry.
-        start: pose in which the run began, in the frame of `path`: m, m, rad.
-        shown, layers: what the brain showed and sketched.
-        brain: steps and switches of a brain of processes; None: a brain of another kind, or no step yet.
-        swept: what sensors with fans of rays measured.
-        true_contacts, touches: where, shape (n, 2).
-        events: as the page has them.
-        load: share of the tick that the board's work took, at each of them; None: not known.
-        pins: output edges by the name of the pin: times (s of the run) and levels.
-    """
-
-    series: Columns
-    path: Pose
-    estimate: Pose | None
-    start: tuple[float, float, float]
-    shown: Shown
-    layers: Sequence[Layer] = ()
-    brain: BrainRecord | None = None
-    swept: Sequence[scene.Swept] = ()
-    true_contacts: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    touches: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    events: Sequence[Event] = ()
-    load: Floats | None = None
-    pins: dict[str, tuple[Floats, NDArray[np.uint8]]] = field(default_factory=dict)
 
 
 # ---- what does not change --------------------------------------------------------------------------------------------
@@ -204,23 +170,33 @@ def moving_data(moving: Sequence[Moving]) -> list[dict[str, Any]]:
 
 
 def rows_data(
-    stretch: Stretch, *, cognitive: Sequence[str] = (), steps_at_most: int | None = None, sweeps_room: int | None = None
+    view: scene.View,
+    *,
+    events: Sequence[Event] = (),
+    pins: Mapping[str, tuple[Floats, NDArray[np.uint8]]] | None = None,
+    load: float | None = None,
+    cognitive: Sequence[str] = (),
+    steps_at_most: int | None = None,
+    sweeps_room: int | None = None,
 ) -> dict[str, Any]:
     """What a robot did in a stretch of time, which the page appends to what it has.
 
     Args:
-        stretch: what it did.
+        view: what it did.
+        events: as the page has them.
+        pins: output edges by the name of the pin: times (s of the run) and levels.
+        load: share of the tick that the board's work took; None: not known.
         cognitive: as of `robot_data`.
         steps_at_most: of the brain; None: all.
         sweeps_room: how many numbers of two bytes the sweeps of each sensor may take; None: all of them.
     """
-    series = stretch.series
+    series = view.columns
     pulses = [series.number(name, "pulse") for name in ("servo_left", "servo_right")]
     readouts = series.readouts()
     return {
         "time": _array(series.time),
-        "path": _pose(stretch.path),
-        "estimate": None if stretch.estimate is None else _pose(stretch.estimate),
+        "path": _pose(view.path),
+        "estimate": None if view.estimate is None else _pose(view.estimate),
         "turret": _array(np.nan_to_num(series.number("turret", "angle"), nan=0.0)),
         "left": _array(series.signals[0]),
         "right": _array(series.signals[1]),
@@ -229,15 +205,15 @@ def rows_data(
         "flags": _small(flags(series)),
         "signs": [_small(values) for _, _, values in series.signs()],
         "readings": [{"values": _array(one.values), "ages": _array(one.ages)} for one in readouts],
-        "shown": _shown(stretch.shown),
-        "layers": [_layer(layer, stretch.start) for layer in stretch.layers],
-        "swept": [_swept(one, sweeps_room) for one in stretch.swept],
-        "mind": None if stretch.brain is None else _mind(stretch.brain, cognitive, steps_at_most),
-        "true_contacts": np.round(stretch.true_contacts, 4).tolist(),
-        "touches": np.round(stretch.touches, 4).tolist(),
-        "events": [[round(time, 4), kind, text] for time, kind, text in stretch.events[:EVENTS_AT_MOST]],
-        "load": None if stretch.load is None else _array(stretch.load),
-        "pins": [_pin(name, time, level) for name, (time, level) in stretch.pins.items()],
+        "shown": _shown(view.shown),
+        "layers": [_layer(layer, view.start) for layer in view.layers],
+        "swept": [_swept(one, sweeps_room) for one in view.swept],
+        "mind": None if view.brain is None else _mind(view.brain, cognitive, steps_at_most),
+        "true_contacts": np.round(view.true_contacts, 4).tolist(),
+        "touches": np.round(view.touches, 4).tolist(),
+        "events": [[round(time, 4), kind, text] for time, kind, text in events[:EVENTS_AT_MOST]],
+        "load": None if load is None else _array(np.full(len(series), load)),
+        "pins": [_pin(name, time, level) for name, (time, level) in (pins or {}).items()],
     }
 
 

@@ -70,11 +70,11 @@ def content(results: Sequence[Run]) -> dict[str, Any]:
 
 def run_data(result: Run, view: scene.View, number: int = 1, room: int | None = None) -> dict[str, Any]:
     """What the page shows of one robot, with its whole run. `number`: of the robot, from 1; `room`: of its sweeps."""
-    brain = result.overview.brain
+    brain = view.brain
     cognitive = () if brain is None else scene.shown_cognitive(brain)
     about = page_data.robot_data(
         result.robot,
-        result.overview.columns,
+        view.columns,
         number=number,
         title=f"{result.brain} on {result.robot.name} ({result.board})",
         brain=result.brain,
@@ -83,37 +83,19 @@ def run_data(result: Run, view: scene.View, number: int = 1, room: int | None = 
         has_estimate=view.estimate is not None,
         table=result.table(),
         way=result.way_in_words(),
-        names=result.brain_names if brain is not None and len(brain) else None,
+        names=None if brain is None else result.brain_names,
         cognitive=cognitive,
     )
+    deeds = [(time_s, "intervention", in_words(data)) for time_s, data in result.record.rows(STREAM)]
     rows = page_data.rows_data(
-        stretch(result, view), cognitive=cognitive, steps_at_most=STEPS_AT_MOST, sweeps_room=room
+        view,
+        events=sorted(page_data.events(view.columns, result.whiskers) + deeds, key=itemgetter(0)),
+        pins=page_data.pins(result.record.block("pins"), result.robot, result.clock_offset),
+        cognitive=cognitive,
+        steps_at_most=STEPS_AT_MOST,
+        sweeps_room=room,
     )
     return about | {"rows": rows}
-
-
-def _deeds(result: Run) -> list[page_data.Event]:
-    """What people did to the robot meanwhile."""
-    return [(time_s, "intervention", in_words(data)) for time_s, data in result.record.rows(STREAM)]
-
-
-def stretch(result: Run, view: scene.View) -> page_data.Stretch:
-    """The whole run."""
-    few = result.overview
-    return page_data.Stretch(
-        series=few.columns,
-        path=view.path,
-        estimate=view.estimate,
-        start=view.pose(0) if view.known else (0.0, 0.0, 0.0),
-        shown=few.shown,
-        layers=view.layers,
-        brain=few.brain if few.brain is not None and len(few.brain) else None,
-        swept=view.swept,
-        true_contacts=view.true_contacts,
-        touches=view.touches,
-        events=sorted(page_data.events(few.columns, result.whiskers) + _deeds(result), key=itemgetter(0)),
-        pins=page_data.pins(result.record.block("pins"), result.robot, result.clock_offset),
-    )
 
 
 # ---- the page's text -------------------------------------------------------------------------------------------------

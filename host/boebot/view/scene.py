@@ -4,7 +4,8 @@ as display lists (boebot.devices.drawing)."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from boebot.record.brain_record import BrainRecord
     from boebot.record.columns import Columns
     from boebot.record.run import Run
-    from boebot.record.shown import Layer
+    from boebot.record.shown import Layer, Shown
     from boebot.record.truth import Floats
     from boebot.showing import Sketch
 
@@ -62,32 +63,60 @@ class Swept:
 
 @dataclass(frozen=True)
 class View:
-    """A run seen from above; lengths in metres."""
+    """What is seen of a robot's run from above, or of a stretch of it; lengths in metres."""
 
-    known: bool
-    """The truth is known, and `path` is it; otherwise `path` is the odometric estimate; without that it is zeros."""
-    path: Pose
-    estimate: Pose | None
-    """Laid on the true start; None without the truth, which it is compared with, or without encoders or odometer."""
-    plan: FloorPlan
-    true_contacts: Floats
+    columns: Columns
+    """Its ticks."""
+    start: tuple[float, float, float]
+    """Pose in which the run began, as the path has it: m, m, rad; zeros without the truth."""
+    shown: Shown
+    """Values that the brain showed."""
+    layers: Sequence[Layer] = ()
+    """What it sketched."""
+    brain: BrainRecord | None = None
+    """Steps and switches of a brain of processes; None: a brain of another kind, or no step yet."""
+    plan: FloorPlan = field(default_factory=FloorPlan)
+    true_contacts: Floats = field(default_factory=lambda: np.empty((0, 2)))
     """Where the body came to touch something, shape (n, 2)."""
-    touches: Floats
+    touches: Floats = field(default_factory=lambda: np.empty((0, 2)))
     """Where the robot was when a whisker was pressed, shape (n, 2)."""
-    turret: Floats
-    """Its angle (rad) at each tick; 0 without one, or while it is free."""
-    path_is_seen: bool
-    """Somebody knows where the robot went: the simulator, or its odometry."""
-    layers: list[Layer]
-    """What the brain sketched."""
-    swept: list[Swept]
-    """What sensors with fans of rays measured."""
+
+    @property
+    def known(self) -> bool:
+        """The truth is known, and `path` is it; otherwise `path` is the odometric estimate, or else zeros."""
+        return self.columns.true_pose is not None
+
+    @property
+    def path_is_seen(self) -> bool:
+        """Somebody knows where the robot went: the simulator, or its odometry."""
+        return self.known or self.columns.odometry is not None
+
+    @property
+    def path(self) -> Pose:
+        """See `known`."""
+        return self.columns.true_pose or self.columns.odometry or Pose(*np.zeros((3, len(self.columns))))
+
+    @cached_property
+    def estimate(self) -> Pose | None:
+        """By odometry, from the true start on; None without the truth or without odometry."""
+        odometry = self.columns.odometry
+        return odometry.placed(*self.start) if self.known and odometry is not None else None
+
+    @property
+    def turret(self) -> Floats:
+        """Its angle (rad) at each tick; 0 without one, or while it is free."""
+        return np.nan_to_num(self.columns.number("turret", "angle"), nan=0.0)
+
+    @cached_property
+    def swept(self) -> list[Swept]:
+        """What sensors with fans of rays measured."""
+        return swept(self.columns, self.path)
 
     def origin(self, sketch: Sketch) -> tuple[float, float, float]:
         """Of the frame of a sketch, as it lies in the picture at the run's end: m, m, rad."""
         if sketch.frame == "robot":
             return self.pose(-1)
-        return self.pose(0) if sketch.frame == "start" and self.known else (0.0, 0.0, 0.0)
+        return self.start if sketch.frame == "start" else (0.0, 0.0, 0.0)
 
     def pose(self, index: int) -> tuple[float, float, float]:
         """Of the path at a tick."""
@@ -97,19 +126,16 @@ class View:
 def view(result: Run) -> View:
     """The run as the pictures show it."""
     few = result.overview
-    series = few.columns
-    seen = series.odometry if series.true_pose is None else series.true_pose
+    true, brain = few.columns.true_pose, few.brain
     return View(
-        known=series.true_pose is not None,
-        path=Pose(*np.zeros((3, len(series)))) if seen is None else seen,
-        estimate=few.placed_odometry,
+        columns=few.columns,
+        start=(0.0, 0.0, 0.0) if true is None else true.at(0),
+        shown=few.shown,
+        layers=few.layers,
+        brain=brain if brain is not None and len(brain) else None,
         plan=result.plan if result.has_truth else FloorPlan(),
         true_contacts=few.contact_places,
         touches=few.touch_places,
-        turret=np.nan_to_num(series.number("turret", "angle"), nan=0.0),
-        path_is_seen=seen is not None,
-        layers=few.layers,
-        swept=[] if seen is None else swept(series, seen),
     )
 
 
