@@ -17,12 +17,11 @@ import numpy as np
 from boebot.arenas.floor_plan import FloorPlan, Moving
 from boebot.boards import BoardSession, VehicleSession
 from boebot.record.blocks import EMPTY, Block, Group, joined
-from boebot.record.brain_record import STEPS, SWITCHES, read_brain
+from boebot.record.brain_record import STEPS, SWITCHES, Shown, names_in, read_brain, read_layers, shown_in
 from boebot.record.columns import Columns, Reader
 from boebot.record.interventions import STREAM, in_words
 from boebot.record.record import Record
 from boebot.record.run import Run
-from boebot.record.shown import Shown, names_in, read_layers, shown_in
 from boebot.record.truth import Floats, Pose
 from boebot.running.driver import gather_rows
 from boebot.running.hands import Hands

@@ -65,7 +65,7 @@ class Columns(ABC):
         steps: at which of the ticks the brain has stepped: their indices.
         command: in force at each tick: kind (index of KINDS), left, right, as the brain gave it.
         slow: what a board's other messages said, by their kind.
-        showing: rows of what the brain showed meanwhile (boebot.record.shown), with what it had shown before.
+        showing: rows of what the brain showed meanwhile (boebot.record.brain_record), with what it had shown before.
         travel: what left and right wheel rolled from tick to tick (m, forward positive); the first entry is 0.
         odometry: at each tick, as seen from the run's start: there it is 0, 0, 0; None: the robot has neither encoders
             nor an odometer.

@@ -1,13 +1,17 @@
-"""Figures by name as people read them: "true_distance_m" is "true distance", in "m". For tables in terminals and in
-notebooks."""
+"""Figures as people read them, in tables of terminals and notebooks: "true_distance_m" is "true distance", in "m"; and
+what the watchdog's resets of an emulated board amount to: where the program hung, and how often."""
 
 from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from boebot.boards import WatchdogReset
+
+HANGS_AT_MOST = 4  # that get a sentence each
 _UNIT = re.compile(r"_(m_s|ms|m|s|kg|us|hz|bytes|v|ppm|cycles|percent)$")
 _UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V", "us": "µs", "percent": "%"}
 
@@ -42,3 +46,41 @@ def html_table(values: Mapping[str, Any]) -> str:
     cells = (map(html.escape, row) for row in rows(values))
     lines = (f"<tr><th>{name}</th><td>{value}</td><td>{unit}</td></tr>" for name, value, unit in cells)
     return f"<table>{''.join(lines)}</table>"
+
+
+def hang_sentences(resets: Sequence[WatchdogReset]) -> list[str]:
+    """For people: one for each place, by its first reset."""
+    found = []
+    for first, count in _by_place(resets):
+        times = "" if count == 1 else f"; {count} times in all"
+        found.append(f"{first}{times}")
+    if others := _others(resets):
+        found.append(f"the watchdog reset the program {others} times more, at other places")
+    return found
+
+
+def hang_places(resets: Sequence[WatchdogReset]) -> str | None:
+    """For a table: `0x1A72 in motion_signals (motion.c:54), 3 times`; None: it reset nothing."""
+    parts = []
+    for first, count in _by_place(resets):
+        times = "" if count == 1 else f", {count} times"
+        parts.append(f"0x{first.address:04X} {first.place}".rstrip() + times)
+    if others := _others(resets):
+        parts.append(f"elsewhere {others} times")
+    return "; ".join(parts) or None
+
+
+def _place(reset: WatchdogReset) -> str:
+    return reset.place or f"0x{reset.address:04X}"
+
+
+def _by_place(resets: Sequence[WatchdogReset]) -> list[tuple[WatchdogReset, int]]:
+    """The first reset at each place and how many there were, for the places that get a sentence each."""
+    counts = Counter(map(_place, resets))
+    first = {_place(reset): reset for reset in reversed(resets)}
+    return [(first[name], count) for name, count in list(counts.items())[:HANGS_AT_MOST]]
+
+
+def _others(resets: Sequence[WatchdogReset]) -> int:
+    """Resets at all further places."""
+    return len(resets) - sum(count for _, count in _by_place(resets))

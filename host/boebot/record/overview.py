@@ -13,9 +13,8 @@ import numpy as np
 
 from boebot.devices.device import SlowDevice
 from boebot.link.messages import EventKind, Status
-from boebot.record.brain_record import BrainRecord, read_brain
+from boebot.record.brain_record import BrainRecord, Layer, Shown, read_brain, read_layers, read_shown
 from boebot.record.columns import Columns, chained, columns, whole
-from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.truth import APART_S, Bools, Floats, Pose, Track
 from boebot.showing import SKETCH
 

@@ -19,14 +19,13 @@ from boebot.devices.whisker import Whisker
 from boebot.errors import brief
 from boebot.link.frame import text
 from boebot.link.messages import Identity
-from boebot.record import hangs
-from boebot.record.brain_record import BrainNames, BrainRecord, read_brain
+from boebot.record import figures
+from boebot.record.brain_record import BrainNames, BrainRecord, Layer, Shown, read_brain, read_layers, read_shown
 from boebot.record.columns import MESSAGES, Columns, whole
 from boebot.record.figures import counted
 from boebot.record.interventions import touched
 from boebot.record.overview import Overview, overview
 from boebot.record.record import Record, Unrecorded
-from boebot.record.shown import Layer, Shown, read_layers, read_shown
 from boebot.record.truth import Pose, plan_of, truth_of
 from boebot.showing import SKETCH
 
@@ -324,7 +323,7 @@ class Run:
             "resets": self.resets,
             "sessions_lost": self.sessions_lost,
             "touched": self.touched,
-            "hung_at": hangs.places(self.watchdog_resets),
+            "hung_at": figures.hang_places(self.watchdog_resets),
             "firmware": None if identity is None else text(identity.firmware_version),
             "compiler": None if identity is None else text(identity.compiler),
             "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",

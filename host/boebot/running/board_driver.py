@@ -30,7 +30,7 @@ from boebot.link.errors import LatchedAgainError, SessionLostError
 from boebot.link.frame import FRAME_OVERHEAD, reader, text
 from boebot.link.link import Link
 from boebot.link.transport import OnBus
-from boebot.record import hangs
+from boebot.record import figures
 from boebot.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
 from boebot.running.driver import PROGRESS_S, LinkQuality, Task, check_period, result_so_far, step_limit, whole_ticks
@@ -434,6 +434,6 @@ class BoardDriver:
             run_time=max(self._last_s, 0.0),
             identity=self.identity,
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
-            notices=[*self.notices, *self.session.notes(), *hangs.sentences(watchdog_resets)],
+            notices=[*self.notices, *self.session.notes(), *figures.hang_sentences(watchdog_resets)],
             watchdog_resets=watchdog_resets,
         )

@@ -21,7 +21,7 @@ from boebot import slips
 from boebot.boards import BoardSession, VehicleSession, is_live, open_board, open_vehicle
 from boebot.description.robots import RobotDescription, notices
 from boebot.errors import BoebotError
-from boebot.record import hangs
+from boebot.record import figures
 from boebot.record.recording import Recording
 from boebot.record.run_folder import RunFolder
 from boebot.result import RunResult, TogetherResult
@@ -236,7 +236,7 @@ def _board_driver(session: BoardSession, task: Task) -> Driver:
     try:
         return BoardDriver(session, task)
     except BoebotError as error:
-        for sentence in (*session.notes(), *hangs.sentences(session.watchdog_resets())):
+        for sentence in (*session.notes(), *figures.hang_sentences(session.watchdog_resets())):
             error.add_note(sentence)
         raise
 

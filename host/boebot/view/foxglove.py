@@ -41,9 +41,8 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from boebot.arenas.floor_plan import floor_plan, moving_solids
 from boebot.devices.laser import Laser
 from boebot.errors import brief
-from boebot.record.brain_record import each_switch
+from boebot.record.brain_record import each_switch, shown_names
 from boebot.record.columns import Columns, columns, events
-from boebot.record.shown import shown_names
 from boebot.record.truth import lateness, shifts
 from boebot.showing import SKETCH, VALUES, Sketch
 from boebot.view import foxglove_numbers, foxglove_scene, scene, style

@@ -44,9 +44,8 @@ if TYPE_CHECKING:
     from boebot.arenas.floor_plan import FloorPlan, Moving
     from boebot.devices.device import Readout
     from boebot.record.blocks import Block
-    from boebot.record.brain_record import BrainNames, BrainRecord
+    from boebot.record.brain_record import BrainNames, BrainRecord, Layer, Shown
     from boebot.record.columns import Columns
-    from boebot.record.shown import Layer, Shown
     from boebot.record.truth import Bools, Floats, Pose
 
 FORMAT = 10

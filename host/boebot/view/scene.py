@@ -20,10 +20,9 @@ if TYPE_CHECKING:
 
     from boebot.description.robots import RobotDescription
     from boebot.devices.drawing import Sweeps
-    from boebot.record.brain_record import BrainRecord
+    from boebot.record.brain_record import BrainRecord, Layer, Shown
     from boebot.record.columns import Columns
     from boebot.record.run import Run
-    from boebot.record.shown import Layer, Shown
     from boebot.record.truth import Floats
     from boebot.showing import Sketch
 

@@ -11,12 +11,11 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boebot.record.brain_record import each_part, each_switch
+from boebot.record.brain_record import each_part, each_switch, shown_in, shown_names
 from boebot.record.columns import Columns
 from boebot.record.columns import columns as pieces
 from boebot.record.record import KINDS
 from boebot.record.run_folder import FORMAT
-from boebot.record.shown import shown_in, shown_names
 
 if TYPE_CHECKING:
     from boebot.record.brain_record import BrainNames, BrainRecord

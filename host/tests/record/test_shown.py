@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 import boebot
 from boebot.errors import BrainError
+from boebot.record.brain_record import read_layers, read_shown
 from boebot.record.record import Record
-from boebot.record.shown import read_layers, read_shown
 from boebot.result import RunResult, read_run
 from boebot.showing import BYTES_AT_ONCE, BYTES_S, NAMES, SKETCH, SKETCH_EACH_S, UNKNOWN, Showing, Sketch
 from boebot.view import painter, scene
