@@ -105,6 +105,12 @@ def joined(*blocks: Block | None) -> Block:
     return Block(np.concatenate([block.times for block in there]), b"".join(block.data for block in there), sizes)
 
 
+def merged(groups: Sequence[Group]) -> Group:
+    """Groups that follow each other, as one."""
+    names = dict.fromkeys(name for group in groups for name in group)
+    return {name: joined(*chain(groups, name)) for name in names}
+
+
 def schema() -> bytes:
     """Of a block on disk: a FileDescriptorSet, as MCAP wants it for Protobuf."""
     from google.protobuf.descriptor_pb2 import FileDescriptorSet

@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 
 from boebot.devices.readings import Readings
 from boebot.link.delivery import BoardEvent
-from boebot.record.blocks import EMPTY, Block, Group, Row, Rows, chain, group_of, joined
+from boebot.record.blocks import EMPTY, Block, Group, Row, Rows, chain, group_of, joined, merged
 
 if TYPE_CHECKING:
     from boebot.record.record_file import RecordWriter
@@ -109,13 +109,10 @@ class Record:
         self._kept = InMemory() if kept is None else kept
         self._prefix = prefix
         self._rows: defaultdict[str, list[Row]] = defaultdict(list)
-        self._blocks: dict[str, Block] = {}  # of other streams, that wait with those rows
+        self._waiting: list[Group] = []  # to be kept, before those rows
         self._room = STEPS_AT_MOST  # steps of the brain until rows are due
-        self._told: Counter[str] | None = None  # how many of those that wait `news` has given; None: nobody asks
-        self._untold: dict[str, Block] = {}  # that were kept before somebody asked again
-        self._counts: Counter[str] | None = (
-            Counter() if kept is None else None
-        )  # of the rows that are kept; None: not known
+        self._news: list[Group] | None = None  # that `news` has not given yet; None: nobody asks
+        self._counts = None if kept else Counter[str]()  # of the rows that are kept; None: not known
         self._due_s = wall.perf_counter() + EACH_S
 
     @classmethod
@@ -146,37 +143,40 @@ class Record:
             RecordError: they cannot be kept.
         """
         self._due_s = wall.perf_counter() + EACH_S
-        if self._told is not None:
-            self._untold, self._told = dict(self.news()), Counter()
-        rows: Rows = {**self._rows, **self._blocks}
-        self._rows, self._blocks, self._room = defaultdict(list), {}, STEPS_AT_MOST
-        if any(rows.values()):
-            self._counted(rows)
+        self._settle()
+        group, self._waiting, self._room = merged(self._waiting), [], STEPS_AT_MOST
+        if group:
+            self._counted(group)
             assert isinstance(self._kept, InMemory)
-            named = {name if name in WORLD else self._prefix + name: some for name, some in rows.items()}
+            named = {name if name in WORLD else self._prefix + name: block for name, block in group.items()}
             self._kept.write(named, time_s)
 
     def put(self, group: Group) -> None:
         """Rows of streams that come in blocks: they wait to be kept with the others."""
-        for stream, block in group.items():
-            self._blocks[stream] = joined(self._blocks.get(stream), block)
+        self._settle()
+        self._add(group)
 
     def news(self) -> Group:
         """The rows that came since this was last asked; of the first time only those that are not kept yet."""
-        told = self._told = self._told or Counter()
-        self._room -= len(self._rows["command"])
-        self.put(group_of(self._rows))  # as blocks they wait to be kept, too: made once
-        self._rows = defaultdict(list)
-        found, self._untold = self._untold, {}
-        for stream, block in self._blocks.items():
-            if len(block) > told[stream]:
-                found[stream] = joined(found.get(stream), block.part(told[stream], len(block)))
-                told[stream] = len(block)
-        return found
+        self._settle()
+        new, self._news = self._waiting if self._news is None else self._news, []
+        return merged(new)
 
-    def _counted(self, rows: Rows) -> None:
+    def _settle(self) -> None:
+        """Makes blocks of the rows so far."""
+        self._room -= len(self._rows["command"])
+        self._add(group_of(self._rows))
+        self._rows = defaultdict(list)
+
+    def _add(self, group: Group) -> None:
+        if group:
+            self._waiting.append(group)
+            if self._news is not None:
+                self._news.append(group)
+
+    def _counted(self, group: Group) -> None:
         if self._counts is not None:
-            self._counts.update({stream: len(some) for stream, some in rows.items()})
+            self._counts.update({stream: len(block) for stream, block in group.items()})
 
     def append_telemetry(self, time_s: float, payload: bytes, host_s: float, bound_s: float) -> None:
         """One tick of a board."""
@@ -203,12 +203,9 @@ class Record:
 
     def groups(self) -> Iterator[Group]:
         """What is kept, and what waits to be, oldest first; each group by itself is small."""
+        self._settle()
         yield from self._kept_groups()
-        waiting = dict(self._blocks)
-        for stream, block in group_of(self._rows).items():
-            waiting[stream] = joined(waiting.get(stream), block)
-        if waiting:
-            yield waiting
+        yield from self._waiting
 
     def _kept_groups(self) -> Iterator[Group]:
         for group in self._kept.groups():
@@ -222,7 +219,8 @@ class Record:
             self._counts = Counter()
             for group in self._kept_groups():
                 self._counted(group)
-        return self._counts[stream] + len(self._rows.get(stream, ())) + len(self._blocks.get(stream, ()))
+        waiting = sum(len(block) for block in chain(self._waiting, stream))
+        return self._counts[stream] + waiting + len(self._rows.get(stream, ()))
 
     def rows(self, stream: str) -> list[Row]:
         """The rows of a stream, oldest first."""
