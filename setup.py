@@ -2,7 +2,6 @@
 else it makes what follows from the protocol and the robots' files (protocol/generate.py).
 
 * `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py), MIT.
-* `boebot.running._last_resort`: ends a process that Python cannot end (host/boebot/running/build_last_resort.py), MIT.
 * `boebot.arenas._arena`: arenas and rays (host/boebot/arenas/build_arena.py), MIT.
 * `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
 * `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py),
@@ -55,7 +54,6 @@ CFFI_MODULES = [
     f"{script}:ffi"
     for script, wanted in (
         ("host/boebot/link/build_codec.py", True),
-        ("host/boebot/running/build_last_resort.py", not MSVC),
         ("host/boebot/arenas/build_arena.py", True),
         ("sim_bridge/build_core.py", True),
         ("sim_bridge/boards/avr/build_avr.py", HAS_SIMAVR),

@@ -15,8 +15,7 @@ from boebot.arenas import Arena, ArenaDescription, Disc, Light, Patch, Polygon
 from boebot.description.robots import RobotDescription, load_robot
 from hil_tests.rig import Rig
 from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
-from sim_bridge.sessions.opening import alone
-from sim_bridge.sessions.with_board import SimSession
+from sim_bridge.sessions.session import SimSession
 from sim_bridge.sim import Sim, SimRobot
 
 WALL_THICKNESS_M = 0.05
@@ -88,7 +87,7 @@ def circle(
     board = (
         avr_board(avr_image(description.pin_map)) if url == "avr" else native_board(native_library(description.pin_map))
     )
-    rig = CircleRig(SimSession(sim.add(board, description, pose=pose, imperfections=imperfections), url, alone(sim)))
+    rig = CircleRig(SimSession(sim.add(board, description, pose=pose, imperfections=imperfections), url, SimRobot.wait))
     with rig:
         rig.start()
         yield rig

@@ -11,7 +11,7 @@ from boebot.brains import LoadedBrain
 from boebot.description.robots import load_robot
 from boebot.robot import Robot
 from boebot.running.board_driver import BoardDriver
-from boebot.running.driver import Task
+from boebot.running.tasks import Request, Task
 from boebot_timing.emulated.loads import TICK_CYCLES
 from boebot_timing.tests.latency_limits import WHISKER
 from hil_tests.rig import CYCLES_PER_S, TICK_S
@@ -50,12 +50,12 @@ def test_a_touch_is_seen_by_the_brain_within_two_ticks_and_its_period(board_url:
     request = BoardRequest(robot=load_robot("shieldbot"), arena="empty", noise=False)
     seconds = 40 * TOUCH_EVERY * period_ticks * TICK_S / (1 if period_ticks == 1 else 3)
     task = Task(
+        request=Request.single(seconds=seconds),
         brain=LoadedBrain("touch", step),
-        request=request,
+        board=request,
         on=board_url,
-        seconds=seconds,
         period_s=period_ticks * TICK_S,
-        brain_seed=1,
+        seed=1,
     )
     try:
         driver = BoardDriver(session, task)

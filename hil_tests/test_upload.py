@@ -23,7 +23,8 @@ from hil_tests.calibration import board
 from hil_tests.calibration.talk import START, Talk
 from sim_bridge.serve import carry
 from sim_bridge.served_ports import PtyPort
-from sim_bridge.sessions.with_board import SimSession, open_avr
+from sim_bridge.sessions.session import SimSession
+from sim_bridge.sessions.world import AVR, open_on
 
 pytestmark = pytest.mark.emulated
 
@@ -36,7 +37,7 @@ PATIENCE_S = 10.0  # by the wall clock: the bootloader waits one second for a pr
 def served(image: Path) -> Iterator[tuple[str, SimSession]]:
     """The port of an emulated board, as `boebot serve` offers it."""
     request = BoardRequest(robot=load_robot("shieldbot"), arena="empty", seed=1, noise=False, image=str(image))
-    session, port, ended = open_avr(request), PtyPort(board.BAUD), threading.Event()
+    session, port, ended = open_on(AVR, request), PtyPort(board.BAUD), threading.Event()
     thread = threading.Thread(target=carry, args=(session, port, lambda: not ended.is_set(), lambda _: None))
     thread.start()
     try:

@@ -21,7 +21,6 @@ from boebot import arguments
 from boebot.arenas import Arena
 from boebot.brains import LoadedBrain
 from boebot.errors import BrainError, RobotError
-from boebot.running import interrupts
 from sim_bridge._core import ffi, lib
 from sim_bridge.vehicle import VehicleModel
 from sim_bridge.vehicles import worlds
@@ -219,12 +218,11 @@ class Batch:
         left = arguments.whole("batch: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
         if self._brains is None or self._brains.made_of != (brain, period):
             self._brains = Brains(brain, self.model, self._seeds, period)
-        with interrupts.heard():
-            while left > 0:
-                runs = (self.flags == lib.VEHICLE_RUNS).tolist()
-                signals = self._brains.step(self.steps.tolist(), self.readings.tolist(), runs)
-                self.step(signals, min(left, self._brains.period_ticks))
-                left -= min(left, self._brains.period_ticks)
+        while left > 0:
+            runs = (self.flags == lib.VEHICLE_RUNS).tolist()
+            signals = self._brains.step(self.steps.tolist(), self.readings.tolist(), runs)
+            self.step(signals, min(left, self._brains.period_ticks))
+            left -= min(left, self._brains.period_ticks)
         return self.readings
 
     @property

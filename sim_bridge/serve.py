@@ -18,8 +18,8 @@ from boebot.boards import BoardRequest, BoardSession, Visit
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.served_ports import Port, PtyPort, TcpPort
-from sim_bridge.sessions.opening import Pace
-from sim_bridge.sessions.with_board import SimSession, open_avr, open_native
+from sim_bridge.sessions.session import SimSession
+from sim_bridge.sessions.world import AVR, NATIVE, Pace, open_on
 
 IDLE_S = 0.002  # how long the loop sleeps when no byte comes
 BRISK_S = 0.0002  # and for a while after one came, so that its answer is not late
@@ -97,11 +97,11 @@ def serve(
     Raises:
         BoebotError: no such board or port, or the board's program crashed.
     """
-    openers = {"native": open_native, "avr": open_avr}
-    if kind not in openers:
-        raise BoardError(f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(openers)}")
+    kinds = {board.name: board for board in (NATIVE, AVR)}
+    if kind not in kinds:
+        raise BoardError(f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(kinds)}")
     with contextlib.ExitStack() as stack:
-        session = openers[kind](request)
+        session = open_on(kinds[kind], request)
         stack.callback(session.close)
         port: Port = PtyPort(session.transport.baud) if tcp is None else TcpPort(tcp)
         stack.callback(port.close)

@@ -31,7 +31,7 @@ from boebot.record.interventions import STREAM
 from boebot.record.record import Record
 from boebot.result import RunResult, read_run
 from boebot.running.hands import Repeated
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 
 if TYPE_CHECKING:

@@ -40,9 +40,8 @@ if TYPE_CHECKING:
     from boebot.errors import BoebotError
     from boebot.result import RunResult, TogetherResult
     from boebot.robot import Command, Observation, Robot
-    from boebot.running.runner import run
+    from boebot.running.runner import run, run_together
     from boebot.running.tasks import Member
-    from boebot.running.together import run_together
     from boebot.showing import Grid
 
     __version__: str
@@ -76,7 +75,7 @@ _HOMES = {
     "load_robot": "description.robots",
     "TogetherResult": "result",
     "run": "running.runner",
-    "run_together": "running.together",
+    "run_together": "running.runner",
 }
 
 

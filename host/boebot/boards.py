@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-BOARDS_GROUP = "boebot.boards"  # kind -> BoardFactory
-VEHICLES_GROUP = "boebot.vehicles"  # "direct" -> VehicleFactory
+BOARDS_GROUP = "boebot.boards"  # kind, or "direct" -> WorldFactory
 DIRECT = "direct"  # what a robot without a board runs on
 SERVERS_GROUP = "boebot.servers"  # any name -> Server
 
@@ -43,7 +42,7 @@ class BoardRequest:
     arena: str | None = None  # bundled name or .toml file; None: the simulator's default
     seed: int = 1
     realtime: bool = False  # pace simulated time by the wall clock
-    start_pose: tuple[float, float, float] | None = None  # x (m), y (m), heading (rad); None: the arena's own
+    pose: tuple[float, float, float] | None = None  # x (m), y (m), heading (rad); None: the arena's own
     image: str | None = None  # firmware to load in place of the bundled one
     record: bool = True  # keep the truth for the pictures
     pins: bool = False  # record the edges of an emulated board's pins
@@ -98,16 +97,12 @@ class WatchdogReset:
         return f"the watchdog reset the program, which it found {where}"
 
 
-class BoardSession(Protocol):
-    """An opened board. `close` gives everything back; nothing else is called after it."""
-
-    @property
-    def transport(self) -> Transport:
-        """The bytes to and from the board."""
+class Session(Protocol):
+    """A robot, opened. `close` gives everything back; nothing else is called after it."""
 
     @property
     def description(self) -> str:
-        """The board in a few words, such as "emulated ATmega328P"."""
+        """In a few words, such as "emulated ATmega328P"."""
 
     @property
     def arena(self) -> Arena | None:
@@ -139,7 +134,18 @@ class BoardSession(Protocol):
         """
 
     def counters(self) -> Mapping[str, float]:
-        """What the board counted, by name; may be empty."""
+        """What board and world counted, by name; may be empty."""
+
+    def close(self) -> None:
+        """Closes the board, and the world if it is this robot's alone."""
+
+
+class BoardSession(Session, Protocol):
+    """A board."""
+
+    @property
+    def transport(self) -> Transport:
+        """The bytes to and from the board."""
 
     def watchdog_resets(self) -> Sequence[WatchdogReset]:
         """Those so far, oldest first; empty where nobody sees into the board."""
@@ -148,16 +154,9 @@ class BoardSession(Protocol):
         """Sentences on what the board's program asked for that the board does not do as the chip would, or the chip
         not as it seems, each with its place, once; empty of a board that cannot be seen into."""
 
-    def close(self) -> None:
-        """Closes the board."""
 
-
-class VehicleSession(Protocol):
-    """A simulated robot without a board, opened. `close` gives everything back; nothing else is called after it."""
-
-    @property
-    def description(self) -> str:
-        """The robot in a few words."""
+class VehicleSession(Session, Protocol):
+    """A simulated robot without a board."""
 
     @property
     def tick_s(self) -> float:
@@ -180,46 +179,17 @@ class VehicleSession(Protocol):
     def ended(self) -> str:
         """Why it can go no further, or ""."""
 
-    @property
-    def arena(self) -> Arena:
-        """Where the robot is."""
 
-    def drain(self, *, ended: bool = False) -> Group:
-        """See `BoardSession`."""
-
-    def truth_now(self) -> TruthNow:
-        """See `BoardSession`."""
-
-    def place(self, x: float, y: float, heading: float) -> None:
-        """See `BoardSession`."""
-
-    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
-        """See `BoardSession`."""
-
-    def counters(self) -> Mapping[str, float]:
-        """What the world counted, by name; may be empty."""
-
-    def close(self) -> None:
-        """Frees the world."""
-
-
-BoardFactory = Callable[[BoardRequest], BoardSession]
-"""What an entry point of the group `boebot.boards` loads to: opens a board; raises a BoebotError with one sentence if
-it cannot."""
-VehicleFactory = Callable[[BoardRequest], VehicleSession]
-"""The same of the group `boebot.vehicles`: opens a robot without a board."""
-
-
-class SharedWorld(Protocol):
-    """Several robots in one simulated world, opened. Time passes only in `advance`: a session that waits calls who
-    turns the clock, and goes on once its robot has woken."""
+class World(Protocol):
+    """The robots of one run, opened. A single one lets time pass itself, as it waits. Of several, time passes only in
+    `advance`: a session that waits calls who turns the clock, and goes on once its robot has woken."""
 
     @property
     def sessions(self) -> Sequence[BoardSession | VehicleSession]:
         """One per robot, in the order of the requests: with a board for those whose description has one."""
 
     def on_wait(self, pause: Callable[[int], None]) -> None:
-        """Who is called with a robot's index when it waits, and returns once it has woken."""
+        """Who is called with the index of one of several robots when it waits, and returns once it has woken."""
 
     def advance(self) -> list[int]:
         """Lets time pass up to the earliest wake-up of a robot that waits; the indices of those that wake then."""
@@ -228,12 +198,10 @@ class SharedWorld(Protocol):
         """Frees all boards and the world."""
 
 
-@runtime_checkable
-class TogetherFactory(Protocol):
-    """A factory of boards or vehicles that can put several robots into one world, one of boards also such without."""
-
-    def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
-        """Opens them; arena, seed of the world and pace are the first request's."""
+WorldFactory = Callable[[Sequence[BoardRequest]], World]
+"""What an entry point of the group `boebot.boards` loads to: opens robots in one simulated world, on its kind of board
+or, of the name `direct`, without; arena, seed of the world and pace are the first request's. It raises a BoebotError
+with one sentence if it cannot."""
 
 
 class Visit(NamedTuple):
@@ -269,11 +237,19 @@ class Server(Protocol):
 
 
 class LiveSession:
-    """A board behind a port: a robot, or an emulated one that somebody serves."""
+    """A board behind a port: a robot, or an emulated one that somebody serves. It is a `World` of one, too."""
 
     def __init__(self, transport: Transport, description: str) -> None:
         self.transport = transport
         self.description = description
+        self.sessions = [self]
+
+    def on_wait(self, pause: Callable[[int], None]) -> None:
+        """Time passes by itself."""
+
+    def advance(self) -> list[int]:
+        """Of one robot never called."""
+        return []
 
     arena = None
 
@@ -312,46 +288,45 @@ class LiveSession:
 
 def board_kinds() -> list[str]:
     """The emulated boards that are installed."""
-    return list(guests(BOARDS_GROUP))
+    return [name for name in guests(BOARDS_GROUP) if name != DIRECT]
 
 
-def open_board(url: str, request: BoardRequest) -> BoardSession:
-    """Opens the board that `url` names.
+def open_world(url: str, requests: Sequence[BoardRequest]) -> World:
+    """Opens the robots of a run, those with boards on the board, or the kind of board, that `url` names.
 
     Raises:
-        BoardError: no such board, or it cannot be opened, or the robot has none; no such imperfection.
+        BoardError: no such board, or it cannot be opened, or one that does not fit the robots; no such imperfection.
     """
-    check_board(url, request.robot)
-    if point := guests(BOARDS_GROUP).get(url):
-        factory: BoardFactory = _load(point)
-        return factory(request)
+    with_boards = [request.robot for request in requests if request.robot.has_board]
+    if is_live(url) and len(requests) > 1:
+        raise BoardError(f"several robots in one run are simulated; {url!r} is a port: run each robot by itself there")
+    for robot in with_boards or [request.robot for request in requests]:
+        check_board(url, robot)
     if is_live(url):
+        (request,) = requests
         if request.without or request.imperfections:
             raise BoardError(f"the robot at {url!r} is as it is built: imperfections are for simulated runs")
-        if request.start_pose is not None:
+        if request.pose is not None:
             raise BoardError(f"the robot at {url!r} starts where it stands: a pose is for simulated runs")
         transport = open_port(url, _default_baud(request.robot))
         return LiveSession(transport, f"board at {transport.name}")
-    raise BoardError(_unknown(url))
+    kind = guests(BOARDS_GROUP).get(url)
+    if kind is None and url == DIRECT:
+        raise BoardError("there is no world for a robot without a board: the simulator is not installed")
+    if kind is None:
+        raise BoardError(_unknown(url))
+    factory: WorldFactory = _load(kind)
+    return factory(requests)
 
 
-def open_together(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
-    """Opens several robots in one simulated world, those with boards on the kind of board that `url` names.
+def open_board(url: str, request: BoardRequest) -> BoardSession:
+    """Opens one board, to step it by hand; its `close` closes its world, too. Raises as `open_world`."""
+    return cast(BoardSession, open_world(url, [request]).sessions[0])
 
-    Raises:
-        BoardError: no such kind, one that cannot share a world, or one that does not fit the robots.
-    """
-    if is_live(url):
-        raise BoardError(f"several robots in one run are simulated; {url!r} is a port: run each robot by itself there")
-    with_boards = [request.robot for request in requests if request.robot.has_board]
-    for robot in with_boards or [request.robot for request in requests]:
-        check_board(url, robot)
-    if point := guests(BOARDS_GROUP if with_boards else VEHICLES_GROUP).get(url):
-        factory = _load(point)
-        if not isinstance(factory, TogetherFactory):
-            raise BoardError(f"board {url!r} cannot share a world with others")
-        return factory.together(requests)
-    raise BoardError(_unknown(url))
+
+def open_vehicle(url: str, request: BoardRequest) -> VehicleSession:
+    """The same of a robot without a board."""
+    return cast(VehicleSession, open_world(url, [request]).sessions[0])
 
 
 def check_board(url: str, robot: RobotDescription) -> None:
@@ -367,19 +342,6 @@ def check_board(url: str, robot: RobotDescription) -> None:
             f"robot {robot.name!r} is driven by its board: it cannot run {DIRECT!r}; "
             f"expected one of {', '.join(board_kinds())}, or a port"
         )
-
-
-def open_vehicle(url: str, request: BoardRequest) -> VehicleSession:
-    """Opens a robot without a board, in the simulated world.
-
-    Raises:
-        BoardError: `url` names a board, or there is no simulator.
-    """
-    check_board(url, request.robot)
-    for point in guests(VEHICLES_GROUP).values():
-        factory: VehicleFactory = _load(point)
-        return factory(request)
-    raise BoardError("there is no world for a robot without a board: the simulator is not installed")
 
 
 def default_board(robots: Sequence[RobotDescription]) -> str:

@@ -1,7 +1,6 @@
 """What packages beside the core add to it. They join by entry points, each under a name in one of these groups:
 
-    boebot.boards     a kind of emulated board       boebot.boards.BoardFactory
-    boebot.vehicles   a world without boards         boebot.boards.VehicleFactory
+    boebot.boards     a kind of emulated board       boebot.boards.WorldFactory
     boebot.servers    who offers emulated robots     boebot.boards.Server
     boebot.ports      a scheme of URLs               Callable[[str], Transport], given the whole URL
     boebot.commands   a sub-command                  Command

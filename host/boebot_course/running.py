@@ -9,15 +9,16 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import signal
 import threading
 import traceback
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 
 from boebot.errors import BoebotError
-from boebot.running import interrupts
+from boebot.running.interrupts import SIGNALS
 from boebot_course.experiment import Experiment, Measured, Outcome, Progress
 from boebot_course.experiments import all_experiments
 
@@ -103,7 +104,7 @@ def _in_processes(names: Sequence[str], seed: int, jobs: int, files: Files) -> G
     pool = ProcessPoolExecutor(min(jobs, len(names)), spawned, _end_with_parent)
     try:
         # Processes start with the signals ignored that ask to end, and keep to it: it is this one that ends them.
-        with interrupts.ignored():
+        with _ignored():
             futures = {pool.submit(_run_there, name, seed, files): name for name in names}
         for future in as_completed(futures):
             try:
@@ -113,10 +114,21 @@ def _in_processes(names: Sequence[str], seed: int, jobs: int, files: Files) -> G
             except Exception as error:  # what came of it could not be handed over
                 yield Verdict(futures[future], error=_place(error))
     finally:
-        with interrupts.ignored():
+        with _ignored():
             for child in set(multiprocessing.active_children()) - before:
                 child.kill()
             pool.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _ignored() -> Iterator[None]:
+    """Signals that ask to end do nothing in the block."""
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 def _end_with_parent() -> None:

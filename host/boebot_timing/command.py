@@ -226,7 +226,7 @@ def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, see
     if brain is None:
         return step_s or 0.0, None
     from boebot.brains import load_brain
-    from boebot.running.runner import execute
+    from boebot.running.loop import execute
     from boebot.running.tasks import Request
 
     loaded = load_brain(brain)

@@ -22,8 +22,7 @@ from boebot.devices.uart import Uart
 from boebot.errors import BoebotError, TimingError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
-from boebot.running.board_driver import TIME_TO_LIVE_LIMIT_MS, check_time_to_live
-from boebot.running.driver import TICK_S, check_period, whole_ticks
+from boebot.running.driver import TICK_S, TIME_TO_LIVE_LIMIT_MS, check_period, check_time_to_live, whole_ticks
 from boebot.running.tasks import Finding
 from boebot_timing.table import SensorRow, Table, read_table
 

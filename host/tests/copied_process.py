@@ -17,8 +17,7 @@ from typing import NamedTuple
 import matplotlib.backends.backend_agg  # noqa: F401
 
 import boebot.cli.app  # noqa: F401
-import sim_bridge.sessions.with_board
-import sim_bridge.sessions.without_board  # noqa: F401
+import sim_bridge.sessions.world  # noqa: F401
 from boebot import cli
 
 LONGEST_S = 120

@@ -636,8 +636,8 @@ def _signed(count: int) -> int:
 
 
 class InProcess:
-    """A board session in simulated time: transport and session in one, with the line's time and what the channel does
-    to it."""
+    """A board session in simulated time: world, transport and session in one, with the line's time and what the channel
+    does to it."""
 
     name = "peer"
     realtime = False
@@ -660,6 +660,13 @@ class InProcess:
     @property
     def transport(self) -> InProcess:
         return self
+
+    @property
+    def sessions(self) -> list[InProcess]:
+        return [self]
+
+    def on_wait(self, pause: Callable[[int], None]) -> None:
+        pass
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))

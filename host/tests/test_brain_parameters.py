@@ -27,10 +27,9 @@ from boebot.result import RunResult, TogetherResult, read_run
 from boebot.running.again import again, recorded
 from boebot.running.brain_parameters import parameters
 from boebot.running.hands import Hands
+from boebot.running.loop import execute
 from boebot.running.replayed import replayed
-from boebot.running.runner import execute
 from boebot.running.tasks import Member, Request
-from boebot.running.together import execute_together
 
 
 def mind(turn_probability: float = 0.00777) -> Brain:
@@ -260,7 +259,7 @@ def test_a_brain_that_came_from_no_file_is_repeated(tmp_path: Path) -> None:
 def test_robots_with_parameters_of_their_own_are_repeated(tmp_path: Path) -> None:
     members = [Member(brain="clearway", robot="arsim", parameters={"avoid.turn": turn}) for turn in (0.2, 0.3)]
     with RunFolder(tmp_path) as folder:
-        result = execute_together(Request(members=members, seconds=1), folder=folder)
+        result = execute(Request(members=members, seconds=1), folder=folder)
     assert result.error is None and isinstance(read_run(tmp_path), TogetherResult)
     assert again(recorded(tmp_path)).is_equal
 

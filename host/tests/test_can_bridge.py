@@ -27,7 +27,7 @@ from boebot.link import messages
 from boebot.link.frame import encode
 from boebot.link.link import Link
 from boebot.robot import Robot
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from can_line import after, drive
 from command import boebot as boebot_command

@@ -12,20 +12,21 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from boebot import cli
-from boebot.boards import BoardRequest, board_kinds
+from boebot.boards import BoardRequest, board_kinds, open_world
 from boebot.cli import board_link, run_table, teleop
 from boebot.cli import link as link_command
 from boebot.link import finding, messages
 from boebot.link.link import Link
 from boebot.result import RunResult, read_run
 from boebot.robot import Robot
-from boebot.running import runner
+from boebot.running import loop
 from boebot.running.runner import run
 from boebot.running.tasks import Request
 from command import boebot, heed_signals
@@ -35,7 +36,12 @@ from peer import InProcess, Peer, Pty, pty
 @pytest.fixture
 def peer(monkeypatch: pytest.MonkeyPatch) -> Peer:
     peer = Peer()
-    monkeypatch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+
+    def opened(url: str, requests: Sequence[BoardRequest]) -> Any:
+        is_one = len(requests) == 1 and requests[0].robot.has_board
+        return InProcess(peer) if is_one else open_world(url, requests)
+
+    monkeypatch.setattr(loop, "open_world", opened)
     return peer
 
 
@@ -78,7 +84,7 @@ def test_run_prints_json_and_writes_files(peer: Peer, capsys: pytest.CaptureFixt
 def test_folder_that_cannot_be_written_is_said_before_the_run(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(runner, "open_board", lambda url, request: pytest.fail("the run began"))
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: pytest.fail("the run began"))
     (tmp_path / "file").touch()
     code, _, err = boebot(capsys, "run", "wander", "--out", str(tmp_path / "file"))
     assert code == 1 and "cannot be written to" in err
@@ -314,36 +320,6 @@ def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals,
     assert ticks_in(tmp_path / "out") > 20
 
 
-@pytest.mark.wall_clock
-def test_brain_that_catches_ctrl_c_leaves_a_board_that_was_stopped(tmp_path: Path) -> None:
-    brain = tmp_path / "mine.py"
-    brain.write_text("""
-import time
-def step(robot):
-    robot.drive(0.5, 0.5)
-    if robot.time > 0.5:
-        open("begun", "w").close()
-    while robot.time > 0.5:
-        try:
-            time.sleep(0.01)
-        except BaseException:
-            pass
-""")
-    with pty(Peer()) as served:
-        command = [sys.executable, "-m", "boebot", "run", str(brain), "--on", served.path, "--step-timeout", "inf"]
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_signals, cwd=tmp_path
-        )
-        until = time.monotonic() + 20
-        while not (tmp_path / "begun").exists() and time.monotonic() < until:
-            time.sleep(0.02)
-        assert not served.peer.stops
-        process.send_signal(signal.SIGINT)  # soon: a host that is silent for 1 s has lost its session
-        out, err = process.communicate(timeout=20)
-        assert served.peer.stops, "by the stop message, not by the dead-man"
-    assert process.returncode == 130 and "interrupted" in out and err.endswith("boebot: interrupted\n")
-
-
 @pytest.mark.parametrize("after_s", [0.04, 0.1, 0.2, 0.3])
 def test_interrupt_while_the_command_starts_is_no_traceback(after_s: float) -> None:
     process = subprocess.Popen(
@@ -386,51 +362,6 @@ cli.main()
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, preexec_fn=heed_signals
     )
-    assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
-
-
-def test_interrupt_that_python_drops_comes_again() -> None:
-    """One that falls into a callback, as of a weak reference, is "ignored" by Python."""
-    code = """
-import signal, time, weakref
-import boebot.cli as cli
-
-class Thing:
-    pass
-
-def run():
-    thing = Thing()
-    watched = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
-    del thing
-    time.sleep(20)
-    raise SystemExit("never interrupted")
-
-cli._run = run
-cli.main()
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=20, preexec_fn=heed_signals, check=False
-    )
-    assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
-
-
-PRESSES_TWICE = """
-import atexit, os, signal
-from boebot import cli
-from boebot.running import interrupts
-atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))
-interrupts.ONE_PRESS_S = 0.0
-def run():
-    os.kill(os.getpid(), signal.SIGINT)
-cli._run = run
-signal.signal(signal.SIGINT, signal.default_int_handler)
-cli.main()
-"""
-
-
-def test_second_interrupt_while_the_program_ends_is_no_traceback() -> None:
-    """A program that has much to put away takes its time, and people press again."""
-    done = subprocess.run([sys.executable, "-c", PRESSES_TWICE], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (130, "boebot: interrupted\n")
 
 
@@ -819,7 +750,7 @@ def test_keyboard_drives_while_keys_are_held(peer: Peer, monkeypatch: pytest.Mon
             super().step(robot)
             commands.append((robot.command.left, robot.command.right))
 
-    result = runner.execute(Request.single(Watched(lambda: next(typed), shown.append), seconds=10))
+    result = loop.execute(Request.single(Watched(lambda: next(typed), shown.append), seconds=10))
     assert isinstance(result.error, KeyboardInterrupt)
     turn = teleop.TURN
     assert commands == [(0.5, 0.5), (0.5, 0.5), (1, 1), (turn, -turn), (0, 0), (1, 1), (1, 1)]

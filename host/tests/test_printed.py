@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from boebot import cli
 from boebot.cli import output
 from boebot.errors import printable
-from boebot.running import runner
+from boebot.running import loop
 from command import boebot
 from peer import InProcess, Peer
 
@@ -79,7 +79,7 @@ def test_names_and_errors_of_files_come_as_escapes(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     peer = Peer()
-    monkeypatch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: InProcess(peer))
     brain = tmp_path / "brain.py"
     brain.write_text(f"def step(robot):\n    raise RuntimeError({RED!r})\n")
     code, out, err = boebot(capsys, "run", str(brain), "--seconds", "1", "--out", str(tmp_path / "\x1b]0;run"))

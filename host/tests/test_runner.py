@@ -16,7 +16,7 @@ from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
 from boebot.link import messages
 from boebot.result import RunResult, read_run
 from boebot.robot import Robot
-from boebot.running import runner
+from boebot.running import loop
 from boebot.running.tasks import Request
 from peer import InProcess, Peer
 
@@ -25,7 +25,7 @@ from peer import InProcess, Peer
 def session(monkeypatch: pytest.MonkeyPatch) -> InProcess:
     """What `--on native` opens in these tests."""
     session = InProcess(Peer())
-    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: session)
     return session
 
 
@@ -34,7 +34,7 @@ def straight(robot: Robot) -> None:
 
 
 def run_on(peer: Peer, brain: object, monkeypatch: pytest.MonkeyPatch, **options: object) -> RunResult:
-    monkeypatch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: InProcess(peer))
     return boebot.run(brain, **options)  # type: ignore[arg-type]
 
 
@@ -190,7 +190,7 @@ def test_board_that_vanishes_ends_the_run_with_a_whole_record(session: InProcess
             raise BoardError("peer has gone")
 
     session.before_tick = unplug
-    result = runner.execute(Request.single(straight, seconds=10))
+    result = loop.execute(Request.single(straight, seconds=10))
     assert isinstance(result.error, BoardError)
     assert result.series.raw["tick"][-1] == 99
     assert result.table()["ended"] == "peer has gone"
@@ -202,7 +202,7 @@ def test_board_that_falls_silent_ends_the_run(session: InProcess) -> None:
             session.peer.answers = False
 
     session.before_tick = fall_silent
-    result = runner.execute(Request.single(straight, seconds=10))
+    result = loop.execute(Request.single(straight, seconds=10))
     assert str(result.error) == "the board at peer fell silent: no telemetry for 1 s"
     assert session.now() < 2.6
 
@@ -224,7 +224,7 @@ def test_board_behind_a_port_may_wait_in_its_boot_loader(
         session.peer.answers = True
 
     session.before_tick = reset
-    result = runner.execute(Request.single(straight, seconds=6))
+    result = loop.execute(Request.single(straight, seconds=6))
     if error is None:
         assert result.error is None and result.resets == 1
         assert result.run_time == pytest.approx(6.0, abs=0.02)
@@ -338,7 +338,7 @@ def test_low_supply_ends_the_run_and_names_the_voltage(session: InProcess) -> No
             session.peer.supply_mv = 3900
 
     session.before_tick = drop
-    result = runner.execute(Request.single(straight, seconds=5))
+    result = loop.execute(Request.single(straight, seconds=5))
     assert str(result.error) == (
         "the board at peer has stopped its motors: its supply is low, 3.90 V; charge or change the batteries"
     )
@@ -347,7 +347,7 @@ def test_low_supply_ends_the_run_and_names_the_voltage(session: InProcess) -> No
 
 def test_run_does_not_begin_with_a_low_supply(session: InProcess) -> None:
     session.peer.supply_mv = 3900
-    result = runner.execute(Request.single(straight, seconds=5))
+    result = loop.execute(Request.single(straight, seconds=5))
     assert str(result.error) == "the board at peer does not arm its motors: its supply is low (3.90 V)"
     assert session.peer.accepted == []
 
@@ -358,7 +358,7 @@ def test_stop_from_elsewhere_ends_the_run(session: InProcess) -> None:
             session.peer._latch(messages.Latch.STOP_COMMAND)
 
     session.before_tick = stop
-    result = runner.execute(Request.single(straight, seconds=5))
+    result = loop.execute(Request.single(straight, seconds=5))
     assert str(result.error) == "the board at peer has stopped its motors: a stop command came from elsewhere"
     assert result.run_time < 1.0
 
@@ -507,7 +507,7 @@ def test_overruns_are_counted_over_their_roll_over_and_over_resets(session: InPr
     starts = session.peer.starts
     session.peer.overruns = 250
     session.before_tick = overrun
-    result = runner.execute(Request.single(straight, seconds=3))
+    result = loop.execute(Request.single(straight, seconds=3))
     assert (result.error, result.resets) == (None, 1)
     assert result.overruns == 10 + 3
 

@@ -20,7 +20,7 @@ from boebot.devices.device import kinds
 from boebot.errors import BrainError
 from boebot.record.run_folder import RunFolder
 from boebot.result import RunResult, read_run
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from command import boebot as command
 

@@ -24,7 +24,7 @@ from boebot.link.link import Link
 from boebot.record.columns import newest_messages
 from boebot.result import RunResult
 from boebot.robot import Equipment, Observation, Robot
-from boebot.running import runner
+from boebot.running import loop
 from boebot.running.board_driver import message_ticks
 from boebot.running.tasks import Request
 from peer import FIELD_COUNTS, InProcess, Peer
@@ -43,8 +43,9 @@ def run_on(
     peer: Peer, brain: object, monkeypatch: pytest.MonkeyPatch, channel: Channel | None = None, **options: object
 ) -> RunResult:
     session = InProcess(peer, channel)
-    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
-    return runner.execute(Request.single(brain, robot=peer.robot, **options))
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: session)
+    result: RunResult = loop.execute(Request.single(brain, robot=peer.robot, **options))
+    return result
 
 
 def test_brain_sees_what_the_board_sends(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,7 +210,7 @@ def test_emergency_stop_frees_the_turret_and_silences_the_buzzer(monkeypatch: py
 def test_turret_turns_back_after_a_reset_and_no_tone_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     peer = Peer(BOEBOT)
     session = InProcess(peer)
-    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: session)
     seen: list[tuple[float, float | None]] = []
 
     def step(robot: Robot) -> None:
@@ -220,7 +221,7 @@ def test_turret_turns_back_after_a_reset_and_no_tone_is_repeated(monkeypatch: py
         seen.append((robot.time, robot.turret.angle))
 
     session.before_tick = lambda tick: peer.reset() if peer.starts == 1 and session.now() > 1.5 else None
-    result = runner.execute(Request.single(step, robot=BOEBOT, seconds=4))
+    result = loop.execute(Request.single(step, robot=BOEBOT, seconds=4))
     assert result.error is None and result.resets == 1
     assert peer.tones == [(440, 0.1)]
     assert seen[-1][1] == pytest.approx(0.8, abs=2e-4)

@@ -14,12 +14,11 @@ import pytest
 from boebot.boards import BoardRequest, board_kinds, open_board
 from boebot.brains import LoadedBrain
 from boebot.description.robots import load_robot
-from boebot.result import RunResult
+from boebot.record.run import Run
 from boebot.robot import Observation, Robot
 from boebot.running.board_driver import BoardDriver
-from boebot.running.driver import Task
-from boebot.running.runner import execute
-from boebot.running.tasks import Request
+from boebot.running.loop import about, execute
+from boebot.running.tasks import Request, Task
 
 pytestmark = pytest.mark.skipif("native" not in board_kinds(), reason="the simulator is not installed")
 
@@ -31,7 +30,7 @@ Pose = tuple[float, float, float]
 
 def watch(
     robot: str, arena: str, pose: Pose, step: Callable[[Robot], None], seconds: float = 1.0
-) -> tuple[list[Observation], RunResult]:
+) -> tuple[list[Observation], Run]:
     """What a robot that was put there sees, without noise."""
     seen: list[Observation] = []
 
@@ -39,9 +38,14 @@ def watch(
         seen.append(robot.observation)
         step(robot)
 
-    request = BoardRequest(robot=load_robot(robot), arena=arena, noise=False, start_pose=pose)
+    request = BoardRequest(robot=load_robot(robot), arena=arena, noise=False, pose=pose)
     task = Task(
-        brain=LoadedBrain("watch", brain), request=request, on="native", seconds=seconds, period_s=0.05, brain_seed=1
+        request=Request.single(seconds=seconds),
+        brain=LoadedBrain("watch", brain),
+        board=request,
+        on="native",
+        period_s=0.05,
+        seed=1,
     )
     session = open_board("native", request)
     try:
@@ -50,7 +54,7 @@ def watch(
         for _ in driver.steps():
             brain(driver.robot)
         driver.end()
-        return seen, driver.result(None, 1.0)
+        return seen, Run(**about(driver, task), **driver.status()._asdict())
     finally:
         session.close()
 

@@ -40,13 +40,13 @@ def places_of(arena: Arena, requests: Sequence[BoardRequest]) -> list[Pose]:
     """
     occupied: list[_Disc] = []
     for number, request in enumerate(requests, 1):
-        if request.start_pose is not None:
-            occupied.append(_given(arena, occupied, number, request.start_pose, request.robot.body.reach_m))
+        if request.pose is not None:
+            occupied.append(_given(arena, occupied, number, request.pose, request.robot.body.reach_m))
     _, _, heading = arena.start
     places: list[Pose] = []
     for number, request in enumerate(requests, 1):
-        if request.start_pose is not None:
-            places.append(request.start_pose)
+        if request.pose is not None:
+            places.append(request.pose)
             continue
         disc = _found(arena, occupied, number, request.robot.body.reach_m)
         occupied.append(disc)

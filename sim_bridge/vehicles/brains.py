@@ -8,7 +8,7 @@ from typing import Any
 from boebot.arguments import shown
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
-from boebot.running.direct_robot import DirectRobot
+from boebot.running.direct_driver import DirectRobot
 from boebot.running.driver import whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import prepare

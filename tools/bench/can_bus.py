@@ -26,7 +26,7 @@ from boebot.can.socketcand_server import SocketcandBus
 from boebot.link import messages
 from boebot.link.frame import Decoder, encode
 from boebot.resources import folder
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from tools.bench.figures import Peer, figure
 

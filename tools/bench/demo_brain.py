@@ -10,7 +10,7 @@ from unittest import mock
 from boebot.brains import load_brain
 from boebot.result import RunResult
 from boebot.robot import Robot
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from sim_bridge.sim import SimRobot
 from tools.bench.figures import figure
@@ -25,7 +25,9 @@ def run(brain: object, on: str, seconds: float) -> RunResult:
     Raises:
         BoebotError: it ended before its time.
     """
-    result = execute(Request.single(brain, robot=ROBOT, arena=ARENA, on=on, seconds=seconds, period=PERIOD_S))
+    result: RunResult = execute(
+        Request.single(brain, robot=ROBOT, arena=ARENA, on=on, seconds=seconds, period=PERIOD_S)
+    )
     if result.error is not None:
         raise result.error
     return result

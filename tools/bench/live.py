@@ -14,9 +14,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from boebot.live.live_view import LiveView
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Member, Request
-from boebot.running.together import execute_together
 from boebot.view.page_data import FORMAT
 from tools.bench.figures import figure
 
@@ -143,7 +142,7 @@ def redraws() -> float:
         with contextlib.ExitStack() as stack:
             printed = stack.enter_context(looking(count_redraws, view.url))
             stack.callback(view.close)
-            result = execute_together(request, onlooker=view)
+            result = execute(request, onlooker=view)
     if result.error is not None:
         raise result.error
     return float(printed[0])

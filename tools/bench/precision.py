@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from boebot.link import messages
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from hil_tests.rig import CYCLES_PER_US, Rig
 from tools.bench import arduino_servo

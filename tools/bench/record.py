@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from tools import resident
 from tools.bench.figures import figure

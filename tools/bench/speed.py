@@ -6,7 +6,7 @@ import time
 
 from boebot.boards import BoardRequest, open_board
 from boebot.description.robots import load_robot
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from tools.bench import peers
 from tools.bench.figures import Peer, figure

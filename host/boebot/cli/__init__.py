@@ -12,7 +12,6 @@ import os
 import signal
 import sys
 import threading
-import time
 from typing import NoReturn
 
 from boebot.cli import streams
@@ -21,19 +20,17 @@ from boebot.running import interrupts
 from boebot.running.interrupts import SIGNALS
 
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
-_ASK_AGAIN_S = 0.02
 
 
 def main() -> NoReturn:
     """Runs the command; every error that people can make ends as one sentence."""
     code: object
-    begun_s = time.monotonic()
+    interrupts.first = None
     others = set(threading.enumerate())
     try:
         for number in SIGNALS:  # motors are stopped and the record is written at each of them
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it
                 signal.signal(number, interrupts.interrupt)
-        sys.unraisablehook = _ask_again
         streams.open_closed()
         streams.accept_all_characters()
         code = _run()
@@ -42,7 +39,7 @@ def main() -> NoReturn:
     except KeyboardInterrupt as error:
         code = _interrupted("interrupted", error)
     except Exception as error:
-        if interrupts.wishes.signal_s < begun_s:
+        if interrupts.first is None:
             raise
         code = _interrupted("interrupted", error)  # an import that Ctrl-C cut may end as any other error
     if _is_interrupted(code) and not others.issuperset(threading.enumerate()):
@@ -104,9 +101,6 @@ def _run() -> object:
 
 
 def _interrupted(sentence: str, error: BaseException) -> int:
-    """Says so; who presses again while the program ends, as people do where that takes a while, has been heard."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
     _say(sentence, error)
     return interrupts.exit_code()
 
@@ -116,12 +110,3 @@ def _say(sentence: str, error: BaseException) -> None:
     with contextlib.suppress(OSError, ValueError):
         for text in (sentence, *getattr(error, "__notes__", ())):
             print(f"boebot: {printable(text)}", file=sys.stderr)
-
-
-def _ask_again(ignored: sys.UnraisableHookArgs) -> None:
-    """Python drops a KeyboardInterrupt in its own callbacks, as while it imports: it is raised again."""
-    if not issubclass(ignored.exc_type, KeyboardInterrupt) or not hasattr(signal, "setitimer"):
-        sys.__unraisablehook__(ignored)
-        return
-    signal.signal(signal.SIGALRM, signal.default_int_handler)
-    signal.setitimer(signal.ITIMER_REAL, _ASK_AGAIN_S)

@@ -18,7 +18,6 @@ from boebot.record.record_file import NoRecordError
 from boebot.record.run import Run
 from boebot.record.run_folder import RECORD
 from boebot.result import Result
-from boebot.running import interrupts
 from boebot.view import IncompleteError
 
 
@@ -57,26 +56,23 @@ def end(result: Result, out: Path | None, wanted: Detail) -> None:
         for notice in result.notices:
             output.say(notice)
     interrupted = isinstance(result.error, KeyboardInterrupt)
-    with interrupts.ignored():
-        files: list[Path] = []
-        unsaved: BoebotError | None = None
-        try:
-            print_run(result, wanted, is_said=result.error is not None and not interrupted)
-        finally:
-            if out is not None:
-                try:
-                    files = [out / RECORD, *result.save(out)]
-                except BoebotError as error:
-                    unsaved = error
-                    files = [out / RECORD, *error.files] if isinstance(error, IncompleteError) else []
-                files = [path for path in files if path.exists()]  # a brain may have deleted them
-        if wanted is Detail.JSON:
-            output.print_json(
-                result.table() | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]}
-            )
-        elif files and wanted is not Detail.NOTHING:
-            assert out is not None
-            output.line(files_in(out, files))
+    files: list[Path] = []
+    unsaved: BoebotError | None = None
+    try:
+        print_run(result, wanted, is_said=result.error is not None and not interrupted)
+    finally:
+        if out is not None:
+            try:
+                files = [out / RECORD, *result.save(out)]
+            except BoebotError as error:
+                unsaved = error
+                files = [out / RECORD, *error.files] if isinstance(error, IncompleteError) else []
+            files = [path for path in files if path.exists()]  # a brain may have deleted them
+    if wanted is Detail.JSON:
+        output.print_json(result.table() | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]})
+    elif files and wanted is not Detail.NOTHING:
+        assert out is not None
+        output.line(files_in(out, files))
     first = InterruptedRunError("interrupted") if interrupted else result.error
     if first is not None:
         if unsaved is not None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from boebot.errors import printable
 from boebot.record import figures
-from boebot.running.driver import Progress
+from boebot.running.loop import Progress
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions

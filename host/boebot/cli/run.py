@@ -17,10 +17,8 @@ from boebot.cli.ending import end
 from boebot.cli.run_table import detail
 from boebot.errors import BoebotError
 from boebot.record import run_folder
-from boebot.result import Result
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Member, Request
-from boebot.running.together import execute_together
 
 DEFAULT_ROBOT = "shieldbot"
 TURN = 2 * math.pi + 1e-9  # rad
@@ -175,23 +173,12 @@ def run(
             title = name if on is None else f"{name} on {on}"
             bar = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
             progress = None if view else shown.enter_context(output.step_watch(bar))
-
-            def put_away(result: Result) -> None:
-                """What this function cannot do itself: a brain goes on after Ctrl-C."""
-                shown.close()
-                try:
-                    end(result, out, wanted)
-                except BoebotError as error:
-                    output.say(str(error))
-
-            run_all = execute if count == 1 else execute_together
             page = shown.enter_context(watched.view(view=view, speed=speed, port=view_port))
             shown.enter_context(streams.kept(for_the_answer=json))
             if page is None:
-                result = run_all(request, progress, folder, put_away)
+                result = execute(request, progress, folder)
             else:
-                again = lambda wanted: run_all(wanted, progress, folder, put_away, page)  # noqa: E731
-                result = watched.run(page, request, again)
+                result = watched.run(page, request, lambda wanted: execute(wanted, progress, folder, page))
         end(result, out, wanted)
 
 

@@ -21,7 +21,7 @@ from boebot.cli.run_table import detail
 from boebot.errors import BoebotError
 from boebot.record import run_folder
 from boebot.robot import Robot
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 
 HOLD_S = 0.6  # a key counts as held: terminals begin to repeat it after half a second

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from boebot.cli import output
 from boebot.errors import BoebotError
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from boebot.boards import BoardRequest
     from boebot.live.live_view import LiveView
     from boebot.live.served_view import ServedView
-
-Result = TypeVar("Result")
 
 
 def view(*, view: bool, speed: float | None, port: int | None) -> contextlib.AbstractContextManager[LiveView | None]:
@@ -57,11 +55,11 @@ def served_view(request: BoardRequest, kind: str, *, view: bool, port: int | Non
         page.close()
 
 
-def run(page: LiveView, request: Request, run_all: Callable[[Request], Result], *, waits: bool = True) -> Result:
+def run(page: LiveView, request: Request, run_all: Callable[[Request], Any], *, waits: bool = True) -> Any:
     """Runs it, and again as often as a page asks for that; `waits`: at the end as long as one is open."""
     from boebot.live.session import run_viewed
 
-    return run_viewed(page, request, run_all, waits=waits)  # type: ignore[type-var]
+    return run_viewed(page, request, run_all, waits=waits)
 
 
 def _tell(url: str) -> None:

@@ -23,8 +23,8 @@ from boebot.record.interventions import STREAM, in_words
 from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.record.truth import Floats, Pose
-from boebot.running.driver import gather_rows
 from boebot.running.hands import Hands
+from boebot.running.loop import gather_rows
 from boebot.showing import SKETCH
 from boebot.view import page_data, scene
 
@@ -60,7 +60,7 @@ class OfRun:
     @property
     def clock_offset_s(self) -> float:
         """See `Source`."""
-        return self._driver.result(None, 0.0).clock_offset
+        return self._driver.status().clock_offset
 
     def news(self) -> Group:
         """See `Source`."""

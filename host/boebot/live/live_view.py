@@ -16,6 +16,7 @@ from typing import Any
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
 from boebot.errors import BoebotError
 from boebot.imperfections import switched_off, switches
+from boebot.link.transport import OnBus
 from boebot.live import messages
 from boebot.live.audience import Audience
 from boebot.live.chunks import EACH_S, Chunks, OfRun
@@ -181,7 +182,7 @@ class LiveView:
     def _live(self) -> Message:
         assert self._controls is not None
         request = self._robots[0].task.request
-        off = set(request.without)
+        off = set(self._robots[0].task.board.without)
         return {
             "can": sorted(self._controls.can),
             "seed": request.seed,
@@ -322,7 +323,15 @@ def _pose_now(robot: Hands) -> tuple[float, float, float] | None:
 
 
 def _quality(robot: Hands) -> Message | None:
-    quality = robot.driver.link_quality()
-    if quality is None:
+    link, status = robot.driver.link, robot.driver.status()
+    if link is None:
         return None
-    return {**quality._asdict(), "bus": None if quality.bus is None else quality.bus._asdict()}
+    bus = link.transport.bus_figures() if isinstance(link.transport, OnBus) else None
+    return {
+        "lost": status.lost_frames,
+        "bad": status.bad_frames,
+        "sessions_lost": status.sessions_lost,
+        "resets": status.resets,
+        "round_trip_s": link.clock.round_trips.quantile(0.5),
+        "bus": None if bus is None else bus._asdict(),
+    }

@@ -7,17 +7,15 @@ import html
 import webbrowser
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 from boebot.errors import BoebotError
 from boebot.imperfections import switched_off
 from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
-from boebot.result import RunResult, TogetherResult
+from boebot.result import Result
 from boebot.running.tasks import Request
 from boebot.view.display import has_display, kernel_shell
-
-Result = TypeVar("Result", RunResult, TogetherResult)
 
 
 @contextlib.contextmanager
@@ -49,7 +47,7 @@ def show(url: str, say: Callable[[str], None]) -> None:
             webbrowser.open(url)
 
 
-def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result], *, waits: bool) -> Result:
+def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Any], *, waits: bool) -> Any:
     """Runs what is requested, and again as often as a page asks for it; returns what came of the last run.
 
     Args:
@@ -78,7 +76,7 @@ def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Result
         request = _afresh(request, restart)
 
 
-def _ended(view: LiveView, result: RunResult | TogetherResult, *, waits: bool) -> bool:
+def _ended(view: LiveView, result: Result, *, waits: bool) -> bool:
     """Tells all pages that the run has ended. Where another one may be asked for, waits until a page does, or none is
     open any more, and returns True."""
     robots = result.robots

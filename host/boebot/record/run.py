@@ -73,12 +73,12 @@ class Run:
     seed: int
     period: float
     tick: float
-    error: BaseException | None
     record: Record
     world: Arena | None
-    clock_offset: float
-    steps: int
-    run_time: float
+    error: BaseException | None = None
+    clock_offset: float = 0.0
+    steps: int = 0
+    run_time: float = 0.0
     late_steps: int | None = None
     resets: int | None = None
     lost_frames: int | None = None
@@ -86,8 +86,8 @@ class Run:
     wall_time: float | None = None
     sessions_lost: int | None = None
     identity: Identity | None = None
-    link: dict[str, dict[str, int]] = field(default_factory=dict)
-    notices: list[str] = field(default_factory=list)
+    link: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    notices: Sequence[str] = ()
     watchdog_resets: Sequence[WatchdogReset] = ()
     counters: dict[str, int | float | None] = field(default_factory=dict)
     layout: Layout | None = None

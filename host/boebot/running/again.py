@@ -21,12 +21,10 @@ from boebot.record.reading import CutError, attachments_of
 from boebot.record.recording import BEGIN
 from boebot.record.run import why
 from boebot.result import RunResult, read_run
-from boebot.running.driver import Progress
 from boebot.running.hands import Repeated
-from boebot.running.runner import execute
+from boebot.running.loop import Progress, execute
 from boebot.running.sources import arena_file, brain_files, write_copies
 from boebot.running.tasks import Member, Request
-from boebot.running.together import execute_together
 
 BEYOND_S = 1.0  # by which the repetition of a record that is cut is longer than it
 
@@ -146,8 +144,7 @@ def again(run: Recorded, progress: Progress | None = None, *, trust: bool = Fals
             files[name] = str(copies / as_utf8(Path(name).name))
         request = _request(run, files, Path(folder))
         repeated = Repeated([result.record for result in run.results])
-        run_all = execute if len(run.results) == 1 else execute_together
-        new = run_all(request, progress, onlooker=repeated).robots
+        new = execute(request, progress, onlooker=repeated).robots
     for result in new:
         if isinstance(result.error, KeyboardInterrupt):
             raise result.error

@@ -18,9 +18,9 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from boebot.arguments import duration
 from boebot.boards import BoardSession
 from boebot.description.board_parameters import configure
+from boebot.description.equipment import Equipment
 from boebot.devices.latest import NO_MESSAGES, Latest
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError, ProtocolError
@@ -29,15 +29,12 @@ from boebot.link.delivery import StampedTelemetry as Received
 from boebot.link.errors import LatchedAgainError, SessionLostError
 from boebot.link.frame import FRAME_OVERHEAD, reader, text
 from boebot.link.link import Link
-from boebot.link.transport import OnBus
 from boebot.record import figures
-from boebot.result import RunResult
-from boebot.robot import Equipment, Observation, Robot
-from boebot.running.driver import PROGRESS_S, LinkQuality, Task, check_period, result_so_far, step_limit, whole_ticks
+from boebot.robot import Observation, Robot
+from boebot.running.driver import Driver, Status, check_time_to_live, step_limit, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepLimit
+from boebot.running.tasks import Task
 
-TIME_TO_LIVE_MS = 250  # at least; longer brain periods live 2.5 periods
-TIME_TO_LIVE_LIMIT_MS = 2000
 SILENCE_S = 3.0  # a board silent for longer is lost; after a reset its boot loader waits for up to 2 s
 SILENCE_SIMULATED_S = 1.0  # a board in this process has no boot loader
 STOP_LIMIT_S = 0.5  # how long the end of a run waits for the board to confirm its stop
@@ -71,23 +68,7 @@ def message_ticks(devices_period: int, byte_s: float, tick_s: float) -> int:
     return max(devices_period, math.ceil(needed_s / tick_s - 1e-6))
 
 
-def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
-    """The set-points' time to live (ms) at a brain period; at least `least_s`.
-
-    Raises:
-        BoebotError: the period is so long that the motors would stop between two steps, or telemetry so seldom.
-    """
-    check_period(period_s, TIME_TO_LIVE_LIMIT_MS / 2500)
-    time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000), math.ceil(least_s * 1000))
-    if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
-        raise BoebotError(
-            f"set-points would have to live {duration(least_s)}, so seldom does telemetry come; "
-            f"expected at most {duration(TIME_TO_LIVE_LIMIT_MS / 1000)}"
-        )
-    return time_to_live_ms
-
-
-class BoardDriver:
+class BoardDriver(Driver):
     """Drives one robot over the link (see `boebot.running.driver.Driver`)."""
 
     def __init__(self, session: BoardSession, task: Task) -> None:
@@ -98,7 +79,7 @@ class BoardDriver:
         """
         self.session = session
         self.task = task
-        request = task.request
+        description = task.board.robot
         self.record = task.record
         self.link = Link(session.transport, self.record.append)
         hello = self.link.open()
@@ -108,17 +89,18 @@ class BoardDriver:
         self.telemetry_ticks = hello.telemetry_period
         self.period_s = self.period_ticks * self.tick_s
         self.time_to_live_ms = check_time_to_live(self.period_s, self._time_to_live_least())
-        self.step_limit = step_limit(task, self._limit())
+        self.step_limit = step_limit(task.request.step_timeout, self._limit())
         self.identity = self.link.identity()
         pin_map = text(self.identity.pin_map)
-        if pin_map != request.robot.pin_map:
+        if pin_map != description.pin_map:
             raise ProtocolError(
                 f"the board at {session.transport.name} runs firmware for pin map {pin_map!r}, but robot "
-                f"{request.robot.name!r} needs {request.robot.pin_map!r}"
+                f"{description.name!r} needs {description.pin_map!r}"
             )
-        self.description = request.robot
-        self.equipment = Equipment(request.robot, self.tick_s)
-        self.robot = Robot(request.robot.name, self.period_s, task.brain_seed)
+        self.description = description
+        self.layout = None
+        self.equipment = Equipment(description, self.tick_s)
+        self.robot = Robot(description.name, self.period_s, task.seed)
         self.resets = 0
         self.late_steps = 0
         self._last_s = -1.0  # time of the newest telemetry of the run
@@ -177,7 +159,7 @@ class BoardDriver:
                 raise self._never_ready()
             session = link.counts.sessions
             try:
-                self.description = configure(link, self.task.request.robot)
+                self.description = configure(link, self.task.board.robot)
                 self.equipment = self._equipment()
                 if not self._halted:
                     self._arm()
@@ -264,14 +246,6 @@ class BoardDriver:
         if telemetry.latch == messages.Latch.STOP_COMMAND and not self._halted:
             raise BoardError(f"the board at {where} has stopped its motors: a stop command came from elsewhere")
 
-    def link_quality(self) -> LinkQuality:
-        """See `boebot.running.driver.Driver`."""
-        link = self.link
-        decoder, trip_s = link.line.decoder, link.clock.round_trips.quantile(0.5)
-        transport = link.transport
-        bus = transport.bus_figures() if isinstance(transport, OnBus) else None
-        return LinkQuality(decoder.lost, decoder.bad, link.counts.sessions_lost, self.resets, trip_s, bus)
-
     # ---- the run -----------------------------------------------------------------------------------------------------
 
     def steps(self) -> Iterator[float]:
@@ -282,7 +256,7 @@ class BoardDriver:
         put_aside, command_given = self.record.append_telemetry, self.record.append_command
         equipment, tick_s, n = self.equipment, self.tick_s, self.period_ticks
         paced = self.task.request.realtime and not transport.realtime
-        time_to_live_ms, seconds, progress = self.time_to_live_ms, self.task.seconds, self.task.progress
+        time_to_live_ms, seconds = self.time_to_live_ms, self.task.request.seconds
 
         period = self.telemetry_ticks
         last = due = -1
@@ -296,7 +270,7 @@ class BoardDriver:
         nap_s = link.session.time_out_s / _NAPS if transport.realtime else math.inf
         awake_s, took_s = _host_clock(), 0.0  # as of `now_s`; the brain's step since then
         wait_until_s = received_s + (period + 1) * tick_s
-        started = next_progress = wall.perf_counter()
+        started = wall.perf_counter()
         meanwhile: list[Received] = []  # what came during a late step of a paced run
         while True:
             received = meanwhile + poll(look_s, min(wait_until_s, now_s + nap_s))
@@ -352,9 +326,6 @@ class BoardDriver:
                     ahead = (received_s - started_s) - (wall.perf_counter() - started)
                     if ahead > 0:
                         wall.sleep(ahead)
-                if progress is not None and wall.perf_counter() >= next_progress:
-                    next_progress = wall.perf_counter() + PROGRESS_S
-                    progress(time_s)
                 slow = self._slow(last) if equipment.needs_messages else NO_MESSAGES
                 sample = make(unpack(payload))
                 robot.observation = Observation(sample, equipment, time_s, board_s, host_s, bound_s, slow)
@@ -409,30 +380,22 @@ class BoardDriver:
         """Stops the board, waits until it confirms, and leaves it to others; one that has gone stops by its
         dead-man."""
         self._put_devices_aside()
-        with contextlib.suppress(BoebotError, KeyboardInterrupt):
+        with contextlib.suppress(BoebotError):
             self.link.stop_and_confirm(STOP_LIMIT_S)
             self._take_events()
             self.link.close()
 
-    def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
+    def status(self) -> Status:
         """See `boebot.running.driver.Driver`."""
         link, watchdog_resets = self.link, self.session.watchdog_resets()
-        return result_so_far(
-            self.task,
-            self.session,
-            error,
-            elapsed_s,
-            robot=self.description,
-            period=self.period_s,
-            tick=self.tick_s,
+        return Status(
+            run_time=max(self._last_s, 0.0),
             clock_offset=self.clock_offset_s,
             late_steps=self.late_steps,
             resets=self.resets,
-            sessions_lost=link.counts.sessions_lost,
             lost_frames=link.line.decoder.lost,
             bad_frames=link.line.decoder.bad,
-            run_time=max(self._last_s, 0.0),
-            identity=self.identity,
+            sessions_lost=link.counts.sessions_lost,
             link={"host": link.counters().as_dict(), "board": dict(link.board_counters.values)},
             notices=[*self.notices, *self.session.notes(), *figures.hang_sentences(watchdog_resets)],
             watchdog_resets=watchdog_resets,

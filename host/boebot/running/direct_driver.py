@@ -10,33 +10,84 @@ import time as wall
 from collections.abc import Iterator
 
 from boebot.boards import VehicleSession
+from boebot.description.equipment import Equipment
+from boebot.description.robots import RobotDescription
+from boebot.devices.readings import Layout, Readings, ages, periods
 from boebot.errors import BoardError
+from boebot.link.messages import Status as StatusBits
 from boebot.record.record import Unrecorded
-from boebot.result import RunResult
-from boebot.running.direct_robot import DirectRobot
-from boebot.running.driver import PROGRESS_S, Task, result_so_far, step_limit, whole_ticks
+from boebot.robot import Observation, Robot
+from boebot.running.driver import Driver, Status, step_limit, whole_ticks
+from boebot.running.tasks import Task
 
 
-class DirectDriver:
+class DirectRobot:
+    """One robot in one run.
+
+    Attributes:
+        robot: what the brain meets.
+    """
+
+    def __init__(
+        self, description: RobotDescription, layout: Layout, readings: int, tick_s: float, period_s: float, seed: int
+    ) -> None:
+        """
+        Args:
+            layout: where the readings of each device stand.
+            readings: how many there are.
+            tick_s: of a step of the world.
+            period_s: from step to step of the brain.
+            seed: of the brain's chance.
+        """
+        self._speed_maximum = description.body.wheel_speed_maximum_m_s
+        self._equipment = Equipment(description, tick_s, layout)
+        self._tick_s = tick_s
+        self._periods = periods(description.device, layout, readings)
+        self._sampled = any(sample_s > tick_s for sample_s in self._periods)
+        self._ages = (0.0,) * readings
+        self.robot = Robot(description.name, period_s, seed, self._speed_maximum)
+
+    def sample(self, tick: int, values: tuple[float, ...]) -> Readings:
+        """The readings (SI units) after that many steps of the world."""
+        if self._sampled:
+            self._ages = ages(self._periods, tick * self._tick_s, self._tick_s)
+        status = 0 if self.robot.latched else int(StatusBits.MOTORS_ENABLED)
+        return Readings(tick, status, self._ages, values)
+
+    def show(self, sample: Readings) -> None:
+        """The robot's new observation."""
+        time_s = sample.tick * self._tick_s
+        self.robot.observation = Observation(sample, self._equipment, time_s, time_s, time_s, 0.0, sample)
+
+    def signals(self) -> tuple[float, float]:
+        """What the motors get by the robot's command, left and right, in [-1, 1]."""
+        kind, left, right = self.robot.command
+        if self.robot.latched or kind == "stop":
+            return 0.0, 0.0
+        if kind == "speed":
+            return left / self._speed_maximum, right / self._speed_maximum
+        return left, right
+
+
+class DirectDriver(Driver):
     """Drives one robot by motor signals (see `boebot.running.driver.Driver`)."""
 
     def __init__(self, session: VehicleSession, task: Task) -> None:
         """Raises BoebotError where the brain's period is no whole number of steps."""
         self.session = session
         self.task = task
-        request = task.request
+        self.description, self.layout = task.board.robot, session.layout
+        self.link = self.identity = None
         self.period_ticks = whole_ticks(task.period_s, session.tick_s)
+        self.tick_s = session.tick_s
         self.period_s = self.period_ticks * session.tick_s
         count = len(session.readings())
-        self._direct = DirectRobot(request.robot, session.layout, count, session.tick_s, self.period_s, task.brain_seed)
+        self._direct = DirectRobot(self.description, self.layout, count, self.tick_s, self.period_s, task.seed)
         self.robot = self._direct.robot
         self.record = task.record
-        self.step_limit = step_limit(task)
+        self.step_limit = step_limit(task.request.step_timeout)
         self.late_steps = 0
         self._last_s = 0.0
-
-    def link_quality(self) -> None:
-        """See `boebot.running.driver.Driver`: there is no link."""
 
     def begin(self) -> None:
         """Nothing is to be made ready."""
@@ -44,12 +95,12 @@ class DirectDriver:
     def steps(self) -> Iterator[float]:
         """See `boebot.running.driver.Driver`."""
         session, robot, direct, n = self.session, self.robot, self._direct, self.period_ticks
-        tick_s, progress = session.tick_s, self.task.progress
+        tick_s = session.tick_s
         put_aside, command_given = self.record.append_readings, self.record.append_command
         is_recorded = not isinstance(self.record, Unrecorded)
-        end_s = self.task.seconds - tick_s / 2
+        end_s = self.task.request.seconds - tick_s / 2
         paced = self.task.request.realtime
-        started = next_progress = wall.perf_counter()
+        started = wall.perf_counter()
         left = right = 0.0
         tick, time_s = 0, 0.0
         sample = direct.sample(tick, session.readings())
@@ -57,9 +108,6 @@ class DirectDriver:
         while time_s < end_s:
             if paced and (ahead := time_s - (wall.perf_counter() - started)) > 0:
                 wall.sleep(ahead)
-            if progress is not None and wall.perf_counter() >= next_progress:
-                next_progress = wall.perf_counter() + PROGRESS_S
-                progress(time_s)
             direct.show(sample)
             shown = wall.perf_counter()
             yield time_s
@@ -84,21 +132,6 @@ class DirectDriver:
         """No motor signals any more, should time go on for others."""
         self.session.stop()
 
-    def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
+    def status(self) -> Status:
         """See `boebot.running.driver.Driver`."""
-        return result_so_far(
-            self.task,
-            self.session,
-            error,
-            elapsed_s,
-            robot=self.task.request.robot,
-            period=self.period_s,
-            tick=self.session.tick_s,
-            clock_offset=0.0,
-            late_steps=self.late_steps,
-            resets=0,
-            lost_frames=0,
-            bad_frames=0,
-            run_time=self._last_s,
-            layout=self.session.layout,
-        )
+        return Status(run_time=self._last_s, clock_offset=0.0, late_steps=self.late_steps)

@@ -1,95 +1,69 @@
 """What drives a robot in a run, behind one small interface: over the link to its board, or direct.
 
-A run is one loop (boebot.running.runner): each turn of `Driver.steps` shows the brain a new observation, the brain
-steps, and the next turn carries out its command. A brain sees no difference between drivers.
+Each turn of `Driver.steps` shows the brain a new observation, the brain steps, and the next turn carries out its
+command (boebot.running.loop). A brain sees no difference between drivers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple, Protocol
 
 from boebot.arguments import duration
-from boebot.boards import BoardRequest, BoardSession, VehicleSession
-from boebot.brain.composition import MadeOf
-from boebot.brains import LoadedBrain
+from boebot.boards import BoardSession, VehicleSession, WatchdogReset
+from boebot.description.robots import RobotDescription
+from boebot.devices.readings import Layout
 from boebot.errors import BoebotError
-from boebot.link.transport import BusFigures
-from boebot.record.brain_record import BrainNames, append_brain
-from boebot.record.record import Record
-from boebot.result import RunResult
+from boebot.link.link import Link
+from boebot.link.messages import Identity
 from boebot.robot import Robot
 from boebot.running.stepping import AT_LEISURE, StepLimit
 
-Progress = Callable[[float], None]
-"""Called now and then with the seconds of the run that have passed."""
-
 TICK_S = 0.01  # of the firmware's control tick
 PERIOD_MAXIMUM_S = 10.0  # of any brain
-PROGRESS_S = 0.1  # wall time between two reports of progress
+TIME_TO_LIVE_MS = 250  # of set-points, at least; longer brain periods live 2.5 periods
+TIME_TO_LIVE_LIMIT_MS = 2000
 
 
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """One run, as it was asked for."""
+class Status(NamedTuple):
+    """How a robot's run has gone so far; names and meaning are those of `boebot.record.run.Run`."""
 
-    brain: LoadedBrain
-    request: BoardRequest
-    on: str
-    """the board, as the user named it"""
-    seconds: float
-    """may be infinite"""
-    period_s: float
-    record: Record = field(default_factory=Record)
-    """where what happens goes"""
-    progress: Progress | None = None
-    step_timeout_s: float | None = None
-    """how long a step of the brain may take by the wall clock; None: the driver's choice"""
-    brain_seed: int
-    """of the brain's chance"""
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    """of the brain that were set for this run, by name"""
-    made_of: MadeOf | None = None
-    """the brain, if it is one of processes"""
-    unrealisable: str | None = None
-    """why sensors, period and line do not go together in time, where the run was forced all the same"""
-
-
-class LinkQuality(NamedTuple):
-    """Of the link to a board, since the run began."""
-
-    lost: int
-    """telemetry frames that never came"""
-    bad: int
-    """frames that came damaged"""
-    sessions_lost: int
-    resets: int
-    """of the board"""
-    round_trip_s: float | None
-    """median from question to answer; None: not known"""
-    bus: BusFigures | None = None
-    """of the CAN bus, if the board is on one"""
+    run_time: float
+    clock_offset: float
+    late_steps: int
+    resets: int = 0
+    lost_frames: int = 0
+    bad_frames: int = 0
+    sessions_lost: int | None = None
+    link: Mapping[str, Mapping[str, int]] = {}
+    notices: Sequence[str] = ()
+    watchdog_resets: Sequence[WatchdogReset] = ()
 
 
 class Driver(Protocol):
-    """Drives one robot through one run."""
+    """Drives one robot through one run.
 
-    @property
-    def session(self) -> BoardSession | VehicleSession:
-        """The robot as it was opened."""
+    Attributes:
+        session: the robot as it was opened.
+        robot: what the brain meets.
+        description: the robot as its board has it.
+        step_limit: how long a step of the brain may take.
+        period_s, tick_s: from step to step of the brain, and of the control ticks.
+        link: to its board; None: it has none.
+        identity: what the board says of itself; None: there is no board.
+        layout: where the readings of each device stand; None: they come by the link.
+    """
 
-    @property
-    def robot(self) -> Robot:
-        """What the brain meets."""
-
-    @property
-    def step_limit(self) -> StepLimit:
-        """How long a step of the brain may take."""
-
-    def link_quality(self) -> LinkQuality | None:
-        """How the link has done so far; None: there is none."""
+    session: BoardSession | VehicleSession
+    robot: Robot
+    description: RobotDescription
+    step_limit: StepLimit
+    period_s: float
+    tick_s: float
+    link: Link | None
+    identity: Identity | None
+    layout: Layout | None
 
     def begin(self) -> None:
         """Makes the robot ready to move.
@@ -109,70 +83,13 @@ class Driver(Protocol):
     def end(self) -> None:
         """Stops the motors and lets go of the robot, whatever happened before."""
 
-    def result(self, error: BaseException | None, elapsed_s: float) -> RunResult:
-        """The run's result so far; `elapsed_s`: its length by the wall clock; `error`: why it ended before its time."""
+    def status(self) -> Status:
+        """How the run has gone so far."""
 
 
-def result_so_far(
-    task: Task, session: BoardSession | VehicleSession, error: BaseException | None, elapsed_s: float, **own: Any
-) -> RunResult:
-    """A driver's `result`; `own`: what it alone knows."""
-    request, brain = task.request, task.brain
-    return RunResult(
-        brain=brain.name,
-        board=task.on,
-        description=session.description,
-        arena=request.arena,
-        seed=task.brain_seed,
-        error=error,
-        record=task.record,
-        world=session.arena,
-        steps=task.record.count("command"),
-        wall_time=elapsed_s,
-        counters=dict(session.counters()),
-        without=request.without,
-        imperfections=request.imperfections,
-        brain_names=BrainNames.of(brain.brain),
-        parameters=task.parameters,
-        made_of=task.made_of,
-        odometry_source=brain.odometry,
-        unrealisable=task.unrealisable,
-        **own,
-    )
-
-
-def keep_rows(driver: Driver, task: Task, time_s: float, *, ended: bool = False) -> None:
-    """Hands over what has happened up to that time of the run to be kept. `ended`: the run has ended.
-
-    Raises:
-        BoebotError: it cannot be kept.
-    """
-    gather_rows(driver, task, ended=ended)
-    task.record.keep(time_s)
-
-
-def gather_rows(driver: Driver, task: Task, *, ended: bool = False) -> None:
-    """Brings what has happened into the record, where it waits to be kept."""
-    append_brain(task.record, task.brain.brain, driver.robot)
-    if ended:
-        driver.robot.showing.end()
-    for row in driver.robot.showing.take():
-        task.record.append(*row)
-    task.record.put(driver.session.drain(ended=ended))
-
-
-def end_rows(driver: Driver, task: Task) -> BoebotError | None:
-    """The same at the end of a run. Returns why they cannot be kept."""
-    try:
-        keep_rows(driver, task, driver.result(None, 0.0).run_time, ended=True)
-    except BoebotError as error:
-        return error
-    return None
-
-
-def step_limit(task: Task, otherwise: StepLimit = AT_LEISURE) -> StepLimit:
-    """As the task says, or else."""
-    return otherwise if task.step_timeout_s is None else AT_LEISURE._replace(seconds=task.step_timeout_s)
+def step_limit(seconds: float | None, otherwise: StepLimit = AT_LEISURE) -> StepLimit:
+    """As the user wants it (s by the wall clock), or else."""
+    return otherwise if seconds is None else AT_LEISURE._replace(seconds=seconds)
 
 
 def check_period(period_s: float, most_s: float = PERIOD_MAXIMUM_S) -> None:
@@ -185,6 +102,22 @@ def check_period(period_s: float, most_s: float = PERIOD_MAXIMUM_S) -> None:
             f"a brain period of {duration(period_s)} is too long; expected at most {duration(most_s)}"
             + (meant if period_s / 1000 <= most_s else "")
         )
+
+
+def check_time_to_live(period_s: float, least_s: float = 0.0) -> int:
+    """The set-points' time to live (ms) at a brain period; at least `least_s`.
+
+    Raises:
+        BoebotError: the period is so long that the motors would stop between two steps, or telemetry so seldom.
+    """
+    check_period(period_s, TIME_TO_LIVE_LIMIT_MS / 2500)
+    time_to_live_ms = max(TIME_TO_LIVE_MS, math.ceil(2.5 * period_s * 1000), math.ceil(least_s * 1000))
+    if time_to_live_ms > TIME_TO_LIVE_LIMIT_MS:
+        raise BoebotError(
+            f"set-points would have to live {duration(least_s)}, so seldom does telemetry come; "
+            f"expected at most {duration(TIME_TO_LIVE_LIMIT_MS / 1000)}"
+        )
+    return time_to_live_ms
 
 
 def whole_ticks(period_s: float, tick_s: float) -> int:

@@ -29,7 +29,8 @@ from boebot.record.interventions import (
 from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.running.brain_parameters import set_parameters
-from boebot.running.driver import Driver, Task
+from boebot.running.driver import Driver
+from boebot.running.tasks import Task
 
 
 class Onlooker(Protocol):

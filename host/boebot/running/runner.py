@@ -1,42 +1,21 @@
-"""Runs a brain on a robot: `boebot.run(...)` does from a script or a notebook what the command `boebot run` does.
-
-One loop serves every robot, with a board or without (boebot.running.driver). On a robot in this process time stands
-still while the brain thinks, so that a run is a function of brain, robot, arena and seed.
-
-However a run ends (time up, an error in the brain, Ctrl-C, a port that vanishes, a low supply, a stop from elsewhere),
-the motors are stopped and the record is complete up to there.
-"""
+"""Runs brains on robots: `boebot.run(...)` and `boebot.run_together(...)` do from a script or a notebook what the
+command `boebot run` does. The loop of a run is in boebot.running.loop."""
 
 from __future__ import annotations
 
 import sys
-import time as wall
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
-from boebot import slips
-from boebot.boards import BoardSession, VehicleSession, is_live, open_board, open_vehicle
-from boebot.description.robots import RobotDescription, notices
+from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
-from boebot.record import figures
-from boebot.record.recording import Recording
-from boebot.record.run_folder import RunFolder
-from boebot.result import RunResult, TogetherResult
-from boebot.running import interrupts
-from boebot.running.board_driver import BoardDriver
-from boebot.running.brain_parameters import in_force
-from boebot.running.direct_driver import DirectDriver
-from boebot.running.driver import Driver, Progress, Task, end_rows, keep_rows
-from boebot.running.hands import Hands, Onlooker
-from boebot.running.sources import sources
-from boebot.running.stepping import StepTimes, StepWatch, step_once
-from boebot.running.tasks import Request, check_progress, expect
+from boebot.record.run_folder import RunFolder, locked
+from boebot.result import Result, RunResult, TogetherResult
+from boebot.running.loop import Progress, execute
+from boebot.running.tasks import Member, Request, expect
 
-UNENDED = "the brain went on after Ctrl-C, so the whole program was ended; expected no `except:` that catches it"
-Result = TypeVar("Result", RunResult, TogetherResult)
+__all__ = ["Member", "run", "run_together"]
 
 
 def run(
@@ -113,191 +92,88 @@ def run(
         pins=pins,
         parameters=parameters,
     )
-    return keep(viewed(request, progress, execute, view=view), out)
+    return cast(RunResult, _kept(request, progress, out, view=view))
 
 
-def viewed(
-    request: Request, progress: Progress | None, run_all: Callable[..., Result], *, view: bool
-) -> Callable[[RunFolder | None, Callable[[Result], None]], Result]:
-    """What `keep` does: the whole of a run, with a live view or without."""
-    if not isinstance(view, bool):
-        raise BoebotError(f"view is {view!r}; expected True or False")
-    if not view:
-        return lambda folder, put_away: run_all(request, progress, folder, put_away)
-    if not request.record:
-        raise BoebotError("a run that is not recorded cannot be viewed; expected record=True with view=True")
-
-    def work(folder: RunFolder | None, put_away: Callable[[Result], None]) -> Result:
-        from boebot.live.session import opened, run_viewed
-
-        with opened(lambda url: print(f"watch it: {url}", file=sys.stderr, flush=True)) as page:
-            again = lambda wanted: run_all(wanted, progress, folder, put_away, page)  # noqa: E731
-            return run_viewed(page, request, again, waits=False)
-
-    return work
-
-
-def execute(
-    request: Request,
+def run_together(
+    members: Sequence[Member],
+    arena: str | Path | None = None,
+    seconds: float = 60.0,
+    on: str | None = None,
+    seed: int = 1,
+    realtime: bool = False,
+    out: str | Path | None = None,
     progress: Progress | None = None,
-    folder: RunFolder | None = None,
-    put_away: Callable[[RunResult], None] | None = None,
-    onlooker: Onlooker | None = None,
-) -> RunResult:
-    """Runs the one robot of a request; its record goes to the folder as it comes. Once the run has begun every end of
-    it, even by an error, is a result: see `RunResult.error`. If the brain goes on after Ctrl-C, `put_away` gets the
-    result, in another thread, and then the process ends. An `onlooker` watches it, and may interfere.
+    step_timeout: float | None = None,
+    force_timing: bool = False,
+    pins: bool = False,
+    view: bool = False,
+) -> TogetherResult:
+    """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
+
+        boebot.run_together([Member(brain="wander"), Member(brain="chase.py", pose=(0.5, 0.5, 0))], seconds=30)
+
+    Args:
+        members: the robots.
+        arena, seconds, on, seed, realtime, step_timeout, force_timing, pins, view: as of `boebot.run`.
+        out: folder for a picture and a page of all robots, and for a folder of files per robot.
+        progress: called with the run's time so far (s), about ten times a second.
+
+    Returns:
+        A result per robot, and the figures common to them.
 
     Raises:
-        BoebotError: the run could not begin.
+        BoebotError: whatever the user can mend: bad input, no free place, an error in a brain (with its robot and
+            place). The record up to there is written to `out` all the same.
+        KeyboardInterrupt: Ctrl-C; all motors stopped and the record written.
     """
-    check_progress(progress)
-    with interrupts.heard(), ExitStack() as stack:
-        (task,) = request.tasks()
-        stack.enter_context(in_force(task.brain, task.parameters))
-        recording = Recording(1, recorded=request.record)
-        task = replace(task, progress=progress, record=recording.records[0])
-        opening = open_board if task.request.robot.has_board else open_vehicle
-        session = opening(task.on, task.request)
-
-        def unended(result: RunResult) -> None:
-            recording.end([result])
-            result.notices.append(UNENDED)
-            if put_away is not None:
-                put_away(result)
-
-        try:
-            driver = driver_of(session, task)
-            waits = session.arena is not None and not request.realtime
-            begun = [driver.result(None, 0.0)]
-            recording.begin(folder, begun, sources(request, [task]), request.said([task]), waits=waits)
-            hands = None if onlooker is None else Hands(driver, task, 0, onlooker)
-            if onlooker is not None and hands is not None:
-                onlooker.begin([hands], begun)
-            result = _drive(driver, task, unended, hands)
-            result.error = recording.end([result]) or result.error
-            return result
-        finally:
-            session.close()
+    request = Request(
+        members=members,
+        arena=arena,
+        on=on,
+        seconds=seconds,
+        seed=seed,
+        realtime=realtime,
+        step_timeout=step_timeout,
+        force_timing=force_timing,
+        pins=pins,
+    )
+    result = _kept(request, progress, out, view=view, together=True)
+    return cast(TogetherResult, result)
 
 
-def keep(work: Callable[[RunFolder | None, Callable[[Result], None]], Result], out: str | Path | None) -> Result:
-    """Does the whole of a run, and writes what came of it to the folder `out`, if there is one. `work` gets the folder,
-    and what to do with a result that it cannot return, for the brain goes on after Ctrl-C.
+def _kept(
+    request: Request, progress: Progress | None, out: str | Path | None, *, view: bool, together: bool = False
+) -> Result:
+    """Does the whole of a run, and writes what came of it to the folder `out`, if there is one. `together`: the result
+    is that of several robots, also where there is one.
 
     Raises:
         BoebotError: the folder cannot be written to; else whatever ended the run before its time, once that is written.
     """
-
     expect("out", out, "a folder or None", str, Path, type(None))
-    place = None if out is None else Path(out).absolute()  # a brain may change to another folder
-
-    def put_away(unended: Result) -> None:
-        print(f"boebot: interrupted; {UNENDED}", file=sys.stderr)
-        if place is not None:
-            unended.save(place)
-
-    if place is None:
-        return _whole(work(None, put_away))
-    with RunFolder(place) as folder:
-        result = work(folder, put_away)
-        try:
-            with interrupts.ignored():
+    if not isinstance(view, bool):
+        raise BoebotError(f"view is {view!r}; expected True or False")
+    if view and not request.record:
+        raise BoebotError("a run that is not recorded cannot be viewed; expected record=True with view=True")
+    with locked(None if out is None else Path(out)) as folder:
+        result: Result = _viewed(request, progress, folder) if view else execute(request, progress, folder)
+        if together and isinstance(result, RunResult):
+            result = TogetherResult(robots=[result], error=result.error)
+        if folder is not None:
+            try:
                 result.save(folder.path)
-        except BoebotError as unsaved:
-            if result.error is None:
-                raise
-            result.error.add_note(str(unsaved))
-    return _whole(result)
-
-
-def _whole(result: Result) -> Result:
-    """Raises whatever ended the run before its time."""
+            except BoebotError as unsaved:
+                if result.error is None:
+                    raise
+                result.error.add_note(str(unsaved))
     if result.error is not None:
         raise result.error
     return result
 
 
-def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
-    """Who drives that robot: over the link to its board, or direct.
+def _viewed(request: Request, progress: Progress | None, folder: RunFolder | None) -> Any:
+    from boebot.live.session import opened, run_viewed
 
-    Raises:
-        BoebotError: it cannot be driven so.
-    """
-    if task.request.robot.has_board:
-        driver: Driver = _board_driver(cast(BoardSession, session), task)
-    else:
-        driver = DirectDriver(cast(VehicleSession, session), task)
-    driver.robot.showing.is_kept = True
-    return driver
-
-
-def _board_driver(session: BoardSession, task: Task) -> Driver:
-    try:
-        return BoardDriver(session, task)
-    except BoebotError as error:
-        for sentence in (*session.notes(), *figures.hang_sentences(session.watchdog_resets())):
-            error.add_note(sentence)
-        raise
-
-
-def _drive(driver: Driver, task: Task, unended: Callable[[RunResult], None], hands: Hands | None) -> RunResult:
-    """The whole run, from the robot made ready to its result; `unended` gets one that cannot be returned; `hands`: who
-    interferes with it."""
-    error: BaseException | None = None
-    times = StepTimes()
-    time_s = 0.0
-    started = wall.perf_counter()
-
-    def keep_due() -> None:
-        if task.record.is_due():
-            keep_rows(driver, task, time_s)
-
-    def take_over() -> None:
-        driver.end()
-        end_rows(driver, task)
-        unended(result_of(driver, task, times, KeyboardInterrupt(), wall.perf_counter() - started))
-
-    try:
-        driver.begin()
-        started = wall.perf_counter()
-        with StepWatch(driver.step_limit, take_over, keep_due) as watch:
-            for time_s in driver.steps():
-                keep_due()
-                if task.brain.is_over:
-                    break
-                if hands is not None:
-                    hands.before_step(time_s)
-                step_once(driver.robot, task.brain, watch, times)
-                if hands is not None:
-                    hands.after_step()
-                    hands.onlooker.look(time_s)
-    except (BoebotError, KeyboardInterrupt) as caught:
-        error = caught
-    finally:
-        elapsed_s = wall.perf_counter() - started
-        with interrupts.ignored():  # a second Ctrl-C must not keep the motors running
-            driver.end()
-            unkept = end_rows(driver, task)
-            task.brain.end()
-    error = error or unkept
-    return result_of(driver, task, times, error, elapsed_s)
-
-
-def result_of(driver: Driver, task: Task, times: StepTimes, error: BaseException | None, elapsed_s: float) -> RunResult:
-    """The driver's result, with how long the brain's steps took, what of the run was forced, and what a user should
-    know of the brain."""
-    result = driver.result(error, elapsed_s)
-    result.notices += [*task.brain.notices, *driver.robot.showing.notices]
-    main = task.brain.main
-    if times.long and slips.sleeps(task.brain.step if main is None else main.function):
-        result.notices.append(slips.of_sign("sleep"))
-    result.longest_step, result.long_steps = times.longest, times.long
-    request = task.request
-    if not is_live(task.on):
-        result.notices += notices(request.robot, request.without)
-    elif request.arena is not None:
-        result.notices.append(f"arena {request.arena} changes nothing: the robot at {task.on} is where it stands")
-    if task.unrealisable is not None:
-        result.notices.append(f"forced: {task.unrealisable}")
-    return result
+    with opened(lambda url: print(f"watch it: {url}", file=sys.stderr, flush=True)) as page:
+        return run_viewed(page, request, lambda wanted: execute(wanted, progress, folder, page), waits=False)

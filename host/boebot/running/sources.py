@@ -15,8 +15,7 @@ from pathlib import Path
 
 from boebot import brains
 from boebot.errors import BoebotError, as_utf8
-from boebot.running.driver import Task
-from boebot.running.tasks import Request
+from boebot.running.tasks import Request, Task
 
 
 def sources(request: Request, tasks: Sequence[Task]) -> dict[str, bytes]:

@@ -5,15 +5,11 @@ run that is as fast as possible only has to notice an endless loop; in real time
 let the robot run into its dead-man. Shorter overruns are counted and the run goes on: the set-points outlive two missed
 periods, and a computer that was busy for a moment is no error in the brain.
 
-A step that goes on for half a second after Ctrl-C, or after another one, catches what should end it, or waits where
-nothing wakes it. The second thread then does what is left to do, which is to stop the motors and write the record, and
-ends the process.
+After Ctrl-C the run ends with the step, also where the brain has caught it (boebot.running.interrupts).
 """
 
 from __future__ import annotations
 
-import contextlib
-import math
 import os
 import signal
 import sys
@@ -27,17 +23,13 @@ from typing import Any, NamedTuple
 from boebot import brains, slips
 from boebot.brain.pausable_thread import leave_copy, throw
 from boebot.brains import LoadedBrain
-from boebot.errors import BoebotError, BrainError
+from boebot.errors import BrainError
 from boebot.robot import Command, Robot
 from boebot.running import interrupts
-from boebot.running.interrupts import wishes
 
 STEP_LIMIT_S = 10.0  # for a step, by the wall clock, where nothing waits for it
 _LOOKS = 10  # of the watching thread while a step may last
 _LOOK_S = 0.1  # from one look to the next at most
-_LASTS_S = 0.5  # while a step lasts longer, what happened before it is put into the record
-_GRACE_S = 0.5  # that a step has to end after Ctrl-C
-_FOREVER_S = 1e6
 _WAKE: Any = getattr(signal, "SIGURG", None)  # what nobody minds; it ends a wait of the main thread
 
 
@@ -141,32 +133,15 @@ class StepWatch:
     thread; elsewhere it ends when that call does.
     """
 
-    def __init__(
-        self,
-        limit: StepLimit,
-        take_over: Callable[[], None] | None = None,
-        keep_due: Callable[[], None] | None = None,
-    ) -> None:
-        """
-        Args:
-            limit: may be changed between two steps.
-            take_over: does what is left to do in the run, in the watching thread, if a step goes on after Ctrl-C; the
-                process ends then. None: nothing is left to do.
-            keep_due: puts what happened before a step that lasts into the record, in the watching thread, while the
-                step goes on. None: there is no record.
-        """
+    def __init__(self, limit: StepLimit) -> None:
+        """`limit`: may be changed between two steps."""
         self.limit = limit
-        self._take_over = take_over
-        self._keep_due = keep_due
-        self._wishes = 0  # to end, before the step
-        self._unheard_s = math.inf  # since when there is one that the main thread has not heard of
         self._thread = 0  # which the steps run in
         self._process = os.getpid()
         self._count = 0  # of steps that have begun
         self._inside = False
         self._thrown = False
         self._lock = threading.Lock()  # held for each change of the last two
-        self._taken_over = False
         self._ended = threading.Event()
         self._watcher = threading.Thread(target=self._watch, name="step watch", daemon=True)
         self._wakes = False  # the thread can be woken from a wait
@@ -181,19 +156,18 @@ class StepWatch:
         self._thread = threading.get_ident()
         self._wakes = _WAKE is not None and threading.current_thread() is threading.main_thread()
         if self._wakes:
-            self._handler = signal.signal(_WAKE, self._woken) or signal.SIG_DFL
+            self._handler = signal.signal(_WAKE, lambda number, frame: None) or signal.SIG_DFL
         self._watcher.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with interrupts.ignored():
-            self._leave()
-            self._ended.set()
-            self._watcher.join()
-            if self._wakes:
-                signal.signal(_WAKE, self._handler)  # type: ignore[arg-type]
+        self._leave()
+        self._ended.set()
+        self._watcher.join()
+        if self._wakes:
+            signal.signal(_WAKE, self._handler)  # type: ignore[arg-type]
 
     def call(self, step: Callable[[Robot], object], robot: Robot) -> object:
         """What `step(robot)` returns.
@@ -204,13 +178,12 @@ class StepWatch:
         """
         try:
             self._count += 1
-            self._wishes = wishes.count
             self._inside = True
             answer = step(robot)
         finally:
             leave_copy(self._process)
             self._leave()
-            if self._wakes and wishes.count != self._wishes:  # also where the brain has caught it
+            if interrupts.first is not None:  # also where the brain has caught it
                 raise KeyboardInterrupt
         if self._thrown:  # and the brain has caught it
             raise _OverdueError
@@ -221,8 +194,6 @@ class StepWatch:
         while True:
             try:
                 with self._lock:
-                    if self._taken_over:
-                        _stand_by()
                     self._inside = False
                     if self._thrown:
                         throw(self._thread, None)
@@ -235,23 +206,13 @@ class StepWatch:
     def _watch(self) -> None:
         seen, looks = -1, 0
         while not self._ended.wait(look_s := min(self.limit.seconds / _LOOKS, _LOOK_S)):
-            if self._inside and self._wakes and self._goes_on():
-                self._end_process()
             if not self._inside or self._count != seen or self._in_debugger():
                 seen, looks = self._count, 0
                 continue
             looks += 1
-            if looks * look_s >= _LASTS_S:
-                self._keep()
             if looks * look_s >= self.limit.seconds * (1 - 1e-9):
                 looks = 0  # a brain that catches it is asked again
                 self._interrupt()
-
-    def _keep(self) -> None:
-        with self._lock:  # the step cannot end meanwhile
-            if self._inside and self._keep_due is not None:
-                with contextlib.suppress(BoebotError):  # the run's next turn meets it again
-                    self._keep_due()
 
     def _interrupt(self) -> None:
         with self._lock:
@@ -260,33 +221,6 @@ class StepWatch:
                 throw(self._thread, _OverdueError)
                 if self._wakes:
                     signal.pthread_kill(self._thread, _WAKE)
-
-    def _goes_on(self) -> bool:
-        """The step was asked to end, and does not."""
-        asked, now_s = wishes.count - self._wishes, wall.monotonic()
-        if asked:
-            return asked > 1 or now_s - wishes.noted_s > _GRACE_S
-        self._unheard_s = min(self._unheard_s, now_s) if interrupts.unheard() else math.inf
-        return now_s - self._unheard_s > _GRACE_S
-
-    def _end_process(self) -> None:
-        """Stops the brain where it is and does the rest of the run."""
-        with self._lock:
-            if not self._inside:
-                return
-            self._taken_over = True
-        signal.pthread_kill(self._thread, _WAKE)
-        interrupts.wait_for_another()
-        try:
-            if self._take_over is not None:
-                self._take_over()
-        finally:
-            interrupts.leave(interrupts.exit_code())
-
-    def _woken(self, number: int, frame: FrameType | None) -> None:
-        """A signal that ends a wait of the step, or all of it."""
-        if self._taken_over:
-            _stand_by()
 
     def _in_debugger(self) -> bool:
         """Somebody traces the step line by line, or a thread of the brain."""
@@ -297,11 +231,3 @@ class StepWatch:
                     return True
                 frame = frame.f_back
         return False
-
-
-def _stand_by() -> None:
-    """Does nothing until the process ends."""
-    for number in interrupts.SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
-    while True:
-        wall.sleep(_FOREVER_S)

@@ -5,23 +5,23 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from boebot import brains
 from boebot.boards import DIRECT, BoardRequest, default_board, is_live
-from boebot.brain.composition import described
+from boebot.brain.composition import MadeOf, described
 from boebot.brains import LoadedBrain
+from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError, NotRealisableError
 from boebot.guests import CHECKS, guests
 from boebot.imperfections import checked
-from boebot.robot import Equipment
-from boebot.running.board_driver import check_time_to_live
+from boebot.record.record import Record
 from boebot.running.brain_parameters import in_force, parameters
-from boebot.running.driver import Task
+from boebot.running.driver import check_time_to_live
 
 DEFAULT_PERIOD = 0.05  # s
 _OF_ONE = {"pose", "period", "without", "parameters", "imperfections"}
@@ -147,11 +147,11 @@ class Request(_NamesFiles):
             "members": [
                 {
                     "brain": _brain_file(task.brain),
-                    "pose": task.request.start_pose,
-                    "seed": task.brain_seed,
+                    "pose": task.board.pose,
+                    "seed": task.seed,
                     "period": task.period_s,
-                    "without": list(task.request.without),
-                    "imperfections": dict(task.request.imperfections),
+                    "without": list(task.board.without),
+                    "imperfections": dict(task.board.imperfections),
                 }
                 for task in tasks
             ],
@@ -170,12 +170,34 @@ class Request(_NamesFiles):
                 tasks.append(_task(member, self, number))
             except BoebotError as error:
                 raise of_robot(error, number, len(self.members)) from None
-        kind = default_board([task.request.robot for task in tasks]) if self.on is None else self.on
-        if self.pins and (is_live(kind) or not any(task.request.robot.has_board for task in tasks)):
+        kind = default_board([task.board.robot for task in tasks]) if self.on is None else self.on
+        if self.pins and (is_live(kind) or not any(task.board.robot.has_board for task in tasks)):
             raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
-        if len(tasks) == 1:
-            return [replace(tasks[0], on=kind)]
-        return [replace(task, on=kind if task.request.robot.has_board else DIRECT) for task in tasks]
+        for task in tasks:
+            task.on = kind if len(tasks) == 1 or task.board.robot.has_board else DIRECT
+        return tasks
+
+
+@dataclass(kw_only=True)
+class Task:
+    """The run of one robot: its `Member` of a request, checked and found."""
+
+    request: Request
+    brain: LoadedBrain
+    board: BoardRequest
+    on: str = ""
+    """the board, as the user named it"""
+    period_s: float
+    seed: int
+    """of the brain's chance"""
+    record: Record = field(default_factory=Record)
+    """where what happens goes"""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """of the brain that were set for this run, by name"""
+    made_of: MadeOf | None = None
+    """the brain, if it is one of processes"""
+    unrealisable: str | None = None
+    """why sensors, period and line do not go together in time, where the run was forced all the same"""
 
 
 def _brain_file(loaded: LoadedBrain) -> str | None:
@@ -214,20 +236,18 @@ def _task(member: Member, request: Request, number: int) -> Task:
         realtime=request.realtime,
         record=request.record,
         pins=request.pins,
-        start_pose=_pose(member.pose),
+        pose=_pose(member.pose),
         without=_names("without", member.without),
         imperfections={} if member.imperfections is None else checked(member.imperfections),
     )
     return Task(
         brain=loaded,
-        request=board,
-        on="",
-        seconds=request.seconds,
+        request=request,
+        board=board,
         period_s=period_s,
-        step_timeout_s=request.step_timeout,
         parameters={name: now[name] for name in given},
         made_of=made_of,
-        brain_seed=int(request.seed) + number - 1 if member.seed is None else int(member.seed),
+        seed=int(request.seed) + number - 1 if member.seed is None else int(member.seed),
         unrealisable=None if finding is None else finding.why,
     )
 

@@ -22,7 +22,7 @@ from boebot.brain import Brain, Utility
 from boebot.cognition import BatteryLevel, contact, near
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
 from boebot_course.trials import Trial, decisions

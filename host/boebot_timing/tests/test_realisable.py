@@ -12,7 +12,7 @@ import boebot
 from boebot import Member
 from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import BoebotError, NotRealisableError
-from boebot.running import runner
+from boebot.running import loop
 from boebot_timing import realisable
 from boebot_timing.realisable import BoardTimes, judge, telemetry_ticks
 from boebot_timing.table import SensorRow, Table, TaskRow
@@ -149,7 +149,7 @@ def test_run_over_a_slow_line_is_refused_and_takes_the_longer_period_by_force(mo
         peer.telemetry_period = 10
         return InProcess(peer)
 
-    monkeypatch.setattr(runner, "open_board", slow_board)
+    monkeypatch.setattr(loop, "open_world", slow_board)
     robot = slow_robot()
     with pytest.raises(NotRealisableError, match=r"telemetry, .* expected a period of 100 ms or a line of 19200 bit/s"):
         boebot.run(lambda robot: None, robot=robot, period=0.05, seconds=1)

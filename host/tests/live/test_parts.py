@@ -23,8 +23,8 @@ from boebot.live.pace import Pace
 from boebot.record.interventions import Arm, Deed, Hand, Parameter, Place, Release, Stop, Tally
 from boebot.record.record import Record
 from boebot.running.brain_parameters import bounds, meaning, set_parameters, sliders
+from boebot.running.loop import execute
 from boebot.running.tasks import Member, Request
-from boebot.running.together import execute_together
 
 ALL = frozenset({"pause", "step", "speed", "restart", "drag", "hand", "parameters"})
 
@@ -218,7 +218,7 @@ def test_first_chunk_has_all_robots_from_their_beginning(monkeypatch: pytest.Mon
     brain.write_text("def step(robot):\n    if robot.time == 0:\n        robot.sketch('once', points=[(0, 0)])\n")
     members = [Member(brain=str(brain), robot="roller", pose=(-0.8, 0.0, 0.0)), Member(brain="wander")]
     view = LiveView(lambda url: None, speed=3.0)
-    result = execute_together(Request(members=members, arena="room", seconds=2.0), onlooker=view)
+    result = execute(Request(members=members, arena="room", seconds=2.0), onlooker=view)
     view.close()
     assert result.error is None
     for rows in chunks[0]:

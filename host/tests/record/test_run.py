@@ -20,7 +20,7 @@ from boebot.live.live_view import LiveView
 from boebot.record import record
 from boebot.record.run_folder import RunFolder
 from boebot.result import RunResult, read_run
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot.view.tables import write_summary
 

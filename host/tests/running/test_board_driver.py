@@ -17,7 +17,7 @@ from boebot.errors import BoardError
 from boebot.link.link import Link
 from boebot.link.ports import open_serial
 from boebot.robot import Robot
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from lines import line
 from peer import Peer, Pty, pty

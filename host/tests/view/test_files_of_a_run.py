@@ -22,7 +22,7 @@ from boebot.errors import BoebotError
 from boebot.link import frame, messages
 from boebot.result import RunResult, read_run
 from boebot.running import board_driver as board
-from boebot.running import runner
+from boebot.running import loop
 from boebot.view import picture, replay, scene, tables
 from peer import InProcess, Peer
 
@@ -41,7 +41,7 @@ def result() -> RunResult:
             robot.drive(-0.2, 0.2)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+        patch.setattr(loop, "open_world", lambda url, requests: InProcess(peer))
         return boebot.run(step, seconds=30)
 
 
@@ -204,7 +204,7 @@ def test_text_cannot_break_out_of_the_page(result: RunResult, tmp_path: Path) ->
 def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = InProcess(Peer())
     session.drain = lambda **_: {}  # type: ignore[method-assign]
-    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: session)
     result = boebot.run("wander", seconds=5, out=tmp_path)
     assert result.odometry_error is None
     content = content_of((tmp_path / "replay.html").read_text())
@@ -216,7 +216,7 @@ def test_run_without_truth_is_drawn_by_odometry(tmp_path: Path, monkeypatch: pyt
 
 def test_run_that_never_heard_of_its_board_still_leaves_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = InProcess(Peer())
-    monkeypatch.setattr(runner, "open_board", lambda url, request: session)
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: session)
     monkeypatch.setattr(board, "configure", lambda link, robot: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         boebot.run("wander", seconds=5, out=tmp_path)

@@ -30,7 +30,7 @@ from boebot.devices.drawing import circle
 from boebot.record import columns
 from boebot.record.truth import Pose
 from boebot.result import RunResult, TogetherResult, robots_of
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot.view import save_for_foxglove
 from command import boebot as command

@@ -26,7 +26,7 @@ from boebot.description.outlines import way_out
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.record import overview
 from boebot.result import RunResult
-from boebot.running import runner
+from boebot.running import loop
 from boebot.view import picture, scene, style
 from boebot.view.painter import draw_arena, draw_robot, frame, ghost_times, legend_entries, paint
 from peer import InProcess, Peer
@@ -157,7 +157,7 @@ def test_ghosts_of_a_gate_show_that_it_opens() -> None:
 
 def run_of(robot: str, monkeypatch: pytest.MonkeyPatch, plan: FloorPlan | None = None, seconds: float = 2) -> RunResult:
     peer = Peer(load_robot(robot))
-    monkeypatch.setattr(runner, "open_board", lambda url, request: InProcess(peer))
+    monkeypatch.setattr(loop, "open_world", lambda url, requests: InProcess(peer))
     result = boebot.run(lambda it: it.drive(0.5, 0.45), robot=robot, seconds=seconds)
     if plan is not None:
         result.plan = plan

@@ -11,8 +11,8 @@ from boebot.arenas import Arena, ArenaDescription, Disc, Moving, Polygon, Wall, 
 from boebot.arenas.floor_plan import SAMPLES_MAXIMUM, Solid, floor_plan, path_end, poses_of
 from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
-from sim_bridge.sessions.with_board import open_native
-from sim_bridge.sessions.without_board import open_direct
+from sim_bridge.sessions.session import DirectSession
+from sim_bridge.sessions.world import NATIVE, direct_world, open_on
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import Vehicle, arsim
 from sim_bridge.view import View
@@ -63,7 +63,7 @@ def test_poses_go_on_over_full_turns() -> None:
 
 def test_a_run_tells_of_its_own_time() -> None:
     """From the first recorded instant to the last, with a board and without."""
-    session = open_native(BoardRequest(robot=load_robot("shieldbot"), arena="showcase"))
+    session = open_on(NATIVE, BoardRequest(robot=load_robot("shieldbot"), arena="showcase"))
     try:
         session.transport.read(2.0, 2.0)
         truth = session.truth()
@@ -72,7 +72,8 @@ def test_a_run_tells_of_its_own_time() -> None:
     assert truth is not None and truth.plan.name == "showcase"
     cart = truth.plan.moving[0]
     assert (cart.time[0], cart.time[-1]) == (truth.time[0], truth.time[-1]) and cart.time[-1] > 1.9
-    vehicle = open_direct(BoardRequest(robot=load_robot("arsim"), arena="showcase"))
+    vehicle = direct_world([BoardRequest(robot=load_robot("arsim"), arena="showcase")]).sessions[0]
+    assert isinstance(vehicle, DirectSession)
     for _ in range(100):
         vehicle.step(0.1, 0.1)
     truth = vehicle.truth()

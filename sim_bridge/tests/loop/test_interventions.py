@@ -19,18 +19,16 @@ from boebot.boards import (
     BoardRequest,
     BoardSession,
     LiveSession,
-    SharedWorld,
     VehicleSession,
-    open_board,
-    open_together,
-    open_vehicle,
+    World,
+    open_world,
 )
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
 from boebot.record.truth import shifts, track_of
 from boebot.result import RunResult
 from boebot.robot import Robot
-from boebot.running import runner, together
+from boebot.running import loop
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, scripted, square
@@ -238,22 +236,12 @@ def sessions(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Of the run under way."""
     opened: list[Any] = []
 
-    def board(url: str, request: BoardRequest) -> BoardSession:
-        opened[:] = [open_board(url, request)]
-        return opened[0]  # type: ignore[no-any-return]
-
-    def vehicle(url: str, request: BoardRequest) -> VehicleSession:
-        opened[:] = [open_vehicle(url, request)]
-        return opened[0]  # type: ignore[no-any-return]
-
-    def world(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
-        shared = open_together(url, requests)
+    def world(url: str, requests: Sequence[BoardRequest]) -> World:
+        shared = open_world(url, requests)
         opened[:] = shared.sessions
         return shared
 
-    monkeypatch.setattr(runner, "open_board", board)
-    monkeypatch.setattr(runner, "open_vehicle", vehicle)
-    monkeypatch.setattr(together, "open_together", world)
+    monkeypatch.setattr(loop, "open_world", world)
     return opened
 
 

@@ -12,13 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
 from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import EmulatedBoard
-from sim_bridge.sessions.opening import alone
-from sim_bridge.sessions.with_board import SimTransport
+from sim_bridge.sessions.session import SimTransport
+from sim_bridge.sessions.world import NATIVE, open_on
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import MS, US, Scripted, add_scripted, arena_of, scripted, scripts, square
 
@@ -95,11 +96,12 @@ def test_closed_transport_says_so() -> None:
 def test_paced_transport_keeps_to_the_wall_clock() -> None:
     import time
 
-    transport = SimTransport(robot := scripted().robot, "script", alone(robot.sim, paced=True))
     start = time.monotonic()
+    session = open_on(NATIVE, BoardRequest(robot=load_robot("shieldbot"), arena="empty", realtime=True))
     for _ in range(10):
-        transport.read(0.01)
+        session.transport.read(0.01)
     assert time.monotonic() - start >= 0.095
+    session.close()
 
 
 # ---- the same however it is cut --------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from boebot.devices.light import LightSensor
 from boebot.devices.servo import ContinuousServo
 from boebot.devices.turret import PositionServo
 from boebot.errors import RobotError
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from sim_bridge._core import ffi
 from sim_bridge.devices import analog_infrared as analog_infrared_model

@@ -15,24 +15,24 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import boebot
 from boebot import cli
-from boebot.boards import BoardRequest, BoardSession, VehicleSession, open_board, open_vehicle
+from boebot.boards import BoardRequest, World, open_world
 from boebot.errors import BoebotError, BrainError
 from boebot.record.record import KINDS
 from boebot.result import RunResult, read_run
 from boebot.robot import Robot
-from boebot.running import runner
-from boebot.running.runner import execute
+from boebot.running import loop
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
-from sim_bridge.sessions.with_board import SimSession
-from sim_bridge.sessions.without_board import DirectSession
+from sim_bridge.sessions.session import DirectSession, SimSession
 
 pytestmark = pytest.mark.unsanitized
 
@@ -64,40 +64,35 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Tells of each run whether the robot stands still once its driver has let go of it."""
     stopped: list[bool] = []
 
-    def board(url: str, request: BoardRequest) -> BoardSession:
-        session = open_board(url, request)
-        assert isinstance(session, SimSession)
-        close = session.close
+    def look(session: SimSession) -> None:
+        session.transport.read(1.0, 1.0)  # wheels that nothing drives have stopped by then
+        truth = session.truth()
+        assert truth is not None and truth.left_speed is not None
+        stopped.append(bool(abs(truth.left_speed[-1]) < 1e-3 < abs(truth.left_speed).max()))
 
-        def look_and_close() -> None:
-            session.transport.read(1.0, 1.0)  # wheels that nothing drives have stopped by then
-            truth = session.truth()
-            assert truth is not None and truth.left_speed is not None
-            stopped.append(bool(abs(truth.left_speed[-1]) < 1e-3 < abs(truth.left_speed).max()))
-            close()
-
-        session.close = look_and_close  # type: ignore[method-assign]
-        return session
-
-    def vehicle(url: str, request: BoardRequest) -> VehicleSession:
-        session = open_vehicle(url, request)
-        assert isinstance(session, DirectSession)
+    def opened(url: str, requests: Sequence[BoardRequest]) -> World:
+        world = open_world(url, requests)
+        (session,) = world.sessions
+        assert isinstance(session, SimSession | DirectSession)
         calls: list[str] = []
-        for name in ("step", "stop", "close"):
-            spy(session, name, calls)
+        if isinstance(session, DirectSession):
+            for name in ("step", "stop", "close"):
+                spy(session, name, calls)
         close = session.close
 
         def look_and_close() -> None:
-            stopped.append(calls.count("step") > 10 and calls[-1] == "stop")
+            if isinstance(session, SimSession):
+                look(session)
+            else:
+                stopped.append(calls.count("step") > 10 and calls[-1] == "stop")
             close()
 
         session.close = look_and_close  # type: ignore[method-assign]
-        return session
+        return world
 
     for kind in ("picture", "replay"):  # tested elsewhere, and they take long
         monkeypatch.setattr(f"boebot.view.{kind}.write", lambda result, path: path.touch())
-    monkeypatch.setattr(runner, "open_board", board)
-    monkeypatch.setattr(runner, "open_vehicle", vehicle)
+    monkeypatch.setattr(loop, "open_world", opened)
     return stopped
 
 
@@ -363,7 +358,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     for name in (
         "boebot.running.board_driver.wall",
         "boebot.running.direct_driver.wall",
-        "sim_bridge.sessions.opening.time",
+        "sim_bridge.sessions.world.time",
     ):
         monkeypatch.setattr(name, clock)
     return clock
@@ -380,8 +375,9 @@ def late(clock: Clock, seconds: float) -> Callable[[Robot], None]:
     return step
 
 
-def paced(brain: object, **options: float) -> RunResult:
-    return execute(Request.single(brain, arena="empty", seconds=1.0, realtime=True, **options))  # type: ignore[arg-type]
+def paced(brain: object, **options: Any) -> RunResult:
+    result: RunResult = execute(Request.single(brain, arena="empty", seconds=1.0, realtime=True, **options))
+    return result
 
 
 def test_run_in_real_time_takes_its_time(clock: Clock) -> None:

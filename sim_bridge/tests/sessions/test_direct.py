@@ -23,7 +23,7 @@ from boebot.devices.line import ReflectanceSensor
 from boebot.devices.whisker import TouchWhisker
 from boebot.errors import BoardError, BrainError
 from boebot.robot import Observation, Robot
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 
 pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
@@ -84,7 +84,7 @@ def test_same_seed_same_run() -> None:
 def test_infrared_reads_the_notes_values_at_a_wall() -> None:
     """Straight at a flat wall from 0.30 m: 0.411 by (3.12) to (3.14)."""
     ahead = InfraredProximity(position_m=(0.2, 0.0), heading_rad=0.0)
-    request = BoardRequest(robot=changed(infrared_left=ahead), arena="arsim", noise=False, start_pose=(1.3, 0.0, 0.0))
+    request = BoardRequest(robot=changed(infrared_left=ahead), arena="arsim", noise=False, pose=(1.3, 0.0, 0.0))
     session = open_vehicle("direct", request)
     values = session.readings()
     assert values[session.layout["infrared_left"].start] == pytest.approx(0.411, abs=0.001)

@@ -20,9 +20,8 @@ from boebot.record.record import Record
 from boebot.record.truth import lateness
 from boebot_course.recorder import Recorder
 from sim_bridge._core import ffi, lib
-from sim_bridge.sessions.opening import alone, truth_of
-from sim_bridge.sessions.without_board import DirectSession
-from sim_bridge.sim import Sim
+from sim_bridge.sessions.session import DirectSession, truth_of
+from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
 from sim_bridge.view import View
@@ -136,7 +135,7 @@ def test_without_a_record_it_is_told_by_the_path() -> None:
 
 def test_a_session_tells_it() -> None:
     sim = Sim(press())
-    session = DirectSession(sim.add(None, load_robot("arsim")), alone(sim))
+    session = DirectSession(sim.add(None, load_robot("arsim")), SimRobot.wait)
     seen = []
     for step in range(700):
         session.step(*((1.0, 1.0) if step > 300 else (0.0, 0.0)))
@@ -149,7 +148,7 @@ def test_record_does_not_depend_on_how_often_it_is_brought_up_to_date() -> None:
     records = []
     for often in (True, False):
         sim = Sim(press())
-        session, record = DirectSession(sim.add(None, load_robot("arsim")), alone(sim)), Record()
+        session, record = DirectSession(sim.add(None, load_robot("arsim")), SimRobot.wait), Record()
         for step in range(700):
             session.step(*((1.0, 1.0) if step > 300 else (0.0, 0.0)))
             if often:

@@ -20,7 +20,7 @@ from boebot.brains import load_brain
 from boebot.cli.new import FROM_TOP
 from boebot.errors import BrainError
 from boebot.result import RunResult
-from boebot.running.runner import execute
+from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from sim_bridge.batch import Batch
 from sim_bridge.vehicle import vehicle_model

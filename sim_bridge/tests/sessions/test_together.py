@@ -19,20 +19,20 @@ import pytest
 import boebot
 from boebot import Member
 from boebot.arenas import load_arena
-from boebot.boards import BoardRequest, SharedWorld, open_together
+from boebot.boards import BoardRequest, World, open_world
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, BrainError
 from boebot.link import frame
 from boebot.link.messages import Hello, Stopped
 from boebot.result import RunResult
 from boebot.robot import Robot
-from boebot.running import together
+from boebot.running import loop
+from boebot.running.loop import StoppedError, execute
 from boebot.running.tasks import Request
-from boebot.running.together import StoppedError, execute_together
 from boebot.view import style
 from sim_bridge.sessions.places import places_of
-from sim_bridge.sessions.together import SimWorld
-from sim_bridge.sessions.with_board import SimSession
+from sim_bridge.sessions.session import SimSession
+from sim_bridge.sessions.world import SimWorld
 
 pytestmark = pytest.mark.unsanitized
 
@@ -137,8 +137,8 @@ def test_board_that_is_reset_in_mid_run_is_opened_again_and_nobody_else_notices(
 ) -> None:
     worlds: list[SimWorld] = []
 
-    def opened(url: str, requests: Sequence[BoardRequest]) -> SharedWorld:
-        world = open_together(url, requests)
+    def opened(url: str, requests: Sequence[BoardRequest]) -> World:
+        world = open_world(url, requests)
         assert isinstance(world, SimWorld)
         worlds.append(world)
         return world
@@ -150,7 +150,7 @@ def test_board_that_is_reset_in_mid_run_is_opened_again_and_nobody_else_notices(
             assert isinstance(session, SimSession)
             session.board.reset("external")
 
-    monkeypatch.setattr(together, "open_together", opened)
+    monkeypatch.setattr(loop, "open_world", opened)
     far = (50.0, 0.0, 0.0)
     calm, troubled = (
         boebot.run_together([Member(), Member(brain=brain, pose=far)], "empty", 4.0) for brain in (ahead, unlucky)
@@ -207,7 +207,7 @@ def stopped(result: RunResult) -> bool:
 
 
 def test_error_in_one_brain_ends_the_run_and_names_the_robot() -> None:
-    result = execute_together(
+    result = execute(
         Request(members=[Member(brain=ahead), Member(brain=fails), Member(brain=ahead)], arena="empty", seconds=30.0)
     )
     assert isinstance(result.error, BrainError)
@@ -228,9 +228,7 @@ def test_interrupt_in_a_brain_stops_all() -> None:
         if robot.time > 0.5:
             raise KeyboardInterrupt
 
-    result = execute_together(
-        Request(members=[Member(brain=ahead), Member(brain=interrupts)], arena="empty", seconds=30.0)
-    )
+    result = execute(Request(members=[Member(brain=ahead), Member(brain=interrupts)], arena="empty", seconds=30.0))
     assert isinstance(result.error, KeyboardInterrupt)
     assert all(isinstance(robot.error, KeyboardInterrupt) and stopped(robot) for robot in result.robots)
 
@@ -275,8 +273,8 @@ def test_board_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
         ([Member(), Member()], {"on": "toaster"}, BoardError, "there is no board 'toaster'"),
         ([Member()] * 65, {"arena": "empty"}, BoardError, "65 robots are too many; expected at most 64"),
         ([Member(pose=(0, 0, 0)), Member(pose=(0.1, 0, 0))], {"arena": "empty"}, ArenaError, "robots 1 and 2 overlap"),
-        ([Member(pose=(9, 9, 0))], {"arena": "room"}, ArenaError, "robot 1 cannot start at x = 9 m, y = 9 m"),
-        ([Member(pose=(math.nan, 0, 0))], {"arena": "empty"}, ArenaError, "robot 1 cannot start at nan"),
+        ([Member(pose=(9, 9, 0)), Member()], {"arena": "room"}, ArenaError, "robot 1 cannot start at x = 9 m, y = 9 m"),
+        ([Member(pose=(math.nan, 0, 0)), Member()], {"arena": "empty"}, ArenaError, "robot 1 cannot start at nan"),
         ([Member(pose=(1, 2))], {}, BoebotError, "expected (x in m, y in m, heading in rad)"),  # type: ignore[arg-type]
         ([Member(), "wander"], {}, BoebotError, "expected a list of boebot.Member"),
         ([Member()], {"seconds": 0.0}, BoebotError, "a run cannot last 0 s"),
@@ -309,7 +307,7 @@ def test_places_are_free_apart_and_always_the_same(name: str) -> None:
 def test_places_given_are_kept_and_others_keep_off() -> None:
     arena, robot = load_arena("empty"), load_robot("shieldbot")
     given = (*arena.start[:2], 1.0)
-    places = places_of(arena, [BoardRequest(robot=robot), BoardRequest(robot=robot, start_pose=given)])
+    places = places_of(arena, [BoardRequest(robot=robot), BoardRequest(robot=robot, pose=given)])
     assert places[1] == given
     assert math.hypot(places[0][0] - given[0], places[0][1] - given[1]) >= 2 * robot.body.radius_m + 0.3
 

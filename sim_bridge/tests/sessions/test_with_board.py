@@ -17,12 +17,15 @@ from boebot.link import frame, messages
 from boebot.link.link import Link
 from boebot.record.record import Record
 from sim_bridge.boards.board import CLOCK_HZ, Damage
-from sim_bridge.sessions.with_board import SimSession, open_native
+from sim_bridge.sessions.session import SimSession
+from sim_bridge.sessions.world import NATIVE, open_on
 
 
 def open_with(**wishes: Any) -> SimSession:
     """A session in an empty field without noise, unless wished otherwise."""
-    return open_native(BoardRequest(**{"robot": load_robot("shieldbot"), "arena": "empty", "noise": False, **wishes}))
+    return open_on(
+        NATIVE, BoardRequest(**{"robot": load_robot("shieldbot"), "arena": "empty", "noise": False, **wishes})
+    )
 
 
 @pytest.fixture
@@ -127,8 +130,8 @@ def test_reset_starts_the_program_again(session: SimSession) -> None:
     assert session.robot.body().x > before  # the world went on
 
 
-def test_start_pose_is_heeded() -> None:
-    session = open_with(start_pose=(0.3, -0.2, 1.0))
+def test_pose_is_heeded() -> None:
+    session = open_with(pose=(0.3, -0.2, 1.0))
     body = session.robot.body()
     assert (body.x, body.y, body.heading) == (0.3, -0.2, 1.0)
     session.close()
@@ -145,7 +148,7 @@ def test_wrong_requests_are_told_in_a_sentence(tmp_path: Path) -> None:
     no_library.write_text("nothing")
     for error, message, wishes in (
         (ArenaError, "there is no arena 'moon'", {"arena": "moon"}),
-        (ArenaError, "cannot start", {"arena": "room", "start_pose": (9.0, 9.0, 0.0)}),
+        (ArenaError, "cannot start", {"arena": "room", "pose": (9.0, 9.0, 0.0)}),
         (BoardError, "there is no firmware image", {"image": "no.such.so"}),
         (BoardError, "firmware.so", {"image": str(no_library)}),
         (

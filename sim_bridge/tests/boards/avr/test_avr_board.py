@@ -72,8 +72,8 @@ def test_session_that_nobody_closes(tmp_path: Path) -> None:
     program = f"""
 from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
-from sim_bridge.sessions.with_board import open_avr
-session = open_avr(BoardRequest(robot=load_robot("shieldbot"), image={str(image)!r}))
+from sim_bridge.sessions.world import AVR, open_on
+session = open_on(AVR, BoardRequest(robot=load_robot("shieldbot"), image={str(image)!r}))
 session.transport.read(0.1)
 """
     subprocess.run([sys.executable, "-c", program], check=True)

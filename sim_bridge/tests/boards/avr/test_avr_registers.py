@@ -17,7 +17,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from sim_bridge.boards.avr import AvrBoard, create
 from sim_bridge.boards.board import BoardAccess
-from sim_bridge.sessions.with_board import open_avr
+from sim_bridge.sessions.world import AVR, open_on
 from sim_bridge.tests.boards.avr.avr_program import PREAMBLE, Machine, assemble, gaps
 from sim_bridge.tests.boards.symbols import entry_of
 
@@ -329,7 +329,9 @@ def test_a_session_tells_of_the_chip_that_is_assumed_and_of_what_is_not_built(tm
     subprocess.run(["avr-objcopy", "-R", ".note.gnu.avr.deviceinfo", str(image), str(bare)], check=True)
     told = {}
     for path in (image, bare):
-        session = open_avr(BoardRequest(robot=load_robot("shieldbot"), arena="empty", record=False, image=str(path)))
+        session = open_on(
+            AVR, BoardRequest(robot=load_robot("shieldbot"), arena="empty", record=False, image=str(path))
+        )
         session.transport.read(0.01)
         told[path] = session.notes()
         assert session.notes() == told[path]

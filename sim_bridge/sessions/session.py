@@ -1,31 +1,61 @@
-"""A robot with a board in a simulated world as the host opens it: bytes, pins, truth.
+"""A simulated robot as the host opens it: with a board bytes, pins and truth, without one readings and motor signals.
 
-`open_native` and `open_avr` are what the entry points of the group `boebot.boards` name: called with one request they
-give a session, their `together` puts several robots into one world (together.py), also such without boards. A session
-joins one emulated board to a body in an arena, by the robot's description; the loop that advances both is C
-(loop/loop.h), and Python is called only where somebody reads or writes bytes.
+A session joins one robot to a world; the loop that advances both is C (loop/loop.h), and Python is called only where
+somebody reads or writes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping
 
-from boebot.boards import BoardRequest, BoardSession, SharedWorld, VehicleSession, WatchdogReset
+from boebot.arenas.floor_plan import floor_plan
+from boebot.boards import Truth, TruthNow, WatchdogReset
 from boebot.description import robots
 from boebot.devices.uart import Uart
 from boebot.errors import BoardError
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
-from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
 from sim_bridge.pins import BoardPins, PinRecorder
-from sim_bridge.sessions.opening import InWorld, Wait, alone, drain, new_sim
-from sim_bridge.sessions.together import SimWorld
-from sim_bridge.sessions.without_board import DirectSession, add_vehicle
-from sim_bridge.sim import Floats, Sim, SimRobot
+from sim_bridge.sim import Floats, SimRobot
+from sim_bridge.vehicles import STEP_S
 
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
-STEP_S = 0.001  # of a world with boards
+
+Wait = Callable[[SimRobot, int, int], None]
+"""Lets time pass for a robot: (robot, cycles, quiet) at most `cycles`; after `quiet` of them only until bytes come."""
+
+
+class InWorld:
+    """What every simulated robot's session offers: the truth, and hands that lift things. Of `BoardSession` and
+    `VehicleSession` of boebot.boards."""
+
+    def __init__(self, robot: SimRobot, *, shared: bool) -> None:
+        """`shared`: the world is not this robot's alone, and is closed by somebody else."""
+        self.robot = robot
+        self._shared = shared
+        self.sim = robot.sim
+        self.arena = robot.sim.arena
+
+    def truth_now(self) -> TruthNow:
+        """Where the robot and the arena's moving shapes are."""
+        return self.robot.truth_now()
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Lifts the robot and puts it there, at rest."""
+        self.robot.place(x, y, heading)
+
+    def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
+        """Puts a moving shape there; it goes on along its way shifted by as much."""
+        self.sim.place_shape(index, (x, y, heading))
+
+    def truth(self) -> Truth | None:
+        """What happened so far; None without recording."""
+        return truth_of(self.robot)
+
+    def close(self) -> None:
+        """Frees board and world. May be called twice."""
+        if not self._shared:
+            self.sim.close()
 
 
 class SimTransport:
@@ -34,13 +64,13 @@ class SimTransport:
     realtime = False
     baud_given = False
 
-    def __init__(self, robot: SimRobot, name: str, wait: Wait | None = None, pins: PinRecorder | None = None) -> None:
-        """`wait` lets time pass; None: for this robot alone. `pins`: collects edges meanwhile."""
+    def __init__(self, robot: SimRobot, name: str, wait: Wait = SimRobot.wait, pins: PinRecorder | None = None) -> None:
+        """`wait` lets time pass. `pins`: collects edges meanwhile."""
         self.name = name
         self.baud = _baud(robot.description)
         self._robot = robot
         self._sim = robot.sim
-        self._wait = wait or alone(robot.sim)
+        self._wait = wait
         self._pins = pins
         self._closed = False
 
@@ -90,16 +120,13 @@ class SimSession(InWorld):
     """An opened simulated robot (BoardSession of boebot.boards)."""
 
     def __init__(self, robot: SimRobot, kind: str, wait: Wait, *, pins: bool = False, shared: bool = False) -> None:
-        """`pins`: the board's edges are recorded. `shared`: the world is not this robot's alone, and is closed by
-        somebody else."""
-        super().__init__(robot)
+        """`pins`: the board's edges are recorded."""
+        super().__init__(robot, shared=shared)
         self.description = f"{robot.board.description} in arena {self.arena.name}"
         self.board = BoardPins(robot)
         self._pins = PinRecorder(self.board) if pins else None
         self.transport = SimTransport(robot, kind, wait, self._pins)
         self.transport.set_baud(self.transport.baud)
-        self._shared = shared
-        self._closed = False
         self._notes: list[str] = []
 
     def drain(self, *, ended: bool = False) -> Group:
@@ -137,67 +164,80 @@ class SimSession(InWorld):
 
     def close(self) -> None:
         """Frees board and world. May be called twice."""
-        if self._closed:
-            return
-        self._closed = True
         self.transport.close()
-        if not self._shared:
-            self.sim.close()
+        super().close()
 
 
-class BoardKind:
-    """A kind of emulated board (TogetherFactory of boebot.boards)."""
+class DirectSession(InWorld):
+    """An opened vehicle (VehicleSession of boebot.boards)."""
 
-    def __init__(self, name: str, find: Callable[[str], Path], make: Callable[[Path], EmulatedBoard]) -> None:
-        """`find`: the bundled firmware for a pin map; `make`: a board with some firmware."""
-        self.name = name
-        self._find, self._make = find, make
+    tick_s = STEP_S
 
-    def __call__(self, request: BoardRequest) -> SimSession:
-        """Opens one robot in a world that is its alone."""
-        sim = new_sim(request, STEP_S)
-        try:
-            robot = self.add(sim, request)
-        except Exception:
-            sim.close()
-            raise
-        return SimSession(robot, self.name, alone(sim, paced=request.realtime), pins=request.pins)
+    def __init__(self, robot: SimRobot, wait: Wait, *, shared: bool = False) -> None:
+        super().__init__(robot, shared=shared)
+        self.layout: Mapping[str, slice] = robot.layout
+        self.description = f"robot without a board in arena {robot.sim.arena.name}"
+        self._wait = wait
+        self._cycles = round(STEP_S * CLOCK_HZ)
 
-    def together(self, requests: Sequence[BoardRequest]) -> SharedWorld:
-        """Opens several robots in one world; those whose description has no board get none."""
+    def readings(self) -> tuple[float, ...]:
+        """All readings now."""
+        return self.robot.readings()
 
-        def open_shared(robot: SimRobot, wait: Wait) -> BoardSession | VehicleSession:
-            if robot.description.has_board:
-                return SimSession(robot, self.name, wait, pins=requests[0].pins, shared=True)
-            return DirectSession(robot, wait, shared=True)
+    def step(self, left: float, right: float) -> None:
+        """One step under these motor signals."""
+        self.robot.signals(left, right)
+        self._wait(self.robot, self._cycles, self._cycles)
 
-        return SimWorld(new_sim(requests[0], STEP_S), requests, self.add, open_shared)
+    def stop(self) -> None:
+        """No motor signals from now on."""
+        self.robot.signals(0.0, 0.0)
 
-    def add(self, sim: Sim, request: BoardRequest) -> SimRobot:
-        """Puts the request's robot into a world, with its board if it has one."""
-        if not request.robot.has_board:
-            return add_vehicle(sim, request)
-        find = self._find
-        board = self._make(find(request.robot.pin_map) if request.image is None else image_file(request.image))
-        try:
-            return sim.add(
-                board,
-                request.robot,
-                pose=request.start_pose,
-                without=request.without,
-                imperfections=request.imperfections,
-            )
-        except Exception:
-            if not board.is_in_use():  # else the simulation's end is the board's
-                board.close()
-            raise
+    @property
+    def ended(self) -> str:
+        """Why it can go no further, or ""."""
+        return self.robot.ended
+
+    def drain(self, *, ended: bool = False) -> Group:
+        """See `boebot.boards.BoardSession`."""
+        return drain(self.robot, ended=ended)
+
+    def counters(self) -> Mapping[str, float]:
+        """`true_contacts`, `true_distance_m` and `time_s`."""
+        return {
+            "true_contacts": float(self.robot.true_contacts),
+            "true_distance_m": float(self.robot.body().distance),
+            "time_s": self.sim.cycle / CLOCK_HZ,
+        }
 
 
-open_native = BoardKind("native", native_library, native_board)
-"""The native board: the firmware's own C on this computer."""
+def drain(robot: SimRobot, *, ended: bool) -> Group:
+    """See `boebot.boards.BoardSession`. What belongs to the world goes with its first robot."""
+    world = robot.sim.drain(ended=ended) if robot.number == min(robot.sim.members) else {}
+    return {**robot.drain(to_now=ended and not robot.description.has_board), **world}
 
-open_avr = BoardKind("avr", avr_image, avr_board)
-"""The emulated ATmega328P with the image that would be flashed."""
+
+def truth_of(robot: SimRobot) -> Truth | None:
+    """What happened to a robot so far; None without recording."""
+    columns = robot.truth() if robot.description.has_board else robot.truth_to_now()
+    if not len(columns["time"]):
+        return None
+    return Truth(
+        time=columns["time"],
+        x=columns["x"],
+        y=columns["y"],
+        heading=columns["heading"],
+        contact=columns["contact"] > 0,
+        left_speed=columns["left"],
+        right_speed=columns["right"],
+        plan=floor_plan(
+            robot.sim.arena,
+            float(columns["time"][0]),
+            float(columns["time"][-1]),
+            robot.sim.lateness(),
+            robot.sim.shifts(),
+        ),
+    )
 
 
 def _baud(robot: robots.RobotDescription) -> int:
