@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from boebot.brain.pausable_thread import DONE, PAUSED, EndedError, PausableThread
 from boebot.errors import BoardError
+from boebot.pausable_thread import DONE, PAUSED, EndedError, PausableThread
 
 
 def test_stretches_alternate_with_the_resuming_thread() -> None:

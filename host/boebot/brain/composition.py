@@ -34,7 +34,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType, UnionType
-from typing import Any, TypedDict
+from typing import Any
 
 import msgspec
 
@@ -119,19 +119,9 @@ def composed(table: dict[str, Any], file: str) -> Brain:
         return Brain(made.values(), variables.values(), period=described.period_s, margin=described.margin)
 
 
-class MadeOf(TypedDict):
-    """What a brain is made of, as the table of a file, with the whole names of classes. Beside it `undescribed`, in
-    words, what no file can say: where there is nothing of this kind, the table composes the same brain."""
-
-    period_s: float
-    margin: float
-    variable: dict[str, dict[str, str] | None]
-    process: dict[str, dict[str, Any]]
-    undescribed: list[str]
-
-
-def described(brain: Brain) -> MadeOf:
-    """That of a brain, as it is now, as JSON has it; without functions that a class has unless it is given others."""
+def described(brain: Brain) -> dict[str, Any]:
+    """What a brain is made of (`MadeOf` of boebot.record.brain_record), as it is now, as JSON has it; without functions
+    that a class has unless it is given others."""
     variables = {one.name: _source(one, brain) for one in brain.variables}
     odd = [] if type(brain) is Brain else [f"the brain is a {class_name(type(brain))}"]
     odd += [f"state variable {name!r} is read by a function" for name, one in variables.items() if one is None]
@@ -150,7 +140,8 @@ def described(brain: Brain) -> MadeOf:
                     odd.append(f"{process.name}.{field.name} is {arguments.shown(value)}")
         numbers = {field.name: getattr(process.utility, field.name) for field in dataclasses.fields(Utility)}
         table["utility"] = numbers | {"w": dict(process.utility.w)}
-    return MadeOf(period_s=brain.PERIOD, margin=brain.margin, variable=variables, process=processes, undescribed=odd)
+    table = {"period_s": brain.PERIOD, "margin": brain.margin, "variable": variables, "process": processes}
+    return table | {"undescribed": odd}
 
 
 def class_name(kind: type) -> str:

@@ -19,10 +19,10 @@ from types import FrameType, TracebackType
 from typing import ClassVar
 
 from boebot import arguments, slips
-from boebot.brain.pausable_thread import PausableThread
 from boebot.cognition import Odometry
 from boebot.cognition.odometry import LAG_S, wrapped
 from boebot.errors import BrainError
+from boebot.pausable_thread import PausableThread
 from boebot.robot import Robot
 
 END_S = 0.5  # that a main which is ended has to clear up

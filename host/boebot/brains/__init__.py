@@ -30,15 +30,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from sysconfig import get_path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from boebot import arguments, slips
-from boebot.brain import Brain, Process, StateVariable, composition
-from boebot.brain.main_brain import MainBrain
-from boebot.brain.pausable_thread import leave_copy
-from boebot.cognition import Odometry
 from boebot.errors import BrainError, as_utf8, did_you_mean
+from boebot.pausable_thread import leave_copy
 from boebot.robot import Robot
+
+if TYPE_CHECKING:  # what a brain of one function does without is imported where it is needed
+    from boebot.brain import Brain
+    from boebot.brain.main_brain import MainBrain
 
 FOLDER = Path(__file__).resolve().parent
 _OTHERS = (FOLDER.parent, *map(get_path, ("stdlib", "purelib", "platlib")))  # the kit, Python, other packages
@@ -84,6 +85,8 @@ class LoadedBrain:
         has neither; None: nothing in it kept a pose."""
         if self.brain is None:
             return None if self.main is None else self.main.odometry_source
+        from boebot.cognition import Odometry
+
         poses = [one for one in self.brain.processes if isinstance(one, Odometry) and one.name in self.brain.begun]
         return ", ".join(dict.fromkeys(one.source for one in poses)) or None
 
@@ -109,6 +112,8 @@ def load_brain(source: object) -> LoadedBrain:
     if isinstance(source, str | Path):
         path = _find(source)
         if path.suffix == TOML:
+            from boebot.brain import composition
+
             return _from_object(composition.load(path), as_utf8(path.stem), path)
         return _from_module(_execute(path), path)
     if isinstance(source, ModuleType):
@@ -116,6 +121,8 @@ def load_brain(source: object) -> LoadedBrain:
         return _from_module(source, Path(file) if file else None)
     if isinstance(source, type):
         return _from_object(_construct(source, None), source.__name__, None)
+    from boebot.brain import Brain, Process
+
     step = getattr(source, "step", None)
     if isinstance(source, Process):
         raise BrainError(f"{source.name!r} is one process; expected a brain of it, Brain([{type(source).__name__}()])")
@@ -156,6 +163,8 @@ def place(error: BaseException, path: Path | None) -> str:
 
 def part(error: BaseException) -> str:
     """The part of a brain of processes in which the error arose: "process 'avoid'", "state variable 'near'", or ""."""
+    from boebot.brain import Process, StateVariable
+
     for frame, _ in traceback.walk_tb(error.__traceback__):
         code = frame.f_code
         owner = frame.f_locals.get(code.co_varnames[0]) if code.co_argcount else None
@@ -265,6 +274,8 @@ def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
         return LoadedBrain(name, step, period, needs, path)
     if callable(main):
         raise BrainError(f"{where}: main takes no robot; expected def main(robot)")
+    from boebot.brain import Brain
+
     other = next((key for key, value in vars(module).items() if isinstance(value, Brain)), None)
     hint = f"; it has a Brain called {other}, expected the name brain" if other else ""
     raise BrainError(f"{where} {slips.of_sign('no step')}{hint}")
@@ -273,6 +284,10 @@ def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:
 def _made(module: ModuleType, where: str, path: Path | None) -> LoadedBrain | None:
     """Of the module's `brain = Brain([...])`, or of its class Brain."""
     brain, kind = getattr(module, "brain", None), getattr(module, "Brain", None)
+    if brain is None and kind is None:
+        return None
+    from boebot.brain import Brain
+
     if isinstance(brain, Brain):
         if callable(getattr(module, "step", None)):
             raise BrainError(
@@ -289,6 +304,8 @@ def _from_object(brain: object, name: str, path: Path | None) -> LoadedBrain:
     if not callable(step):
         raise BrainError(f"{name}: class {type(brain).__name__} has no method step(self, robot)")
     _check_function(step, name, "step")
+    from boebot.brain import Brain
+
     composed = brain if isinstance(brain, Brain) else None
     return LoadedBrain(name, step, _period(brain, name), _needs(brain, name), path, composed)
 
@@ -296,6 +313,8 @@ def _from_object(brain: object, name: str, path: Path | None) -> LoadedBrain:
 def _from_main(main: Callable[..., object], name: str, where: str, owner: object, path: Path | None) -> LoadedBrain:
     """Of a function main(robot); `owner` has its PERIOD and NEEDS."""
     _check_function(main, where, "main")
+    from boebot.brain.main_brain import MainBrain
+
     runs = MainBrain(main)
     return LoadedBrain(name, runs.step, _period(owner, where), _needs(owner, where), path, main=runs)
 

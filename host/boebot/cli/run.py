@@ -12,7 +12,6 @@ import typer
 
 from boebot.brains import bundled
 from boebot.cli import completion, options, output, quantity, streams, watched
-from boebot.cli.again import run_again
 from boebot.cli.ending import end
 from boebot.cli.run_table import detail
 from boebot.errors import BoebotError
@@ -135,6 +134,8 @@ def run(
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
     if repeated is not None:
         _check_alone(context)
+        from boebot.cli.again import run_again  # here: it needs much that a run does not
+
         run_again(repeated, json, trust)
         return
     if trust:

@@ -9,17 +9,16 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.brain.brain import Brain, Switch
-from boebot.brain.process import MotorBehavior
 from boebot.showing import VALUES, Sketch
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # the record of a run without such a brain does without
+    from boebot.brain.brain import Brain, Switch
     from boebot.record.blocks import Row
     from boebot.record.record import Record
     from boebot.record.truth import Floats
@@ -27,6 +26,17 @@ if TYPE_CHECKING:
 
 STEPS, SWITCHES = "brain_step", "switch"  # streams
 SKETCH_BYTES = 3_000_000  # of all sketches that are drawn
+
+
+class MadeOf(TypedDict):
+    """What a brain is made of, as the table of a file, with the whole names of classes. Beside it `undescribed`, in
+    words, what no file can say: where there is nothing of this kind, the table composes the same brain."""
+
+    period_s: float
+    margin: float
+    variable: dict[str, dict[str, str] | None]
+    process: dict[str, dict[str, Any]]
+    undescribed: list[str]
 
 
 @dataclass(frozen=True)
@@ -48,6 +58,8 @@ class BrainNames:
         """None: of a brain without processes."""
         if brain is None:
             return None
+        from boebot.brain.process import MotorBehavior
+
         return cls(
             processes=tuple(process.name for process in brain.processes),
             behaviors=tuple(process.name for process in brain.processes if isinstance(process, MotorBehavior)),
@@ -171,6 +183,8 @@ def each_part(record: Record, names: BrainNames) -> Iterator[BrainRecord]:
 
 def each_switch(record: Record) -> Iterator[Switch]:
     """The switches one by one, oldest first."""
+    from boebot.brain.brain import Switch
+
     for time_s, data in record.each_row(SWITCHES):
         yield Switch(time_s, *msgspec.json.decode(data))
 

@@ -12,7 +12,6 @@ from typing import Any
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.boards import Truth, WatchdogReset
-from boebot.brain.composition import MadeOf
 from boebot.description.robots import RobotDescription
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
@@ -20,7 +19,16 @@ from boebot.errors import brief
 from boebot.link.frame import text
 from boebot.link.messages import Identity
 from boebot.record import figures
-from boebot.record.brain_record import BrainNames, BrainRecord, Layer, Shown, read_brain, read_layers, read_shown
+from boebot.record.brain_record import (
+    BrainNames,
+    BrainRecord,
+    Layer,
+    MadeOf,
+    Shown,
+    read_brain,
+    read_layers,
+    read_shown,
+)
 from boebot.record.columns import MESSAGES, Columns, whole
 from boebot.record.figures import counted
 from boebot.record.interventions import touched

@@ -2,7 +2,7 @@
 
 Each robot is driven over the link to its board, or direct; its brain steps here, in the caller's thread. A single robot
 lets time pass itself, as it waits. Several are each driven by a thread that pauses while it waits
-(boebot.brain.pausable_thread), and one clock turns them all: when all of them wait, time passes up to the earliest
+(boebot.pausable_thread), and one clock turns them all: when all of them wait, time passes up to the earliest
 wake-up, and robots that wake at the same instant go on in the order of their numbers. The run of each is then a
 function of what its own robot meets.
 
@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 from boebot import slips
 from boebot.boards import DIRECT, BoardSession, VehicleSession, World, is_live, open_world
-from boebot.brain.pausable_thread import DONE, PAUSED, PausableThread
 from boebot.description.robots import notices
 from boebot.errors import BoebotError, BrainError
+from boebot.pausable_thread import DONE, PAUSED, PausableThread
 from boebot.record.brain_record import BrainNames, append_brain
 from boebot.record.recording import Recording
 from boebot.record.run import Run

@@ -21,9 +21,9 @@ from types import FrameType, TracebackType
 from typing import Any, NamedTuple
 
 from boebot import brains, slips
-from boebot.brain.pausable_thread import leave_copy, throw
 from boebot.brains import LoadedBrain
 from boebot.errors import BrainError
+from boebot.pausable_thread import leave_copy, throw
 from boebot.robot import Command, Robot
 from boebot.running import interrupts
 

@@ -12,15 +12,14 @@ from typing import Any, NamedTuple
 
 from boebot import brains
 from boebot.boards import DIRECT, BoardRequest, default_board, is_live
-from boebot.brain.composition import MadeOf, described
 from boebot.brains import LoadedBrain
 from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError, NotRealisableError
 from boebot.guests import CHECKS, guests
 from boebot.imperfections import checked
+from boebot.record.brain_record import MadeOf
 from boebot.record.record import Record
-from boebot.running.brain_parameters import in_force, parameters
 from boebot.running.driver import check_time_to_live
 
 DEFAULT_PERIOD = 0.05  # s
@@ -226,9 +225,15 @@ def _task(member: Member, request: Request, number: int) -> Task:
     finding = check_timing(description, period_s)
     if finding is not None and not request.force_timing:
         raise NotRealisableError(f"{finding.why} ({finding.see}; --force-timing runs it all the same)")
-    with in_force(loaded, given):
-        now = parameters(loaded)
-        made_of = None if loaded.brain is None else described(loaded.brain)
+    now: Mapping[str, Any] = {}
+    made_of: Any = None
+    if given or loaded.brain is not None:
+        from boebot.brain.composition import described
+        from boebot.running.brain_parameters import in_force, parameters
+
+        with in_force(loaded, given):
+            now = parameters(loaded)
+            made_of = None if loaded.brain is None else described(loaded.brain)
     board = BoardRequest(
         robot=description,
         arena=None if request.arena is None else str(request.arena),
