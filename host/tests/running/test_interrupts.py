@@ -94,6 +94,7 @@ def test_the_first_one_leaves_a_whole_record_of_several_robots_too(tmp_path: Pat
     assert [robot["ended"] for robot in json.loads(out)["robots"]] == ["interrupted"] * 2
     read = read_run(tmp_path / "out")
     assert all(isinstance(robot.error, KeyboardInterrupt) for robot in read.robots)
+    assert (tmp_path / "out" / "run.png").is_file() and (tmp_path / "out" / "robot-2" / "summary.json").is_file()
 
 
 def test_a_brain_that_has_caught_it_ends_with_its_step(tmp_path: Path) -> None:

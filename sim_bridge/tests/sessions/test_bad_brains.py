@@ -8,10 +8,7 @@ were carried out, the one at 0.30 s was not, and there is a row for each hundred
 from __future__ import annotations
 
 import contextlib
-import json
-import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -312,25 +309,6 @@ def test_bad_brain_at_the_command_line(
     assert len(said.err.splitlines()) == 1 and "ended" in said.out
     complete(tmp_path / "out")
     assert stood_still == [True]
-
-
-@pytest.mark.skipif(os.name != "posix", reason="sends a signal")
-def test_ctrl_c_ends_a_brain_that_hangs(tmp_path: Path) -> None:
-    path, begun = tmp_path / "bad.py", tmp_path / "begun"
-    path.write_text(FUNCTION.format(deed=f"open({str(begun)!r}, 'w').close()\n        while True: pass"))
-    process = subprocess.Popen(
-        [sys.executable, "-m", "boebot", "run", str(path), "--step-timeout", "inf", "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
-    )
-    while not begun.exists() and process.poll() is None:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (130, "boebot: interrupted\n")
-    assert json.loads(out)["run_time_s"] == pytest.approx(BAD_FROM_S)
 
 
 # ---- late, in real time ----------------------------------------------------------------------------------------------

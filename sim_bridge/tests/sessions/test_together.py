@@ -5,12 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import re
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -231,28 +226,6 @@ def test_interrupt_in_a_brain_stops_all() -> None:
     result = execute(Request(members=[Member(brain=ahead), Member(brain=interrupts)], arena="empty", seconds=30.0))
     assert isinstance(result.error, KeyboardInterrupt)
     assert all(isinstance(robot.error, KeyboardInterrupt) and stopped(robot) for robot in result.robots)
-
-
-@pytest.mark.skipif(os.name != "posix", reason="sends a signal")
-@pytest.mark.parametrize("after_s", [0.0, 0.7])
-def test_ctrl_c_ends_all_and_keeps_the_record(tmp_path: Path, after_s: float) -> None:
-    brain, begun = tmp_path / "brain.py", tmp_path / "begun"
-    brain.write_text(f"def step(robot):\n    robot.drive(0.3, 0.3)\n    open({str(begun)!r}, 'w').close()\n")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "boebot", "run", str(brain), "--robots", "2", "--seconds", "1e6", "--json",
-         "--out", str(tmp_path / "out")],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler) and None,
-    )  # fmt: skip
-    while not begun.exists() and process.poll() is None:
-        time.sleep(0.01)
-    time.sleep(after_s)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (130, "boebot: interrupted\n")
-    values = json.loads(out)
-    assert values["ended"] == "interrupted" and len(values["robots"]) == 2
-    assert (tmp_path / "out" / "run.png").is_file() and (tmp_path / "out" / "robot-2" / "summary.json").is_file()
 
 
 def test_board_that_cannot_be_opened_is_named(tmp_path: Path) -> None:
