@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
+from hypothesis import strategies as st
 
 from boebot.brain import Brain, MotorBehavior, Process
 from boebot.description.robots import RobotDescription, load_robot
@@ -17,6 +18,36 @@ from boebot.robot import Command, Equipment, Observation, Robot
 
 SHIELDBOT = load_robot("shieldbot")
 TICK_S = 0.01
+
+BYTES, WORDS, COUNTS = st.integers(0, 255), st.integers(0, 65535), st.integers(-(2**31), 2**31 - 1)
+ANYTHING = st.fixed_dictionaries(
+    {
+        "encoder_left": COUNTS,
+        "encoder_right": COUNTS,
+        "whiskers": st.integers(0, 3),
+        "infrared": st.integers(0, 3),
+        "infrared_age": BYTES,
+        "ping_echo": WORDS,
+        "ping_age": BYTES,
+        "ping_status": st.sampled_from([int(one) for one in messages.PingStatus]),
+        "pulse_left": WORDS,
+        "pulse_right": WORDS,
+        "battery": st.integers(0, 1023),
+        "battery_age": BYTES,
+        "light_left": WORDS,
+        "light_right": WORDS,
+        "light_age": BYTES,
+        "compass_x": st.integers(-4096, 2047),
+        "compass_y": st.integers(-4096, 2047),
+        "compass_age": BYTES,
+        "compass_status": st.sampled_from([int(one) for one in messages.CompassStatus]),
+        "line_left": WORDS,
+        "line_middle": WORDS,
+        "line_right": WORDS,
+        "line_age": BYTES,
+    }
+)
+"""Any fields of telemetry."""
 NOTHING = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
 SLOW: list[Any] = [  # what slow devices say that have measured nothing
     without_readings(messages.DevicesTelemetry)._replace(supply=5000),

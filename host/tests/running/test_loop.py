@@ -158,8 +158,8 @@ def test_error_of_the_brain_is_not_hidden_by_that_of_its_files(
 @pytest.mark.parametrize(
     ("error", "caught", "sentence"),
     [
-        (ZeroDivisionError("division by zero"), BrainError, r"test_runner\.py, line \d+: ZeroDivisionError: division"),
-        (SystemExit(1), BrainError, r"test_runner\.py, line \d+: SystemExit"),
+        (ZeroDivisionError("division by zero"), BrainError, r"test_loop\.py, line \d+: ZeroDivisionError: division"),
+        (SystemExit(1), BrainError, r"test_loop\.py, line \d+: SystemExit"),
         (KeyboardInterrupt(), KeyboardInterrupt, "^$"),
     ],
 )

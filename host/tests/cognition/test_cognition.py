@@ -28,7 +28,7 @@ from boebot.cognition import (
 )
 from boebot.errors import BrainError
 from boebot.link.messages import CompassStatus, PingStatus
-from steps import FULL, QUAD, Stepped, SteppedVehicle, alone
+from steps import ANYTHING, FULL, QUAD, Stepped, SteppedVehicle, alone
 
 RADIUS = QUAD.body.wheel_radius_m
 TRACK = QUAD.body.track_width_m
@@ -365,36 +365,6 @@ def test_nearness_ahead_of_what_ping_says(fields: dict[str, int], expected: floa
 
 
 # ---- any readings --------------------------------------------------------------------------------------------------
-
-
-BYTES, WORDS, COUNTS = st.integers(0, 255), st.integers(0, 65535), st.integers(-(2**31), 2**31 - 1)
-ANYTHING = st.fixed_dictionaries(
-    {
-        "encoder_left": COUNTS,
-        "encoder_right": COUNTS,
-        "whiskers": st.integers(0, 3),
-        "infrared": st.integers(0, 3),
-        "infrared_age": BYTES,
-        "ping_echo": WORDS,
-        "ping_age": BYTES,
-        "ping_status": st.sampled_from([int(one) for one in PingStatus]),
-        "pulse_left": WORDS,
-        "pulse_right": WORDS,
-        "battery": st.integers(0, 1023),
-        "battery_age": BYTES,
-        "light_left": WORDS,
-        "light_right": WORDS,
-        "light_age": BYTES,
-        "compass_x": st.integers(-4096, 2047),
-        "compass_y": st.integers(-4096, 2047),
-        "compass_age": BYTES,
-        "compass_status": st.sampled_from([int(one) for one in CompassStatus]),
-        "line_left": WORDS,
-        "line_middle": WORDS,
-        "line_right": WORDS,
-        "line_age": BYTES,
-    }
-)
 
 
 def numbers_of(process: CognitiveProcess) -> list[float]:

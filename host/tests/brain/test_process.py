@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_cognition import ANYTHING
 
 from boebot.behaviors import (
     Avoid,
@@ -46,7 +45,7 @@ from boebot.cognition import (
     near,
 )
 from boebot.robot import Command, Robot
-from steps import FULL, Stepped
+from steps import ANYTHING, FULL, Stepped
 
 
 @dataclass(frozen=True)
