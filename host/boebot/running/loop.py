@@ -242,7 +242,7 @@ class _Robot:
         """Goes on until its brain is to step, it waits for time to pass (one of several), or is done."""
         if self.thread is not None:
             return self.thread.resume()
-        return next((_STEP for _ in self._stretches), DONE)
+        return next(self._stretches, DONE) or _STEP
 
     def step(self, watch: StepWatch) -> None:
         """A step of its brain.
