@@ -13,7 +13,7 @@ PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-
 	--constraint requirements.lock
 
 # Made by protocol/generate.py. Of the headers in firmware/src/generated one is named here; it makes them all.
-GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host/boebot/can/layout.py host/boebot/devices/attributes.pyi
+GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host/boebot_can/layout.py host/boebot/devices/attributes.pyi
 GENERATED_FROM := $(wildcard protocol/*.py protocol/*.toml protocol/robots/*.toml host/boebot/devices/*.py) firmware/src/tasks.def
 FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.cdef' -o -name 'build_*.py')
@@ -101,12 +101,12 @@ pictures:
 	@$(VENV)/bin/boebot run explore --robot roller --arena office --seconds 1000 --out build/pictures/explored
 	@cp build/pictures/explored/run.png docs/images/explored.png
 	@$(PYTHON_VENV) -m boebot.arenas.reference --pictures
-	@$(VENV)/bin/boebot robot shieldbot --out docs/images/robot-shieldbot.svg
+	@$(VENV)/bin/boebot show robot shieldbot --out docs/images/robot-shieldbot.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 	@$(VENV)/bin/boebot run wander --arena room --seconds 30 --out build/pictures/can
-	@$(VENV)/bin/boebot report build/pictures/can --can log --quiet
-	@$(VENV)/bin/boebot dbc build/pictures/boebot.dbc
+	@$(VENV)/bin/boebot report build/pictures/can --as can.log --quiet
+	@$(VENV)/bin/boebot can dbc build/pictures/boebot.dbc
 	@$(VENV)/bin/cantools plot build/pictures/boebot.dbc telemetry_5.ping_echo --ignore-unknown-frames -o docs/images/can-plot.png <build/pictures/can/can.log
 	@$(PYTHON_VENV) -m tools.live_pictures
 	@$(PYTHON_VENV) -m boebot_course.pages

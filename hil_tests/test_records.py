@@ -48,7 +48,7 @@ def test_killed_run_leaves_all_but_its_last_second(tmp_path: Path) -> None:
     assert cut.run_time == cut.record.times[-1] > 1 and cut.steps > 20
     assert cut.brain_record is not None and len(cut.brain_record) == cut.steps
     assert cut.true_distance is not None and cut.odometry_error is not None and cut.odometry_error < 1
-    report = boebot("report", str(run), "--mend", "--csv")
+    report = boebot("report", str(run), "--mend", "--as", "csv")
     assert report.returncode == 0 and str(cut.error) in report.stderr
     whole = read(run / "record-mended.mcap")
     assert whole.record.rows("to_host") == cut.record.rows("to_host") and whole.table() == cut.table()

@@ -60,7 +60,7 @@ def boebot(*arguments: str) -> copied_process.Done:
 
 def test_served_board_answers_no_sooner_than_it_was_asked(native_pty: str) -> None:
     """Else the bounds of its clock would contradict each other."""
-    done = boebot("link", "--on", native_pty, "--seconds", "3", "--json")
+    done = boebot("doctor", native_pty, "--watch", "--seconds", "3", "--json")
     assert done.returncode == 0, done.stderr
     last = json.loads(done.stdout.splitlines()[-1])
     assert last["clock_restarts"] == 0
@@ -81,7 +81,7 @@ def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_pat
         assert summary["lost_frames"] == 0 and summary["bad_frames"] == 0
         assert {"record.mcap", "run.png", "replay.html"} <= {path.name for path in tmp_path.iterdir()}
         # a second client finds the robot as the first one left it: ready
-        info = boebot("info", url, "--json")
+        info = boebot("doctor", url, "--identity", "--json")
         assert info.returncode == 0, info.stderr
         assert json.loads(info.stdout)["pin_map"] == "shieldbot"
 
@@ -112,7 +112,7 @@ def late_run(url: str, folder: Path, *options: str) -> tuple[copied_process.Done
     )
     out = folder / "run"
     done = boebot("run", str(path), "--on", url, "--seconds", "2", "--out", str(out), "--json", *options)
-    assert boebot("report", str(out), "--csv").returncode == 0
+    assert boebot("report", str(out), "--as", "csv").returncode == 0
     with (out / "run.csv").open() as file:
         return done, list(csv.DictReader(file))
 

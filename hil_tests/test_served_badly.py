@@ -62,7 +62,7 @@ def tcp(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 def info(server: Server) -> copied_process.Done:
-    return copied_process.command(["info", server.url, "--json"], Path.cwd())
+    return copied_process.command(["doctor", server.url, "--identity", "--json"], Path.cwd())
 
 
 def drives(server: Server) -> None:

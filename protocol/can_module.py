@@ -1,4 +1,4 @@
-"""The Python module of the CAN frames' layout, host/boebot/can/layout.py."""
+"""The Python module of the CAN frames' layout, host/boebot_can/layout.py."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import schema
 
 
 def can_module(spec: schema.Schema) -> str:
-    """host/boebot/can/layout.py"""
+    """host/boebot_can/layout.py"""
     names = ("ROUND", "SESSION", "SEQUENCE", "TIME_TO_LIVE", "PART")
     doc = "Which bytes of a message stand in which CAN frame, from protocol/messages.toml by protocol/can_layout.py."
     lines = [

@@ -5,7 +5,7 @@
     python protocol/generate.py --check    exits 1 and names each file in git that is stale
 
 Built: the C headers in firmware/src/generated, the Python modules host/boebot/link/messages.py and
-host/boebot/can/layout.py, and the stub host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest
+host/boebot_can/layout.py, and the stub host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest
 begin with it; a file that would be the same is left alone. In git: the golden vectors protocol/vectors/frames.json,
 the CAN database protocol/boebot.dbc, and the tables of PROTOCOL.md. Each kind of file has a module beside this one.
 """

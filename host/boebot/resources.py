@@ -24,7 +24,7 @@ def checkout() -> Path | None:
 
 
 def folder(kind: str) -> Path:
-    """The folder that holds `kind`: "robots", "images" (firmware), "protocol" (CAN database) or
+    """The folder that holds `kind`: "robots", "images" (firmware), "protocol" (the database of its messages) or
     "arenas"."""
     installed, in_checkout = _FOLDERS[kind]
     return in_checkout if checkout() is not None else installed

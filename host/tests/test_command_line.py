@@ -156,8 +156,8 @@ def test_period_is_in_seconds_or_has_a_unit(peer: Peer, capsys: pytest.CaptureFi
         (("run",), 2, "BRAIN"),
         (("run", "wander", "--sedes", "1"), 2, "No such option"),
         (("fly",), 2, "No such command"),
-        (("info", "/dev/does-not-exist"), 1, "there is no port /dev/does-not-exist"),
-        (("info", "toaster"), 1, "there is no board 'toaster'"),
+        (("doctor", "/dev/does-not-exist", "--identity"), 1, "there is no port /dev/does-not-exist"),
+        (("doctor", "toaster", "--identity"), 1, "there is no board 'toaster'"),
         (("serve", "--on", "avr"), 2, "give one of --pty and --tcp PORT"),
         (("serve", "--pty", "--tcp", "0"), 2, "give one of --pty and --tcp PORT"),
         (
@@ -275,18 +275,18 @@ def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:
         and f"protocol {finding.version_name()}, schema {messages.SCHEMA_HASH:08x}" in out
     )
     code, out, _ = boebot(capsys, "--help")
-    assert code == 0 and all(name in out for name in ("run", "serve", "info", "teleop", "new"))
+    assert code == 0 and all(name in out for name in ("run", "serve", "doctor", "teleop", "can"))
 
 
 @pytest.mark.wall_clock
 def test_info_over_a_port(capsys: pytest.CaptureFixture[str]) -> None:
     with pty(Peer()) as served:
-        code, out, _ = boebot(capsys, "info", served.path, "--json")
+        code, out, _ = boebot(capsys, "doctor", served.path, "--identity", "--json")
         values = json.loads(out)
         assert code == 0
         assert (values["firmware"], values["pin_map"], values["tick_rate_hz"]) == ("0.1.0", "shieldbot", 100)
         assert "infrared" in values["devices"]
-        code, out, _ = boebot(capsys, "info", served.path)
+        code, out, _ = boebot(capsys, "doctor", served.path, "--identity")
         assert code == 0 and "compiler" in out and "servo left centre" in out
 
 
@@ -523,7 +523,7 @@ def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.Capture
 
 @pytest.fixture
 def board(monkeypatch: pytest.MonkeyPatch) -> InProcess:
-    """What `boebot link` and `boebot parameters` open."""
+    """What `boebot doctor --watch` and `boebot parameters` open."""
     session = InProcess(Peer())
 
     def opened(url: str, request: BoardRequest) -> InProcess:
@@ -536,7 +536,7 @@ def board(monkeypatch: pytest.MonkeyPatch) -> InProcess:
 
 def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
     board.peer.usual_task_times = [8 * number for number in range(len(messages.Task))]
-    code, out, err = boebot(capsys, "link", "--once", "--json")
+    code, out, err = boebot(capsys, "doctor", "native", "--watch", "--seconds", "1", "--json")
     seen = json.loads(out)
     assert (code, err) == (0, "")
     assert seen["task_longest_s"] == {task.name.lower(): pytest.approx(task / 2e6) for task in messages.Task}
@@ -548,7 +548,7 @@ def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixtu
     board.read(0.01)
     assert board.peer.session == 0 and board.peer.accepted == [], "closed, and nothing has moved"
     board.peer._happened(messages.EventKind.DEAD_MAN, 7)
-    code, out, _ = boebot(capsys, "link", "--once")
+    code, out, _ = boebot(capsys, "doctor", "native", "--watch", "--seconds", "1")
     assert "motors stopped by the dead-man" in " ".join(out.split())
     for name in (
         "round trip p99",
@@ -565,7 +565,7 @@ def test_link_shows_both_ends_once(board: InProcess, capsys: pytest.CaptureFixtu
 
 
 def test_link_prints_an_object_every_second(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = boebot(capsys, "link", "--json", "--seconds", "3.5")
+    _, out, _ = boebot(capsys, "doctor", "native", "--watch", "--json", "--seconds", "3.5")
     seen = [json.loads(line) for line in out.splitlines()]
     assert len(seen) == 4
     assert seen[-1]["host"]["good"] > seen[0]["host"]["good"] > 0
@@ -573,13 +573,13 @@ def test_link_prints_an_object_every_second(board: InProcess, capsys: pytest.Cap
 
 def test_link_says_that_telemetry_is_thinned(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
     board.peer.telemetry_period = 5
-    _, out, err = boebot(capsys, "link", "--once", "--json")
+    _, out, err = boebot(capsys, "doctor", "native", "--watch", "--seconds", "1", "--json")
     assert "sends telemetry every 50 ms, not every 10 ms" in err
     assert json.loads(out)["telemetry_period_s"] == 0.05
 
 
 def test_link_refuses_to_watch_for_less_than_no_time(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = boebot(capsys, "link", "--json", "--seconds", "-1")
+    code, out, err = boebot(capsys, "doctor", "native", "--watch", "--json", "--seconds", "-1")
     assert (code, out) == (2, "") and "seconds" in err
     assert board.peer.openings == []
 

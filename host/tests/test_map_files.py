@@ -23,12 +23,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from boebot.can.log import read_log
 from boebot.errors import AnalysisError, BoebotError, BrainError
 from boebot.image.elf import read_image
 from boebot.navigation import Lattice, LineMap, OccupancyMap, search
 from boebot.navigation.occupancy_map import LONGEST
 from boebot.result import read_run
+from boebot_can.log import read_log
 from boebot_timing.table import read_table
 from sim_bridge.boards import avr
 from sim_bridge.reading_table import ReadingTable

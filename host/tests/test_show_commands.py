@@ -1,4 +1,4 @@
-"""Tests of `boebot arena` and `boebot robot`: picture, table, JSON, and what is wrong in one sentence."""
+"""Tests of `boebot show arena` and `boebot show robot`: picture, table, JSON, and what is wrong in one sentence."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ def texts(svg: Path) -> set[str]:
 
 def test_arena_is_shown(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, err = boebot(capsys, "arena", "showcase")
+    code, out, err = boebot(capsys, "show", "arena", "showcase")
     assert (code, err) == (0, "")
     assert "4 m x 3 m" in out and "cushion" in out and "IR 10%" in out and "arena-showcase.png" in out
     with Image.open("arena-showcase.png") as picture:
         assert picture.info["Title"] == "showcase: one of everything"
-    code, out, err = boebot(capsys, "arena", "empty", "--out", "it.svg")
+    code, out, err = boebot(capsys, "show", "arena", "empty", "--out", "it.svg")
     assert (code, err) == (0, "") and "open field" in out
     assert "empty: empty field" in texts(Path("it.svg"))
 
 
 def test_arena_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, err = boebot(capsys, "arena", "showcase", "--json")
+    code, out, err = boebot(capsys, "show", "arena", "showcase", "--json")
     assert (code, err) == (0, "") and not list(tmp_path.iterdir())
     shown, arena = json.loads(out), load_arena("showcase")
     assert shown["size_m"] == [4.0, 3.0] and tuple(shown["start"].values()) == arena.start
@@ -57,14 +57,14 @@ def test_arena_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path, monke
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("arena", "statoin"), "did you mean 'station'?"),
+        (("show", "arena", "statoin"), "did you mean 'station'?"),
         (
-            ("arena", "room", "--out", "it.jpg"),
+            ("show", "arena", "room", "--out", "it.jpg"),
             "it.jpg is no name of a picture; expected one that ends in .png",
         ),
-        (("arena", "room", "--out", "no/it.png"), "there is no folder no; expected one that the picture"),
-        (("robot", "shieldbott"), "did you mean 'shieldbot'?"),
-        (("arena", "room", "--out", "/dev/full/it.png"), "there is no folder /dev/full"),
+        (("show", "arena", "room", "--out", "no/it.png"), "there is no folder no; expected one that the picture"),
+        (("show", "robot", "shieldbott"), "did you mean 'shieldbot'?"),
+        (("show", "arena", "room", "--out", "/dev/full/it.png"), "there is no folder /dev/full"),
     ],
 )
 def test_wrong_request_is_one_sentence(
@@ -78,13 +78,13 @@ def test_robot_is_shown_with_its_wiring(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, err = boebot(capsys, "robot", "boebot")
+    code, out, err = boebot(capsys, "show", "robot", "boebot")
     assert (code, err) == (0, "") and "A3" in out and "servo port 13" in out
     written, wires = texts(Path("robot-boebot.svg")), connections(load_robot("boebot"))
     assert all({wire.device, wire.to, wire.part, wire.connector} - {""} <= written for wire in wires)
     assert {wire.pin for wire in wires} - {GROUND} <= written  # ground is a sign
     monkeypatch.setenv("COLUMNS", "120")
-    code, out, err = boebot(capsys, "robot", "shieldbot", "--out", "it.svg")
+    code, out, err = boebot(capsys, "show", "robot", "shieldbot", "--out", "it.svg")
     assert (code, err) == (0, "") and "buzzer (off)" in out
     assert "ping" in texts(Path("it.svg")) and "buzzer" not in texts(Path("it.svg"))
 
@@ -95,14 +95,14 @@ def test_robot_by_arsims_scheme_is_shown_with_it_under_its_whole_name(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("own.v2.toml").write_text('extends = "arsim-1.2"\n')
-    code, out, err = boebot(capsys, "robot", robot)
+    code, out, err = boebot(capsys, "show", "robot", robot)
     assert (code, err) == (0, "") and re.search(r"^ scheme +arsim *$", out, re.MULTILINE)
     assert Path(f"robot-{robot.removesuffix('.toml')}.svg").is_file()
-    assert "scheme" not in boebot(capsys, "robot", "arsim")[1]
+    assert "scheme" not in boebot(capsys, "show", "robot", "arsim")[1]
 
 
 def test_robot_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = boebot(capsys, "robot", "shieldbot-basic", "--json")
+    code, out, err = boebot(capsys, "show", "robot", "shieldbot-basic", "--json")
     assert (code, err) == (0, "")
     shown, robot = json.loads(out), load_robot("shieldbot-basic")
     assert shown["free_pins"] == ["A1", "A2", "A3"]
@@ -122,7 +122,7 @@ def test_robot_without_a_board_is_shown_without_wiring(
         f"extends = 'arsim'\nname = '$x_1$ & <b>'\ntitle = '房 {'long ' * 30}'\n{sensors}"
     )
     monkeypatch.chdir(tmp_path)
-    code, out, err = boebot(capsys, "robot", "many.toml")
+    code, out, err = boebot(capsys, "show", "robot", "many.toml")
     assert (code, err) == (0, "") and "eye_19" in out and "pin" not in out
     assert {"eye_0, up to 3 m", "eye_19, up to 3 m"} <= texts(Path("robot-many.svg"))
     assert any(text.startswith("$x_1$ & <b>: 房 long") for text in texts(Path("robot-many.svg")))

@@ -17,8 +17,8 @@ from cantools.database.can import Database, Message, Signal
 from cantools.database.can.c_source import generate
 from cffi import FFI
 
-from boebot.can.frames import PARTS, Assembler, FrameMaker
 from boebot.link import messages
+from boebot_can.frames import PARTS, Assembler, FrameMaker
 
 PROTOCOL = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(PROTOCOL))

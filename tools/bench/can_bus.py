@@ -19,15 +19,15 @@ from typing import Any
 import can
 import cantools.database
 
-from boebot.can.frames import Assembler, CanFrame, FrameMaker
-from boebot.can.load import DEFAULT_BITRATE, frame_bits
-from boebot.can.log import frames_of
-from boebot.can.socketcand_server import SocketcandBus
 from boebot.link import messages
 from boebot.link.frame import Decoder, encode
 from boebot.resources import folder
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
+from boebot_can.frames import Assembler, CanFrame, FrameMaker
+from boebot_can.load import DEFAULT_BITRATE, frame_bits
+from boebot_can.log import frames_of
+from boebot_can.socketcand_server import SocketcandBus
 from tools.bench.figures import Peer, figure
 
 SECONDS = 20.0
@@ -117,8 +117,18 @@ def direct(port: int) -> float:
 
 
 def mirrored(port: int) -> float:
-    """Through `boebot bridge` in a process of its own, and python-can's client."""
-    command = [sys.executable, "-m", "boebot", "bridge", f"socket://127.0.0.1:{port}", "--socketcand", "0", "--json"]
+    """Through `boebot can bridge` in a process of its own, and python-can's client."""
+    command = [
+        sys.executable,
+        "-m",
+        "boebot",
+        "can",
+        "bridge",
+        f"socket://127.0.0.1:{port}",
+        "--socketcand",
+        "0",
+        "--json",
+    ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as bridge:
         assert bridge.stdout is not None
         try:

@@ -16,34 +16,29 @@ from boebot.guests import Command, guests
 
 COMMANDS = {
     "run": Command("Let a brain drive a robot, and say what happened.", "boebot.cli.run:run"),
-    "report": Command("Print a run's figures and write its files anew, from its record.", "boebot.cli.report:report"),
-    "plot": Command("Draw columns of a run over time, a panel for each.", "boebot.cli.plot:plot"),
+    "report": Command(
+        "Print a run's figures and write its files anew, from its record; or draw columns of it.",
+        "boebot.cli.report:report",
+    ),
     "replay": Command(
-        "Run a brain on what was sensed in a run, and name the first command that differs.", "boebot.cli.replay:replay"
+        "Run a brain on what was sensed in a run, and name the first command that differs; or repeat the run.",
+        "boebot.cli.replay:replay",
     ),
     "new": Command("Write a brain, NAME.py, to start from.", "boebot.cli.new:new"),
     "list": Command(
         "List what is bundled, by the names that other commands and Python understand.", "boebot.cli.names:list_names"
     ),
-    "arena": Command(
-        "Show an arena: a picture, its size, where a robot starts, and its shapes.", "boebot.cli.arena:arena"
-    ),
-    "robot": Command(
-        "Show a robot: a picture from above with its wiring, its measures, and a table of its wires.",
-        "boebot.cli.robot:robot",
+    "show": Command(
+        "Show an arena or a robot: a picture, its measures, what stands there or how it is wired.", "boebot.cli.show:app"
     ),
     "serve": Command("Offer the emulated robot to other programs, until Ctrl-C.", "boebot.cli.serve:serve"),
-    "bridge": Command("Put a board on a CAN bus: every message both ways, until Ctrl-C.", "boebot.cli.bridge:bridge"),
-    "dbc": Command("Write the CAN database of a robot's messages, for CAN tools; or check one.", "boebot.cli.dbc:dbc"),
     "doctor": Command(
         "Examine port, firmware and each device of a robot that stands still; say what is not as it should be.",
         "boebot.cli.doctor:doctor",
     ),
-    "info": Command("Say who is at a port: firmware, compiler, image, devices.", "boebot.cli.info:info"),
     "teleop": Command(
         "Drive by keyboard: arrows or W A S D, 1..9 for the speed, space to stop, Q to end.", "boebot.cli.teleop:teleop"
     ),
-    "link": Command("Watch the link: counters of both ends, round trips, the board's clock.", "boebot.cli.link:link"),
     "parameters": Command("List, read, set, save and reset the board's parameters.", "boebot.cli.parameters:app"),
 }
 """Those of the core; guests add theirs (boebot.guests)."""

@@ -1,8 +1,9 @@
-"""`boebot doctor URL`: what is there, what it reads, what it should read, and where to look if it does not. Nothing
-moves."""
+"""`boebot doctor URL`: what is there, what it reads, what it should read, and where to look if it does not; or who is
+there, or what both ends of the link count. Nothing moves."""
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import zlib
@@ -16,7 +17,7 @@ from serial.tools import list_ports
 import boebot
 from boebot import resources
 from boebot.boards import BoardRequest, board_kinds, is_live
-from boebot.cli import options, output
+from boebot.cli import options, output, quantity
 from boebot.cli.board_link import board_link
 from boebot.description.board_parameters import configure
 from boebot.description.equipment import Equipment
@@ -24,6 +25,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import Checkup
 from boebot.devices.latest import Latest
 from boebot.errors import BoebotError
+from boebot.guests import PORTS, guests
 from boebot.link import finding, messages
 from boebot.link.frame import text
 from boebot.link.link import Link
@@ -51,20 +53,51 @@ def doctor(
         str | None,
         typer.Argument(
             metavar="URL",
-            help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT, can:BUS; "
-            "without it the only port that there is.",
+            help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT; without it the only port that there is.",
         ),
     ] = None,
     robot: options.RobotName = "shieldbot",
-    json: options.Json = False,
+    identity: Annotated[
+        bool, typer.Option("--identity", help="Say who is there: firmware, compiler, image, devices, parameters.")
+    ] = False,
+    watch: Annotated[
+        bool,
+        typer.Option(
+            "--watch", help="Watch the link until Ctrl-C: counters of both ends, round trips, the board's clock."
+        ),
+    ] = False,
+    seconds: Annotated[
+        float | None,
+        typer.Option(metavar="TIME", parser=quantity.parser("s", least=0), help="With --watch: end after this time."),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print JSON in place of the table; with --watch an object every second.")
+    ] = False,
 ) -> None:
     """Examine port, firmware and each device of a robot that stands still; say what is not as it should be.
 
-    Exit code: 0 all is well; 1 something is not.
+    Exit code: 0 all is well; 1 something is not. With --identity or --watch: 0.
     """
+    if (identity and watch) or (seconds is not None and not watch):
+        raise typer.BadParameter("expected one of --identity and --watch, and --seconds with --watch")
     description = load_robot(robot)
     if not description.has_board:
         raise BoebotError(f"robot {description.name!r} has no board: there is nothing to examine")
+    if identity or watch:
+        if url is None:
+            ports = _ports()
+            if len(ports) != 1:
+                raise BoebotError(f"expected the URL of a board: {_which(ports)}")
+            (url,) = ports
+        if identity:
+            from boebot.cli import identity as shown
+
+            shown.show(url, description, json)
+        else:
+            from boebot.cli import link_watch
+
+            link_watch.watch(url, description, math.inf if seconds is None else seconds, json)
+        return
     checks = list(_checks(url, description))
     wrong = [check for check in checks if check.hint]
     if json:
@@ -127,7 +160,7 @@ def _which(ports: list[str]) -> str:
 def _port(url: str) -> Iterator[Check]:
     """A serial port of this computer: whether it is there, may be opened, and is free."""
     path = url.removeprefix("serial:").partition("?")[0]
-    if os.name != "posix" or not is_live(url) or "://" in path or url.startswith("can:"):
+    if os.name != "posix" or not is_live(url) or "://" in path or url.partition(":")[0] in guests(PORTS):
         return
     if not os.access(path, os.F_OK):
         yield Check("port", "missing", path, f"is it plugged in? those there are: {', '.join(_ports()) or 'none'}")
@@ -155,7 +188,7 @@ def _firmware(link: Link, robot: RobotDescription) -> Iterator[Check]:
             "image", reads, f"{expected}, the kit's", "" if runs == ours else "if it is not meant, flash the kit's"
         )
     cause = hello.reset_cause
-    hint = "the firmware hung there: boebot link names the task" if finding.by_watchdog(cause) else ""
+    hint = "the firmware hung there: --watch names the task" if finding.by_watchdog(cause) else ""
     if cause == messages.ResetCause.BROWN_OUT:
         hint = "the supply was too low: charge or change the battery"
     yield Check("last reset", finding.reset_in_words(cause), "power or external", hint)

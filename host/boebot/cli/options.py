@@ -9,6 +9,7 @@ import typer
 
 from boebot.cli import completion, quantity
 from boebot.errors import BoebotError
+from boebot.guests import PORTS, guests
 
 SETTINGS: dict[str, Any] = {
     "pretty_exceptions_enable": False,
@@ -17,13 +18,15 @@ SETTINGS: dict[str, Any] = {
 }
 """Of everything that typer makes."""
 
+_PORTS = ", ".join(["/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT", *(f"{name}:..." for name in guests(PORTS))])
+
 On = Annotated[
     str,
     typer.Option(
         "--on",
         metavar="BOARD",
         autocompletion=completion.boards,
-        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT, can:BUS.",
+        help=f"avr, native, or a port: {_PORTS}.",
     ),
 ]
 RunOn = Annotated[
@@ -32,8 +35,7 @@ RunOn = Annotated[
         "--on",
         metavar="BOARD",
         autocompletion=completion.boards,
-        help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT, can:BUS; direct for a robot "
-        "without a board. Else native, or direct.",
+        help=f"avr, native, or a port: {_PORTS}; direct for a robot without a board. Else native, or direct.",
     ),
 ]
 RobotName = Annotated[

@@ -1,42 +1,48 @@
-"""`boebot replay DIR --brain B`: runs a brain on what was sensed in a run, and names the first command that differs.
-In place of a run's folder it takes a log of CAN frames, whoever has recorded it.
+"""`boebot replay DIR`: a brain on what was sensed in a run, and the first command that differs; or with --again the
+whole simulated run once more, and where it differs. In place of a run's folder it takes a record that others have made.
 
-Exit codes: 0 all commands are the same; 1 one differs, or record or log lack a part inside; 2 it cannot be replayed.
+Exit codes: 0 all is the same; 1 something differs, or a record lacks a part inside; 2 it cannot be replayed.
 """
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from boebot.can.log import as_on_the_wire, is_log, read_log
 from boebot.cli import completion, ending, options, output, streams
 from boebot.errors import BoebotError
+from boebot.guests import RECORDS, ReadRecord, guests
 from boebot.record.reading import CutError
 from boebot.record.run import Run
 from boebot.result import read_run, robots_of
 from boebot.robot import Command
+from boebot.running.again import Repetition, again, recorded
 from boebot.running.replayed import replayed
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
+_PER_UNIT = 10_000  # counts of a set-point per unit
+_SUFFIXES = ", ".join(f".{suffix}" for suffix in guests(RECORDS))
 
 
 @ending.of_sensible_rows()
 def replay(
+    context: typer.Context,
     run: Annotated[
-        Path, typer.Argument(metavar="DIR|LOG", help="Folder of a run, or a log of CAN frames (.blf, .asc, .log).")
+        Path,
+        typer.Argument(metavar="DIR|FILE", help=f"Folder of a run, or a record of other programs' ({_SUFFIXES})."),
     ],
     brain: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--brain",
             metavar="BRAIN",
             autocompletion=completion.brains,
             help="Bundled brain, or a Python or TOML file, as of boebot run.",
         ),
-    ],
+    ] = None,
     robot: options.RobotNumber = None,
     kind: Annotated[
         str | None,
@@ -44,33 +50,69 @@ def replay(
             "--kind",
             metavar="R",
             autocompletion=completion.robots,
-            help="Of a CAN log: bundled robot or .toml file; else the one that its board names.",
+            help="Of a FILE: bundled robot or .toml file; else the one that its board names.",
         ),
     ] = None,
     node: Annotated[
-        str | None, typer.Option("--node", metavar="[BUS:]N", help="Of a CAN log: which board, if several.")
+        str | None, typer.Option("--node", metavar="[BUS:]N", help="Of a FILE: which board, if several.")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option("--seed", metavar="N", help="Of a CAN log: seed of the brain's chance; else 1.")
+        int | None, typer.Option("--seed", metavar="N", help="Of a FILE: seed of the brain's chance; else 1.")
     ] = None,
+    repeats: Annotated[
+        bool, typer.Option("--again", help="Repeat a simulated run with its own brain, and say where it differs.")
+    ] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="With --again: run a brain that came with the record.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="With --again: print JSON in place of a sentence.")] = False,
 ) -> None:
-    """Run a brain on what was sensed in a run, and name the first command that differs."""
+    """Run a brain on what was sensed in a run, and name the first command that differs; or repeat the run."""
+    _check(context, repeats, brain)
     try:
-        if is_log(run):
-            if robot is not None:
-                raise BoebotError(f"{run} is a log of CAN frames; expected --node in place of --robot")
-            result = read_log(run, kind, node, 1 if seed is None else seed)
-        elif (kind, node, seed) != (None, None, None):
-            raise BoebotError(f"{run} is no log of CAN frames; expected no --kind, --node or --seed")
+        if repeats:
+            _repeat(run, json, trust)
         else:
-            result = _recorded(run, robot)
-        with streams.kept():
-            commands = replayed(result, brain)
+            _replay(run, brain or "", robot, kind, node, seed)
     except BoebotError as error:
         output.say(str(error))
         raise typer.Exit(EXIT_DIFFERS if isinstance(error, CutError) else EXIT_USAGE) from None
+
+
+def _check(context: typer.Context, repeats: bool, brain: str | None) -> None:
+    """Raises a usage error where options of one way stand beside those of the other."""
+    if not repeats and brain is None:
+        raise typer.BadParameter("expected --brain BRAIN, or --again", context)
+    others = ("brain", "robot", "kind", "node", "seed") if repeats else ("trust", "json")
+    for name in others:
+        if context.params[name] not in (None, False):
+            way = "--again repeats a run as it was; expected no" if repeats else "expected --again with"
+            raise typer.BadParameter(f"{way} --{name}", context)
+
+
+# ---- a brain on what was sensed --------------------------------------------------------------------------------------
+
+
+def _replay(run: Path, brain: str, robot: int | None, kind: str | None, node: str | None, seed: int | None) -> None:
+    foreign = None if run.is_dir() else guests(RECORDS).get(run.suffix[1:].lower())
+    if foreign is not None:
+        if robot is not None:
+            raise BoebotError(f"{run} is no record of boebot's; expected --node in place of --robot")
+        read: ReadRecord = foreign.load()
+        result = read(run, kind, node, 1 if seed is None else seed)
+    elif (kind, node, seed) != (None, None, None):
+        raise BoebotError(f"{run} is the record of a run; expected no --kind, --node or --seed")
+    else:
+        result = _recorded(run, robot)
+    with streams.kept():
+        commands = replayed(result, brain)
     with ending.of_record(result):
-        _compare(result, [as_on_the_wire(command) for command in commands] if is_log(run) else commands)
+        _compare(result, commands if foreign is None else [_as_on_the_wire(command) for command in commands])
+
+
+def _as_on_the_wire(command: Command) -> Command:
+    """A command as its set-point carries it."""
+    return Command(command.kind, *(round(value * _PER_UNIT) / _PER_UNIT for value in command[1:]))
 
 
 def _compare(result: Run, commands: list[Command]) -> None:
@@ -104,3 +146,52 @@ def _place(result: Run, step: int) -> str:
     series, index = result.series, result.series.steps[step]
     tick = f"tick {series.raw['tick'][index]}, " if result.layout is None else ""
     return f"step {step} ({tick}{series.time[index]:.2f} s)"
+
+
+# ---- the run once more -----------------------------------------------------------------------------------------------
+
+
+def _repeat(folder: Path, as_json: bool, trust: bool) -> None:
+    """`trust`: a brain that came with the record is run without asking."""
+    run = recorded(folder)
+    if run.foreign and not trust and sys.stdin is not None and sys.stdin.isatty():
+        output.say(run.warning)
+        trust = typer.confirm("run it?", err=True)
+    with (
+        streams.kept(for_the_answer=True),
+        output.progress_bar(f"{folder} again", run.seconds) as bar,
+        output.step_watch(bar) as progress,
+    ):
+        repetition = again(run, progress, trust=trust)
+    if repetition.part is not None:
+        output.say(repetition.part)
+    if as_json:
+        output.print_json(_values(repetition))
+    else:
+        output.line(_sentence(folder, repetition))
+    if not repetition.is_equal:
+        raise typer.Exit(EXIT_DIFFERS)
+
+
+def _sentence(folder: Path, repetition: Repetition) -> str:
+    if repetition.difference is not None:
+        return f"differs from {folder} first at robot {repetition.robot}, {repetition.difference}"
+    if repetition.ends is not None:
+        return f"differs from {folder}: robot {repetition.robot} ended by {' and by '.join(map(repr, repetition.ends))}"
+    part = "" if repetition.part is None else ", as far as it goes"
+    return f"bit-equal to {folder}{part}: {repetition.steps} steps"
+
+
+def _values(repetition: Repetition) -> dict[str, object]:
+    first = repetition.difference
+    return {
+        "equal": repetition.is_equal,
+        "whole": repetition.part is None,
+        "steps": repetition.steps,
+        "robot": None if repetition.is_equal else repetition.robot,
+        "stream": None if first is None else first.stream,
+        "time_s": None if first is None else first.time,
+        "row": None if first is None else first.row,
+        "difference": None if first is None else first.what,
+        "ends": None if repetition.ends is None else list(repetition.ends),
+    }

@@ -1,38 +1,50 @@
-"""`boebot report DIR`: the figures and files of a run, made anew from its record."""
+"""`boebot report DIR`: the figures, files and pictures of a run, made anew from its record."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from boebot.can import log
-from boebot.cli import ending, options, output
+from boebot.cli import completion, ending, options, output
 from boebot.cli.run_table import Detail, detail, print_run
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, did_you_mean
+from boebot.guests import FORMATS, guests
 from boebot.record.reading import CutError, mend
 from boebot.record.run_folder import RECORD, RunFolder
+from boebot.record.run import Run
 from boebot.result import Result, read_run, robots_of
-from boebot.view import IncompleteError
+from boebot.view import IncompleteError, save_for_foxglove
+
+CSV, FOXGLOVE = "csv", "foxglove"
+_KINDS = (CSV, FOXGLOVE, *guests(FORMATS))
 
 
 @ending.of_sensible_rows()
 def report(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a run, with its record.mcap.")],
-    csv: Annotated[
-        bool, typer.Option("--csv", help="Also run.csv, the bytes of the line, and a brain's steps.")
-    ] = False,
-    foxglove: Annotated[
-        bool, typer.Option("--foxglove", help="Also foxglove.mcap, which Foxglove draws without set-up.")
-    ] = False,
-    can: Annotated[
-        str | None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="COLUMN", help="With --plot: names as in run.csv: ping_distance_m, command_left."),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
         typer.Option(
-            "--can",
-            metavar="blf|asc|log",
-            help="Also can.blf, can.asc or can.log: the messages as CAN frames, for CAN tools.",
+            "--as",
+            metavar="FORMAT",
+            autocompletion=completion.one_of(*_KINDS),
+            help=f"Write the run in a format for other programs, too: {', '.join(_KINDS)}; again for each further one.",
         ),
+    ] = None,
+    plot: Annotated[
+        bool,
+        typer.Option("--plot", help="In place of all else draw the COLUMNs over time; without a COLUMN name them all."),
+    ] = False,
+    robot: options.RobotNumber = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="With --plot: picture, .png or .svg. Else plot.png here.")
     ] = None,
     mended: Annotated[
         bool, typer.Option("--mend", help="Of a cut or damaged record: what is left of it, as record-mended.mcap.")
@@ -41,50 +53,63 @@ def report(
     verbose: options.Verbose = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Print a run's figures and write its files anew, from its record. A record that is cut is read up to there; of one
-    that is damaged, what is left is read and the exit code is 1."""
-    if can is not None and can not in log.KINDS:
-        raise typer.BadParameter(f"there is no format {can!r}; expected one of {', '.join(log.KINDS)}")
+    """Print a run's figures and write its files anew, from its record; or draw columns of it.
+
+    A record that is cut is read up to there; of one that is damaged, what is left is read and the exit code is 1.
+    --as csv writes run.csv, the bytes of the line, and the steps of a brain of processes; --as foxglove writes
+    foxglove.mcap, which Foxglove draws without set-up.
+    """
+    for name in formats or []:
+        if name not in _KINDS:
+            expected = f"one of {', '.join(_KINDS)}"
+            raise typer.BadParameter(f"there is no format {name!r}; expected {expected}{did_you_mean(name, _KINDS)}")
+    if not plot and (columns or robot is not None or out is not None):
+        raise typer.BadParameter("COLUMN, --robot and --out go with --plot")
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
-    folder = run if run.is_dir() else run.parent
     result = read_run(run)
+    with ending.of_record(result):
+        if plot:
+            _plot(robots_of(result, robot), columns or [], out)
+        else:
+            _report(run, result, formats or [], mended, wanted)
+
+
+def _plot(robots: Mapping[int, Run], columns: list[str], out: Path | None) -> None:
+    # here, as matplotlib takes a while: no other command should wait for it
+    from boebot.view import column_plot, tables
+
+    if columns:
+        output.line(f"picture: {column_plot.write(robots, columns, out or Path('plot.png'))}")
+    else:
+        for name in dict.fromkeys(name for result in robots.values() for name in tables.columns(result)):
+            output.line(name)
+
+
+def _report(run: Path, result: Result, formats: list[str], mended: bool, wanted: Detail) -> None:
+    folder = run if run.is_dir() else run.parent
+    robots = robots_of(result)
     files: list[Path] = []
     unsaved: BoebotError | None = None
     with RunFolder(folder):
         try:
-            files += result.save(folder, csv=csv)
-            if foxglove:
-                from boebot.view import save_for_foxglove
-
+            files += result.save(folder, csv=CSV in formats)
+            if FOXGLOVE in formats:
                 files.append(save_for_foxglove(result.robots, folder))
-            if can is not None:
-                files += _can_logs(result, folder, can)
+            for name in formats:
+                if name not in (CSV, FOXGLOVE):
+                    write: Callable[[Mapping[int, Run], Path], list[Path]] = guests(FORMATS)[name].load()
+                    files += write(robots, folder)
             if mended and isinstance(result.error, CutError):
                 files.append(mend(folder / RECORD if run.is_dir() else run, result.robots))
         except BoebotError as error:  # the figures are printed all the same
             unsaved = error
             files += error.files if isinstance(error, IncompleteError) else []
-    with ending.of_record(result):
-        if wanted is Detail.JSON:
-            wall_clock = {"wall_clock": result.wall_clock()}
-            output.print_json(result.table() | wall_clock | {"files": [str(path) for path in files]})
-        elif wanted is not Detail.NOTHING:
-            print_run(result, wanted)
-            if files:
-                output.line(ending.files_in(folder, files))
-        if unsaved is not None:
-            raise unsaved
-
-
-def _can_logs(result: Result, folder: Path, kind: str) -> list[Path]:
-    """Writes a log for each robot that has a board."""
-    robots = robots_of(result)
-    if len(robots) == 1:
-        return [log.save_log(robots[1], folder / f"can.{kind}")]
-    boards = {number: robot for number, robot in robots.items() if robot.layout is None}
-    if not boards:
-        raise BoebotError("no robot of the run has a board, so there are no CAN frames")
-    return [
-        log.save_log(robot, folder / f"robot-{number}" / f"can.{kind}", (number - 1) % 7 + 1)
-        for number, robot in boards.items()
-    ]
+    if wanted is Detail.JSON:
+        table: dict[str, Any] = result.table()
+        output.print_json(table | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]})
+    elif wanted is not Detail.NOTHING:
+        print_run(result, wanted)
+        if files:
+            output.line(ending.files_in(folder, files))
+    if unsaved is not None:
+        raise unsaved

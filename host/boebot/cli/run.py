@@ -40,16 +40,15 @@ from top to bottom; with --brain, one of several behaviors."""
 
 
 def run(
-    context: typer.Context,
     brain: Annotated[
-        list[str] | None,
+        list[str],
         typer.Argument(
             metavar="BRAIN",
             autocompletion=completion.brains,
             help="What drives it: a bundled brain by its name, a Python file with step(robot), main(robot), a class "
             "Brain or brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
         ),
-    ] = None,
+    ],
     on: options.RunOn = None,
     robot: Annotated[
         list[str] | None,
@@ -115,33 +114,12 @@ def run(
         Path | None,
         typer.Option(metavar="DIR", help="Where to write record.mcap, run.png, replay.html and summary.json."),
     ] = None,
-    repeated: Annotated[
-        Path | None,
-        typer.Option(
-            "--again",
-            metavar="DIR",
-            help="In place of a brain: repeat the simulated run in that folder, and say where it differs.",
-        ),
-    ] = None,
-    trust: Annotated[
-        bool, typer.Option("--trust", help="With --again: run a brain that came with the record.")
-    ] = False,
     json: options.Json = False,
     verbose: options.Verbose = False,
     quiet: options.Quiet = False,
 ) -> None:
     """See `_HELP`."""
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
-    if repeated is not None:
-        _check_alone(context)
-        from boebot.cli.again import run_again  # here: it needs much that a run does not
-
-        run_again(repeated, json, trust)
-        return
-    if trust:
-        raise typer.BadParameter("--trust goes with --again DIR", context)
-    if not brain:
-        raise typer.BadParameter("expected a BRAIN, or --again DIR", context)
     ideal, imperfect = options.names(without), options.magnitudes(imperfection)
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
@@ -208,17 +186,6 @@ def _assigned(texts: list[str], count: int) -> list[dict[str, Any]]:
         for values in meant:
             values[name] = value
     return list(robots.values())
-
-
-def _check_alone(context: typer.Context) -> None:
-    """Raises a usage error where --again has other arguments beside it than --json and --trust."""
-    sources = {name: context.get_parameter_source(name) for name in context.params}
-    given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
-    others = sorted(given - {"repeated", "json", "trust"})
-    if others:
-        raise typer.BadParameter(
-            f"--again repeats a run as it was; expected no {others[0].replace('_', '-')} beside it", context
-        )
 
 
 def _count(robots: int | None, brains: int, kinds: int, poses: int) -> int:

@@ -5,7 +5,8 @@ The ports of this computer are in boebot.link.ports; an in-process board brings 
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
 
 
 class Transport(Protocol):
@@ -82,22 +83,9 @@ class CountsOverruns(Protocol):
         """How many since it was opened, as far as the operating system counts them."""
 
 
-class BusFigures(NamedTuple):
-    """What the host sees of a CAN bus on which its board is."""
-
-    load: float | None
-    """Share of the time for which the bus was busy in the last second, stuffed bits counted; None: not yet known."""
-    errors: int
-    """Error frames."""
-    lost: int
-    """Messages to this host of which a frame was missing."""
-    stale: int
-    """Messages to this host that were of another session."""
-
-
 @runtime_checkable
-class OnBus(Protocol):
-    """A transport whose board is on a CAN bus."""
+class Measures(Protocol):
+    """A transport that knows more of the way to the board than its bytes, as of a bus."""
 
-    def bus_figures(self) -> BusFigures:
-        """What was seen of the bus."""
+    def figures(self) -> Mapping[str, float | None]:
+        """By name, a unit in it; None: not yet known."""

@@ -16,7 +16,7 @@ from typing import Any
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
 from boebot.errors import BoebotError
 from boebot.imperfections import switched_off, switches
-from boebot.link.transport import OnBus
+from boebot.link.transport import Measures
 from boebot.live import messages
 from boebot.live.audience import Audience
 from boebot.live.chunks import EACH_S, Chunks, OfRun
@@ -326,12 +326,11 @@ def _quality(robot: Hands) -> Message | None:
     link, status = robot.driver.link, robot.driver.status()
     if link is None:
         return None
-    bus = link.transport.bus_figures() if isinstance(link.transport, OnBus) else None
     return {
         "lost": status.lost_frames,
         "bad": status.bad_frames,
         "sessions_lost": status.sessions_lost,
         "resets": status.resets,
         "round_trip_s": link.clock.round_trips.quantile(0.5),
-        "bus": None if bus is None else bus._asdict(),
+        "transport": link.transport.figures() if isinstance(link.transport, Measures) else {},
     }

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import IO
 
 from boebot.errors import BoebotError
+from boebot.guests import FORMATS, guests
 
 RECORD, MENDED = "record.mcap", "record-mended.mcap"
 FORMAT = 4  # of a record and of the files made from it; CHANGELOG.md says what is new in each
@@ -30,10 +31,8 @@ FILES = (
     "to_host.bin",
     "wire.csv",
     "foxglove.mcap",
-    "can.blf",
-    "can.asc",
-    "can.log",
     MENDED,
+    *guests(FORMATS),
 )
 """What is made from a record; of a run of several robots also in a folder for each, `robot-1` and so on."""
 _ROBOT = re.compile(r"robot-[1-9]\d*\Z")

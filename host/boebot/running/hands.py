@@ -2,7 +2,7 @@
 
 Whoever watches a run (boebot.live) hands interventions over; they are carried out here, before a step of the brain, and
 each goes into the record with its time. A simulated run with the same interventions at the same steps is the same run
-bit for bit: `boebot run --again` takes them from the record.
+bit for bit: `boebot replay --again` takes them from the record.
 """
 
 from __future__ import annotations

@@ -220,7 +220,7 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, caps
     shown = [text for _, kind, text in content([watched])["runs"][0]["rows"]["events"] if kind == "intervention"]
     assert shown[:2] == ["put at 0.00, 0.00 m, 57°", "moving shape 1 put at 1.20, 0.30 m"]
     assert shown[2] == "wander.forward = 0.3" and shown[3].startswith("driven by hand")
-    for command in (["run", "--again", str(folder)], ["replay", str(folder), "--brain", "demo"]):
+    for command in (["replay", str(folder), "--again"], ["replay", str(folder), "--brain", "demo"]):
         code, out, error = boebot(capsys, *command)
         assert code == 0, out + error
 

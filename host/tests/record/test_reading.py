@@ -1,4 +1,4 @@
-"""Commands on the record of a run: `boebot report`, `boebot plot`, `boebot run --again` and `boebot replay`."""
+"""Commands on the record of a run: `boebot report` and `boebot replay`."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def test_columns_are_drawn(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, err = boebot(capsys, "plot", str(folder), "ping_distance_m", "true_x_m")
+    code, out, err = boebot(capsys, "report", str(folder), "--plot", "ping_distance_m", "true_x_m")
     assert (code, err) == (0, "") and "plot.png" in out
     with Image.open("plot.png") as picture:
         assert picture.info["Title"] == "wander on shieldbot" and picture.width > picture.height
         two = picture.height
-    assert boebot(capsys, "plot", str(folder), "tick", "--out", "one.png")[0] == 0
+    assert boebot(capsys, "report", str(folder), "--plot", "tick", "--out", "one.png")[0] == 0
     with Image.open("one.png") as picture:
         assert picture.height < two
 
@@ -66,7 +66,7 @@ def test_unknown_column_is_refused(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, folder: Path, column: str, sentence: str
 ) -> None:
     picture = tmp_path / "plot.png"
-    code, out, err = boebot(capsys, "plot", str(folder), column, "--out", str(picture))
+    code, out, err = boebot(capsys, "report", str(folder), "--plot", column, "--out", str(picture))
     assert code != 0 and out == "" and sentence in " ".join(err.split()) and "Traceback" not in err
     assert not picture.exists()
 
@@ -86,15 +86,15 @@ def test_one_of_several_robots_is_chosen(capsys: pytest.CaptureFixture[str], tmp
     for number, (asked, title) in enumerate(titles.items()):
         picture = tmp_path / f"{number}.png"
         columns = ("true_x_m", "ping_distance_m")
-        assert boebot(capsys, "plot", str(two), *columns, *asked, "--out", str(picture))[0] == 0
+        assert boebot(capsys, "report", str(two), "--plot", *columns, *asked, "--out", str(picture))[0] == 0
         with Image.open(picture) as opened:
             assert opened.info["Title"] == title
     for robot in ("1", "2"):
         code, out, _ = boebot(capsys, "replay", str(two), "--brain", "wander", "--robot", robot)
         assert code == 0 and "all 40 commands are the same" in out
     refused = {
-        ("plot", str(two), "tick", "--robot", "3"): "there is no robot 3 in the run; expected 1 to 2",
-        ("plot", str(two), "ping_distance_m", "--robot", "1"): "the run has no column 'ping_distance_m'",
+        ("report", str(two), "--plot", "tick", "--robot", "3"): "there is no robot 3 in the run; expected 1 to 2",
+        ("report", str(two), "--plot", "ping_distance_m", "--robot", "1"): "the run has no column 'ping_distance_m'",
         ("replay", str(two), "--brain", "wander", "--robot", "3"): "there is no robot 3 in the run; expected 1 to 2",
         ("replay", str(two), "--brain", "wander"): "is a run of 2 robots; expected --robot 1 to 2",
     }
@@ -107,12 +107,12 @@ def test_runs_are_repeated_bit_by_bit(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: Path, two: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, err = boebot(capsys, "run", "--again", str(folder))
+    code, out, err = boebot(capsys, "replay", str(folder), "--again")
     assert (code, err) == (0, "") and " ".join(out.split()).endswith(": 40 steps") and "bit-equal to" in out
-    assert boebot(capsys, "run", "--again", str(two))[0] == 0
+    assert boebot(capsys, "replay", str(two), "--again")[0] == 0
     avr = ("--on", "avr", "--period", "100ms", "--seconds", "0.5")
     assert boebot(capsys, "run", "wander", *avr, "--out", "avr")[0] == 0
-    assert boebot(capsys, "run", "--again", "avr")[1].endswith(": 5 steps\n")
+    assert boebot(capsys, "replay", "avr", "--again")[1].endswith(": 5 steps\n")
 
 
 def test_repetition_uses_the_recorded_files(
@@ -149,7 +149,7 @@ def test_repetition_uses_the_recorded_files(
     sys.modules.pop("one_speed")  # as in a new process
     ran = Path("ran")
     Path("two/brain.py").write_text(f"open({str(ran)!r}, 'w')\n" + brains["two/brain.py"])
-    code, out, err = boebot(capsys, "run", "--again", "run")
+    code, out, err = boebot(capsys, "replay", "run", "--again")
     sentence = (
         "the record brings a brain that is not the file on this computer, brain.py, one_speed.py, brain.py; it could"
     )
@@ -157,7 +157,7 @@ def test_repetition_uses_the_recorded_files(
     with pytest.raises(library.BoebotError, match=r"expected --trust \(trust=True\)"):
         again(recorded(Path("run")))
     assert not ran.exists()
-    code, out, err = boebot(capsys, "run", "--again", "run", "--trust")
+    code, out, err = boebot(capsys, "replay", "run", "--again", "--trust")
     assert (code, err) == (0, "") and "bit-equal to run: " in out and not ran.exists()
     sys.modules.pop("one_speed")
 
@@ -173,7 +173,7 @@ def test_run_that_ctrl_c_ended_is_repeated_up_to_there(
     with pytest.raises(KeyboardInterrupt):
         library.run("brain.py", out="run")
     Path("interrupt").unlink()
-    code, out, err = boebot(capsys, "run", "--again", "run")
+    code, out, err = boebot(capsys, "replay", "run", "--again")
     assert code == 0 and "bit-equal to run, as far as it goes" in out and "ended by Ctrl-C after 0.75 s" in err
     Path("interrupt").touch()
     with pytest.raises(KeyboardInterrupt):
@@ -192,7 +192,7 @@ def test_repetition_says_where_it_differs(
     Path("moody.py").write_text(source)
     assert boebot(capsys, "run", "moody.py", "--seconds", "1", "--out", "run")[0] == 0
     Path("speed").write_text("0.1")
-    code, out, _ = boebot(capsys, "run", "--again", "run", "--json")
+    code, out, _ = boebot(capsys, "replay", "run", "--again", "--json")
     said = json.loads(out)
     assert code == 1 and not said["equal"]
     assert (said["stream"], said["row"]) == ("command", 11) and said["time_s"] == pytest.approx(0.55)
@@ -205,7 +205,7 @@ def test_record_that_is_cut_is_repeated_as_far_as_it_goes(
     cut.mkdir()
     data = (folder / "record.mcap").read_bytes()
     (cut / "record.mcap").write_bytes(data[: data.rindex(b"end.json") - 50])
-    code, out, err = boebot(capsys, "run", "--again", str(cut))
+    code, out, err = boebot(capsys, "replay", str(cut), "--again")
     assert code == 0 and "as far as it goes" in out and "the record is cut" in err
 
 
@@ -214,11 +214,11 @@ def test_what_cannot_be_repeated_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert boebot(capsys, "run", "wander", "--seconds", "0.2", "--realtime", "--out", "paced")[0] == 0
-    code, _, err = boebot(capsys, "run", "--again", "paced")
+    code, _, err = boebot(capsys, "replay", "paced", "--again")
     assert code == 2 and "was run in real time, which no run repeats bit by bit" in " ".join(err.split())
-    code, _, err = boebot(capsys, "run", "--again", str(folder), "--seed", "2")
+    code, _, err = boebot(capsys, "replay", str(folder), "--again", "--seed", "2")
     assert code == 2 and "expected no seed beside it" in err
-    assert boebot(capsys, "run", "--again", "nowhere")[0] == 2
+    assert boebot(capsys, "replay", "nowhere", "--again")[0] == 2
 
 
 BATTERY = """
@@ -293,7 +293,7 @@ def test_damaged_record_is_not_silent_anywhere(
     monkeypatch.chdir(tmp_path)
     copied(many, tmp_path / "run", change)
     lost = "the run from 1.00 s to 1.25 s is lost; figures are of what is left"
-    code, out, err = boebot(capsys, "report", "run", "--mend", "--csv", "--json")
+    code, out, err = boebot(capsys, "report", "run", "--mend", "--as", "csv", "--json")
     said = json.loads(out)
     assert code == 1 and lost in err and lost in said["ended"]
     assert (said["steps"], said["ticks"]) == (40, 201 - 25)
@@ -306,8 +306,8 @@ def test_damaged_record_is_not_silent_anywhere(
             "--brain",
             str(many.parent / "mine.py"),
         ): "all 20 commands are the same, as far as it goes",
-        ("plot", "run", "true_x_m"): "plot.png",
-        ("run", "--again", "run"): "",
+        ("report", "run", "--plot", "true_x_m"): "plot.png",
+        ("replay", "run", "--again"): "",
         ("report", "run/record-mended.mcap"): "record is damaged",
         ("replay", "run/record-mended.mcap", "--brain", str(many.parent / "mine.py")): "all 20 commands are the same",
     }.items():
@@ -344,7 +344,7 @@ def test_damaged_attachment_is_not_believed(
         said = json.loads(out)
         assert code == 1 and f"attachment '{name}.json' is lost" in err
         assert (said["seed"], said["steps"], said["ticks"]) == (1, 40, 201)
-        code, out, err = boebot(capsys, "run", "--again", name)
+        code, out, err = boebot(capsys, "replay", name, "--again")
         assert (code, out) == (1, "") and "expected a record that is not damaged inside" in err, run
 
 
@@ -355,7 +355,7 @@ def test_mended_record_of_one_whose_end_is_damaged_still_says_so(
     assert boebot(capsys, "report", str(run), "--mend", "-q")[0] == 1
     code, out, err = boebot(capsys, "report", str(run / "record-mended.mcap"), "--json")
     assert code == 1 and "attachment 'end.json' is lost" in err and json.loads(out)["steps"] == 40
-    assert boebot(capsys, "run", "--again", str(run / "record-mended.mcap"))[0] == 1
+    assert boebot(capsys, "replay", str(run / "record-mended.mcap"), "--again")[0] == 1
 
 
 def test_what_only_the_end_of_a_record_knows_is_not_known_without_it(
@@ -388,7 +388,7 @@ def test_mended_record_of_one_that_is_cut_still_says_so(
     assert boebot(capsys, "report", str(run), "--mend", "-q")[0] == 0
     for record in (run, run / "record-mended.mcap"):
         for asked in (
-            ("run", "--again", str(record)),
+            ("replay", str(record), "--again"),
             ("replay", str(record), "--brain", str(many.parent / "mine.py")),
         ):
             code, out, err = boebot(capsys, *asked)
@@ -422,9 +422,14 @@ def test_exit_codes_of_what_is_no_record(capsys: pytest.CaptureFixture[str], tmp
         short: 0,
         old: 0,
     }.items():
-        for command in (("report", "{}"), ("plot", "{}", "tick"), ("replay", "{}", *brain), ("run", "--again", "{}")):
+        for command in (
+            ("report", "{}"),
+            ("report", "{}", "--plot", "tick"),
+            ("replay", "{}", *brain),
+            ("replay", "{}", "--again"),
+        ):
             asked = [str(folder) if word == "{}" else word for word in command]
-            if command[0] == "plot":
+            if "--plot" in command:
                 asked += ["--out", str(tmp_path / "plot.png")]
             code, _, err = boebot(capsys, *asked)
             assert code == expected and "Traceback" not in err, asked
@@ -436,7 +441,7 @@ def test_nothing_is_not_the_same_as_nothing(
     """A record that is cut before its first group."""
     monkeypatch.chdir(tmp_path)
     copied(many, tmp_path / "run", lambda data: data.__delitem__(slice(chunk(data, 0), None)))
-    for asked in (("replay", "run", "--brain", "wander"), ("run", "--again", "run")):
+    for asked in (("replay", "run", "--brain", "wander"), ("replay", "run", "--again")):
         code, out, err = boebot(capsys, *asked)
         assert (code, out) == (2, "") and "there is nothing to compare" in err
     copied(many, tmp_path / "damaged", lambda data: data.__setitem__(chunk(data, 0), 0))
@@ -469,7 +474,7 @@ def test_file_of_a_record_lands_nowhere_else(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, many: Path, name: str
 ) -> None:
     run = strangers(many, tmp_path / "run", name, {}, b"harm")
-    code, out, err = boebot(capsys, "run", "--again", str(run), "--trust")
+    code, out, err = boebot(capsys, "replay", str(run), "--again", "--trust")
     assert (code, out) == (2, "") and f"the record has a file {'brain/' + name!r}; expected a path below brain/" in err
     assert not list(tmp_path.rglob("x.py*"))
 
@@ -488,7 +493,7 @@ def test_stranger_cannot_have_a_port_opened_or_a_file_of_ours_run(
     ]
     for number, (asked, sentence) in enumerate(refused):
         run = strangers(many, tmp_path / str(number), "other.py", asked)
-        code, out, err = boebot(capsys, "run", "--again", str(run))
+        code, out, err = boebot(capsys, "replay", str(run), "--again")
         assert (code, out) == (2, "") and sentence in err
     assert [path.name for path in tmp_path.glob("ours*")] == ["ours.py"]
 
@@ -515,6 +520,10 @@ def test_rows_that_no_run_writes_are_one_sentence(
 ) -> None:
     """Though their checksums are right: a command of kind 9, and one without signals."""
     run = strangers(many, tmp_path / "run", "x.py", {}, rows={"command": Block.of([(0.0, data)])})
-    for asked in (("report", str(run)), ("replay", str(run), "--brain", "wander"), ("plot", str(run), "tick")):
+    for asked in (
+        ("report", str(run)),
+        ("replay", str(run), "--brain", "wander"),
+        ("report", str(run), "--plot", "tick"),
+    ):
         code, out, err = boebot(capsys, *asked)
         assert (code, out) == (2, "") and "the record makes no sense (" in err and len(err.splitlines()) == 1

@@ -72,7 +72,7 @@ def test_name_that_is_no_utf_8_is_escaped_and_the_run_is_repeated_by_it(tmp_path
     assert (done.returncode, done.stderr) == (0, "") and r"a\xff on shieldbot" in done.stdout
     assert_whole(tmp_path / "out", 4)
     (tmp_path / brain).unlink()  # its source is in the record
-    done = copied_process.command(["run", "--again", "out", "--trust"], tmp_path)
+    done = copied_process.command(["replay", "out", "--again", "--trust"], tmp_path)
     assert (done.returncode, done.stdout) == (0, "bit-equal to out: 4 steps\n")
 
 

@@ -305,7 +305,7 @@ def test_command_writes_it_and_a_new_run_replaces_it(
 ) -> None:
     folder = tmp_path / "run"
     boebot.run("wander", seconds=1, out=folder)
-    code, out, err = command(capsys, "report", str(folder), "--foxglove")
+    code, out, err = command(capsys, "report", str(folder), "--as", "foxglove")
     assert (code, err) == (0, "") and "foxglove.mcap" in out and (folder / "foxglove.mcap").is_file()
     boebot.run("wander", seconds=1, out=folder)
     assert not (folder / "foxglove.mcap").exists()
@@ -313,6 +313,6 @@ def test_command_writes_it_and_a_new_run_replaces_it(
     for name in [name for name in sys.modules if name.startswith(("foxglove_", "boebot.view.foxglove"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "foxglove_schemas_protobuf", None)
-    code, out, err = command(capsys, "report", str(folder), "--foxglove")
+    code, out, err = command(capsys, "report", str(folder), "--as", "foxglove")
     assert code != 0 and "pip install 'boebot[foxglove]'" in " ".join(err.split()) and "Traceback" not in err
     assert not (folder / "foxglove.mcap").exists()

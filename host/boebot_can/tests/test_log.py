@@ -1,4 +1,4 @@
-"""A run's CAN frames in logs that stock tools open, and logs of stock tools as runs: `boebot report --can`,
+"""A run's CAN frames in logs that stock tools open, and logs of stock tools as runs: `boebot report --as can.blf`,
 `boebot replay LOG`. python-can and cantools judge."""
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from typing import Any
 import can
 import cantools.database
 import pytest
-from test_can_bridge import bridged
+from test_bridge import bridged
 
 import boebot as library
-from boebot.can.frames import CanFrame
-from boebot.can.log import KINDS, Sent, frames_of, read_log, save_log
-from boebot.can.socketcand_server import SocketcandBus
 from boebot.errors import BoebotError
 from boebot.link.messages import Telemetry
 from boebot.result import RunResult
 from boebot.running.board_driver import BoardDriver
+from boebot_can.frames import CanFrame
+from boebot_can.log import KINDS, Sent, frames_of, read_log, save_log
+from boebot_can.socketcand_server import SocketcandBus
 from command import boebot, heed_signals
 
-DATABASE: Any = cantools.database.load_file(Path(__file__).resolve().parents[2] / "protocol" / "boebot.dbc")
+DATABASE: Any = cantools.database.load_file(Path(__file__).resolve().parents[3] / "protocol" / "boebot.dbc")
 HELLO = range(0x621, 0x631, 2)
 NODE = 0xE0  # bits of an identifier
 OPEN, SET_POINT, TELEMETRY, CLOCK_PROBE = 0x620, 0x120, 0x321, 0x224
@@ -144,7 +144,7 @@ def together(folder: Path, *robots: str) -> str:
 @pytest.mark.usefixtures("no_pictures")
 def test_each_robot_with_a_board_has_a_log(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     mixed = together(tmp_path / "mixed", "arsim", "shieldbot", "boebot")
-    code, out, err = boebot(capsys, "report", mixed, "--can", "asc", "--json")
+    code, out, err = boebot(capsys, "report", mixed, "--as", "can.asc", "--json")
     assert (code, err) == (0, "")
     logs = [Path(name) for name in json.loads(out)["files"] if "can" in Path(name).name]
     assert (
@@ -168,7 +168,7 @@ def test_where_no_log_can_be_written_figures_are_printed_all_the_same(
 ) -> None:
     folder = together(tmp_path / "run", *robots)
     Path(folder, "can.blf").mkdir()
-    code, out, err = boebot(capsys, "report", folder, "--can", "blf")
+    code, out, err = boebot(capsys, "report", folder, "--as", "can.blf")
     assert (code, err) == (1, f"boebot: {sentence.format(folder)}\n") and robots[0] in out
 
 
@@ -311,7 +311,7 @@ def as_node_2(frames: list[CanFrame]) -> list[CanFrame]:
         (without(SET_POINT), "", "{} has no set-points for node 1: nobody drove the robot"),
         (lambda frames: frames + as_node_2(frames), "", "{} has boards of several nodes; expected --node 1 or 2"),
         (as_node_2, "--node 5", "{} has no hello of a board of node 5; expected 2"),
-        (as_node_2, "--robot 2", "{} is a log of CAN frames; expected --node in place of --robot"),
+        (as_node_2, "--robot 2", "{} is no record of boebot's; expected --node in place of --robot"),
         (
             as_node_2,
             "--kind arsim",

@@ -16,11 +16,6 @@ import pytest
 
 import boebot
 from boebot.boards import BoardRequest, BoardSession, open_board
-from boebot.can.bridge import Bridge
-from boebot.can.bus import Bus, BusName, PythonCanBus
-from boebot.can.frames import CanFrame
-from boebot.can.socketcand_server import SocketcandBus
-from boebot.can.transport import open_can
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
@@ -29,6 +24,11 @@ from boebot.link.link import Link
 from boebot.robot import Robot
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
+from boebot_can.bridge import Bridge
+from boebot_can.bus import Bus, BusName, PythonCanBus
+from boebot_can.frames import CanFrame
+from boebot_can.socketcand_server import SocketcandBus
+from boebot_can.transport import open_can
 from can_line import after, drive
 from command import boebot as boebot_command
 
@@ -299,7 +299,7 @@ def test_multicast_stays_on_this_computer_and_brings_no_echo() -> None:
 
 
 def test_command_puts_a_board_on_a_bus_and_says_what_it_carried(capsys: pytest.CaptureFixture[str]) -> None:
-    command = [sys.executable, "-m", "boebot", "bridge", "native", "--socketcand", "0", "--json"]
+    command = [sys.executable, "-m", "boebot", "can", "bridge", "native", "--socketcand", "0", "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
@@ -307,11 +307,11 @@ def test_command_puts_a_board_on_a_bus_and_says_what_it_carried(capsys: pytest.C
             with contextlib.closing(open_can(url)) as transport:
                 link = Link(transport)
                 link.open()
-                assert transport.bus_figures().errors == 0
+                assert transport.figures()["bus_error_frames"] == 0
                 link.close()
             code, examined, _ = boebot_command(capsys, "doctor", url, "--json")
             assert code == 0, examined
-            code, told, _ = boebot_command(capsys, "link", "--on", url, "--once", "--json")
+            code, told, _ = boebot_command(capsys, "doctor", url, "--watch", "--seconds", "1", "--json")
             assert code == 0 and 0.14 < json.loads(told)["bus_load"] < 0.25, "telemetry alone takes 16 %"
             assert json.loads(told)["bus_error_frames"] == 0
         finally:

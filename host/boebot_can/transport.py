@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Mapping
 
-from boebot.can.bus import Bus, BusName, PythonCanBus
-from boebot.can.frames import NODE_MASK, NODES, STOP, CanFrame, ForeignFrameError
-from boebot.can.iso_tp import LongMessages
-from boebot.can.load import BusLoad
-from boebot.can.translator import HostEnd
 from boebot.errors import BoardError
-from boebot.link.transport import BusFigures
+from boebot_can.bus import Bus, BusName, PythonCanBus
+from boebot_can.frames import NODE_MASK, NODES, STOP, CanFrame, ForeignFrameError
+from boebot_can.iso_tp import LongMessages
+from boebot_can.load import BusLoad
+from boebot_can.translator import HostEnd
 
 _SLICE_S = 0.05  # the end of a bus is noticed within this time
 
@@ -89,9 +89,16 @@ class CanTransport:
         self._closed = True
         self._bus.close()
 
-    def bus_figures(self) -> BusFigures:
-        """What was seen of the bus."""
-        return BusFigures(self._load.share(self.now()), self._bus.errors, self._end.assembler.lost, self._end.stale)
+    def figures(self) -> Mapping[str, float | None]:
+        """Of the bus: the share of the last second for which it was busy, stuffed bits counted; error frames; messages
+        to this host of which a frame was missing, and those that were of another session."""
+        load = self._load.share(self.now())
+        return {
+            "bus_load": None if load is None else round(load, 4),
+            "bus_error_frames": self._bus.errors,
+            "bus_lost_messages": self._end.assembler.lost,
+            "bus_stale_messages": self._end.stale,
+        }
 
     def _send(self, frames: list[CanFrame]) -> None:
         now = self.now()

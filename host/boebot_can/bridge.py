@@ -10,12 +10,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from boebot.can.bus import Bus
-from boebot.can.frames import CanFrame, ForeignFrameError
-from boebot.can.iso_tp import LongMessages
-from boebot.can.translator import BoardEnd
 from boebot.errors import BoardError
 from boebot.link.transport import Transport
+from boebot_can.bus import Bus
+from boebot_can.frames import CanFrame, ForeignFrameError
+from boebot_can.iso_tp import LongMessages
+from boebot_can.translator import BoardEnd
 
 STEP_S = 0.0004  # wait for the board between two looks at the bus: a frame to it is late by as much at most
 _HELLO_LIMIT_S = 4.0  # a boot loader may wait first

@@ -12,9 +12,9 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from boebot.can.frames import ALL_NODES, NODE_MASK, SET_POINTS, Assembler, CanFrame, FrameMaker, whole_tick
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, Decoder, encode, reader
+from boebot_can.frames import ALL_NODES, NODE_MASK, SET_POINTS, Assembler, CanFrame, FrameMaker, whole_tick
 
 _TICK = reader(messages.Telemetry, "tick")
 _HELLO_SESSION = reader(messages.Hello, "session")

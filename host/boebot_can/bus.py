@@ -20,10 +20,10 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 from urllib.parse import unquote
 
-from boebot.can.extra import import_extra
-from boebot.can.frames import CanFrame
 from boebot.errors import BoardError, did_you_mean
 from boebot.link.ports import CONNECT_S, why_not_connected
+from boebot_can.extra import import_extra
+from boebot_can.frames import CanFrame
 
 _ERR_ACK = 0x20  # error frame of SocketCAN: nobody acknowledged (linux/can/error.h)
 _ERR_BUS_OFF = 0x40

@@ -1,20 +1,18 @@
-"""`boebot link`: what both ends of the link count, how fast it is, and how well the board's clock is known, live."""
+"""`boebot doctor --watch`: what both ends of the link count, how fast it is, and how well the board's clock is known, live."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from boebot.boards import BoardRequest
-from boebot.cli import options, output, quantity
+from boebot.cli import output
 from boebot.cli.board_link import board_link
-from boebot.description.robots import load_robot
+from boebot.description.robots import RobotDescription
 from boebot.link import finding
 from boebot.link.frame import text
 from boebot.link.link import Link
-from boebot.link.transport import BaudSelectable, OnBus, Transport
+from boebot.link.transport import BaudSelectable, Measures
 
 _PERIOD_S = 1.0
 _WAIT_S = 0.05
@@ -22,31 +20,17 @@ _CYCLES_PER_S = 16_000_000
 _TABLES = ("host", "board_end", "task_longest_s")
 
 
-def link(
-    on: options.On = "native",
-    robot: options.RobotName = "shieldbot",
-    seconds: Annotated[
-        float,
-        typer.Option(metavar="TIME", parser=quantity.parser("s", least=0), help="End by itself after this time."),
-    ] = float("inf"),
-    once: Annotated[bool, typer.Option("--once", help="Print one look, after a second of listening, and end.")] = False,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print a JSON object every second in place of the table.")
-    ] = False,
-) -> None:
-    """Watch the link: counters of both ends, round trips, the board's clock. Ctrl-C ends it; nothing moves."""
-    request = BoardRequest(robot=load_robot(robot), record=False, realtime=True)
-    with board_link(on, request) as (watched, _):
-        if once:
-            seconds = min(seconds, _PERIOD_S)
-        if json:
-            _watch(watched, seconds, lambda look: output.print_json(look, indent=None), once)
+def watch(url: str, robot: RobotDescription, seconds: float, as_json: bool) -> None:
+    """Shows a table that stays in its place, or a JSON object every second."""
+    with board_link(url, BoardRequest(robot=robot, record=False, realtime=True)) as (watched, _):
+        if as_json:
+            _watch(watched, seconds, lambda seen: output.print_json(seen, indent=None))
         else:
-            _show_table(watched, seconds, once)
+            _show_table(watched, seconds)
 
 
-def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None], once: bool) -> None:
-    """Polls for `seconds`; shows a look every second, or only the last."""
+def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None]) -> None:
+    """Polls for `seconds`; shows a look every second, and the last one."""
     now = watched.transport.now
     begun = next_look = now()
     next_look += _PERIOD_S
@@ -54,9 +38,8 @@ def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None]
     while True:
         ended = now() - begun >= seconds
         if now() >= next_look or ended:
-            if not once or ended:
-                show(look(watched, before))
-                before = Rates(watched)
+            show(look(watched, before))
+            before = Rates(watched)
             next_look += _PERIOD_S
         if ended:
             return
@@ -83,7 +66,7 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
         "board": transport.name,
         "robot": None if hello is None else text(hello.robot),
         "baud": transport.baud if isinstance(transport, BaudSelectable) else None,
-        **_bus(transport),
+        **(transport.figures() if isinstance(transport, Measures) else {}),
         "session": None if hello is None or not watched.session.is_open else f"{hello.session:06x}",
         "telemetry_period_s": None if hello is None else round(hello.telemetry_period / hello.tick_rate, 6),
         "last_reset": None if hello is None else finding.reset_in_words(hello.reset_cause),
@@ -104,33 +87,19 @@ def look(watched: Link, before: Rates) -> dict[str, Any]:
     }
 
 
-def _bus(transport: Transport) -> dict[str, Any]:
-    """Of a board on a CAN bus: load and errors of the bus."""
-    if not isinstance(transport, OnBus):
-        return {}
-    seen = transport.bus_figures()
-    return {
-        "bus_load": None if seen.load is None else round(seen.load, 4),
-        "bus_error_frames": seen.errors,
-        "bus_lost_messages": seen.lost,
-        "bus_stale_messages": seen.stale,
-    }
-
-
 def _rounded(seconds: float | None) -> float | None:
     return None if seconds is None else round(seconds, 6)
 
 
-def _show_table(watched: Link, seconds: float, once: bool) -> None:
-    """The same as a table that stays in its place."""
+def _show_table(watched: Link, seconds: float) -> None:
     from rich.live import Live
 
     console = output.console()
-    if once or not console.is_terminal:
-        _watch(watched, seconds, lambda seen: console.print(_table(seen)), once)
+    if not console.is_terminal:
+        _watch(watched, seconds, lambda seen: console.print(_table(seen)))
         return
     with Live(console=console, auto_refresh=False) as live:
-        _watch(watched, seconds, lambda seen: live.update(output.Escaped(_table(seen)), refresh=True), once)
+        _watch(watched, seconds, lambda seen: live.update(output.Escaped(_table(seen)), refresh=True))
 
 
 def _table(seen: dict[str, Any]) -> Any:

@@ -17,16 +17,16 @@ import cantools.database
 import pytest
 
 from boebot.boards import BoardRequest, BoardSession, open_board
-from boebot.can.bus import BusName, PythonCanBus
-from boebot.can.frames import Assembler, CanFrame, ForeignFrameError, FrameMaker, whole_tick
-from boebot.can.iso_tp import LongMessages
-from boebot.can.load import BusLoad, frame_bits
-from boebot.can.transport import open_can
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.frame import encode, text
 from boebot.link.link import Link
+from boebot_can.bus import BusName, PythonCanBus
+from boebot_can.frames import Assembler, CanFrame, ForeignFrameError, FrameMaker, whole_tick
+from boebot_can.iso_tp import LongMessages
+from boebot_can.load import BusLoad, frame_bits
+from boebot_can.transport import open_can
 from can_line import CanLine, Carry, after, drive
 from command import boebot
 
@@ -168,7 +168,7 @@ def test_set_points_are_withheld_while_the_bus_is_ahead(monkeypatch: pytest.Monk
             clock[0] = seconds
             transport.write(set_point + stop)
             assert [frame.identifier for frame in wire.receive(0.0)] == arriving
-        assert transport.bus_figures().stale == 1
+        assert transport.figures()["bus_stale_messages"] == 1
         transport.read(0.0)
         transport.write(set_point)
         assert len(wire.receive(0.0)) == 1, "nothing waits any more"
@@ -217,7 +217,7 @@ def test_name_that_leads_to_no_bus_is_one_sentence(name: str, sentence: str) -> 
 
 
 def test_port_that_does_not_greet_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boebot.can.bus.TIMEOUT_S", 0.1)
+    monkeypatch.setattr("boebot_can.bus.TIMEOUT_S", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         name = f"socketcand:can0?host=127.0.0.1&port={silent.getsockname()[1]}"
         with pytest.raises(BoardError, match="cannot be joined: no answer within"):
@@ -236,7 +236,7 @@ def test_settings_of_a_bus_reach_its_interface() -> None:
 
 
 def test_nothing_of_can_is_imported_before_it_is_used() -> None:
-    lines = "import sys, boebot.cli, boebot.boards, boebot.cli.bridge, boebot.can.bridge, boebot.can.transport\n"
+    lines = "import sys, boebot.cli, boebot.boards, boebot.cli.bridge, boebot_can.bridge, boebot_can.transport\n"
     lines += "print(*{'can', 'isotp', 'cantools', 'msgpack'} & set(sys.modules))"
     ended = subprocess.run([sys.executable, "-c", lines], capture_output=True, text=True, check=True)
     assert ended.stdout.strip() == ""
@@ -255,22 +255,22 @@ def test_without_its_packages_one_sentence_says_so(
 
 def test_database_of_a_node_and_of_another_version(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = tmp_path / "robot.dbc"
-    assert boebot(capsys, "dbc", str(made), "--node", "3")[0] == 0
-    code, out, _ = boebot(capsys, "dbc", "--check", str(made))
+    assert boebot(capsys, "can", "dbc", str(made), "--node", "3")[0] == 0
+    code, out, _ = boebot(capsys, "can", "dbc", "--check", str(made))
     assert code == 0 and "fits this version" in out
     loaded: Any = cantools.database.load_file(made, strict=True)
     assert {message.frame_id >> 5 & 7 for message in loaded.messages} == {3}
     assert loaded.get_message_by_name("setpoint_signal").frame_id == 0x160
     other = tmp_path / "other.dbc"
     other.write_text(made.read_text().replace(f"0x{messages.SCHEMA_HASH:08X}", "0x12345678"))
-    code, _, err = boebot(capsys, "dbc", "--check", str(other))
+    code, _, err = boebot(capsys, "can", "dbc", "--check", str(other))
     assert code == 1 and err == (
         f"boebot: {other} is of another version of the protocol: its SchemaHash is 0x12345678, expected "
-        f"0x{messages.SCHEMA_HASH:08X}; write it anew with `boebot dbc`\n"
+        f"0x{messages.SCHEMA_HASH:08X}; write it anew with `boebot can dbc`\n"
     )
     other.write_text(made.read_text().replace("SG_ ping_echo : 16|16@1+ (1,0)", "SG_ ping_echo : 16|16@1+ (2,0)"))
-    code, _, err = boebot(capsys, "dbc", "--check", str(other))
+    code, _, err = boebot(capsys, "can", "dbc", "--check", str(other))
     assert code == 1 and "lays out telemetry_5 in another way" in err
     made.write_text("no database")
-    code, _, err = boebot(capsys, "dbc", "--check", str(made))
+    code, _, err = boebot(capsys, "can", "dbc", "--check", str(made))
     assert code == 1 and err.startswith(f"boebot: {made} is no CAN database: ") and err.count("\n") == 1

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from boebot import resources
-from boebot.can.extra import import_extra
-from boebot.can.frames import NODE_MASK
-from boebot.can.layout import NODE_SHIFT
 from boebot.errors import BoebotError
 from boebot.link import messages
+from boebot_can.extra import import_extra
+from boebot_can.frames import NODE_MASK
+from boebot_can.layout import NODE_SHIFT
 
 
 def of_node(node: int) -> str:
@@ -53,17 +53,19 @@ def check(path: Path) -> int:
     attribute = getattr(getattr(database, "dbc", None), "attributes", {}).get("SchemaHash")
     wanted = f"0x{messages.SCHEMA_HASH:08X}"
     if attribute is None:
-        raise BoebotError(f"{path} does not name its schema; expected SchemaHash {wanted}, as `boebot dbc` writes it")
+        raise BoebotError(
+            f"{path} does not name its schema; expected SchemaHash {wanted}, as `boebot can dbc` writes it"
+        )
     if attribute.value != wanted:
         raise BoebotError(
             f"{path} is of another version of the protocol: its SchemaHash is {attribute.value}, expected {wanted}; "
-            "write it anew with `boebot dbc`"
+            "write it anew with `boebot can dbc`"
         )
     own = cantools.load_string(of_node(1), "dbc", strict=True)
     wrong = sorted(_layout(own) ^ _layout(database))
     if wrong:
         raise BoebotError(
-            f"{path} lays out {wrong[0][0]} in another way than this version; write it anew with `boebot dbc`"
+            f"{path} lays out {wrong[0][0]} in another way than this version; write it anew with `boebot can dbc`"
         )
     return len(database.messages)
 

@@ -6,3 +6,7 @@
 `bridge` puts a board on one, `transport` drives a board through one. `socketcand_server` is a bus of our own.
 python-can and can-isotp are imported only where a bus is opened: they are the extra `boebot[can]`.
 """
+
+from boebot.guests import Command
+
+COMMAND = Command("Put a board on a CAN bus, or write the database for CAN tools.", "boebot_can.command:app")

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from boebot.can.frames import CanFrame
-from boebot.can.translator import BoardEnd, HostEnd
 from boebot.link import messages
 from boebot.link.link import Link
 from boebot.link.transport import Transport
+from boebot_can.frames import CanFrame
+from boebot_can.translator import BoardEnd, HostEnd
 
 Carry = Callable[[CanFrame], list[CanFrame]]
 

@@ -10,16 +10,12 @@ import heapq
 import logging
 import re
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from boebot.can.extra import import_extra
-from boebot.can.frames import NODE_MASK, PARTS, Assembler, CanFrame, CanMessage, ForeignFrameError
-from boebot.can.iso_tp import LongMessages
-from boebot.can.layout import LAYOUTS, NODE_SHIFT
-from boebot.can.translator import BoardEnd, HostEnd
 from boebot.description.board_parameters import adapted, parameters_of
 from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import BoebotError
@@ -31,6 +27,11 @@ from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.record.run_folder import write_whole
 from boebot.robot import Command
+from boebot_can.extra import import_extra
+from boebot_can.frames import NODE_MASK, PARTS, Assembler, CanFrame, CanMessage, ForeignFrameError
+from boebot_can.iso_tp import LongMessages
+from boebot_can.layout import LAYOUTS, NODE_SHIFT
+from boebot_can.translator import BoardEnd, HostEnd
 
 KINDS = ("blf", "asc", "log")
 """Formats, by suffix: Vector's binary and text, candump's. python-can's others lose data."""
@@ -152,12 +153,27 @@ def save_log(result: Run, path: Path, node: int = 1) -> Path:
     return write_whole(path, write)
 
 
+def save_logs(kind: str, robots: Mapping[int, Run], folder: Path) -> list[Path]:
+    """A format of `boebot report`: a log for each robot that has a board, each another node.
+
+    Raises:
+        BoebotError: none has one, or a file cannot be written.
+    """
+    if len(robots) == 1:
+        return [save_log(robot, folder / f"can.{kind}") for robot in robots.values()]
+    boards = {number: robot for number, robot in robots.items() if robot.layout is None}
+    if not boards:
+        raise BoebotError("no robot of the run has a board, so there are no CAN frames")
+    return [
+        save_log(robot, folder / f"robot-{number}" / f"can.{kind}", (number - 1) % 7 + 1)
+        for number, robot in boards.items()
+    ]
+
+
+save_blf, save_asc, save_candump = (partial(save_logs, kind) for kind in KINDS)
+
+
 # ---- a log as a run --------------------------------------------------------------------------------------------------
-
-
-def is_log(path: Path) -> bool:
-    """Whether that is such a log, by its name, and not the folder of a run."""
-    return path.suffix[1:].lower() in KINDS and not path.is_dir()
 
 
 def read_log(path: Path, robot: str | None = None, node: str | None = None, seed: int = 1) -> Run:
@@ -191,11 +207,6 @@ def read_log(path: Path, robot: str | None = None, node: str | None = None, seed
     result = reader.result(path, _robot(path, reader, robot), seed)
     result.error = result.error or cut
     return result
-
-
-def as_on_the_wire(command: Command) -> Command:
-    """A command as its set-point carries it: in counts of 0.0001."""
-    return Command(command.kind, *(round(value * _PER_UNIT) / _PER_UNIT for value in command[1:]))
 
 
 def _sent(path: Path) -> Iterator[tuple[str, Sent]]:

@@ -1,31 +1,23 @@
-"""`boebot info URL`: who is there. The handshake, firmware, compiler, image, devices, parameters, and the state of the
-board."""
+"""`boebot doctor --identity`: who is there. The handshake, firmware, compiler, image, devices, parameters, and the state
+of the board."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from boebot.boards import BoardRequest
-from boebot.cli import options, output
+from boebot.cli import output
 from boebot.cli.board_link import board_link
-from boebot.description.robots import load_robot
+from boebot.description.robots import RobotDescription
 from boebot.errors import BoardError
 from boebot.link import finding, messages
 from boebot.link.frame import text
 from boebot.link.link import Link
 
 
-def info(
-    url: Annotated[
-        str, typer.Argument(metavar="URL", help="avr, native, or a port: /dev/ttyACM0, socket://HOST:PORT.")
-    ],
-    robot: options.RobotName = "shieldbot",
-    json: options.Json = False,
-) -> None:
-    """Say who is at a port: firmware, compiler, image, devices."""
-    with board_link(url, BoardRequest(robot=load_robot(robot), record=False)) as (link, description):
+def show(url: str, robot: RobotDescription, as_json: bool) -> None:
+    """Says who is at a port: firmware, compiler, image, devices."""
+    with board_link(url, BoardRequest(robot=robot, record=False)) as (link, description):
         hello = link.open()
         identity = link.identity()
         values: dict[str, Any] = {
@@ -55,7 +47,7 @@ def info(
     values["latch"] = _name(messages.Latch, telemetry.latch)
     values["uptime_s"] = round(telemetry.tick / hello.tick_rate, 2)
     values["status"] = [flag.name.lower() for flag in messages.Status if telemetry.status & flag and flag.name]
-    if json:
+    if as_json:
         output.print_json(values | {"parameters": parameters})
         return
     output.print_table(values | {"status": values["status"] or "nothing to report"})

@@ -23,8 +23,8 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from boebot.can.frames import CanFrame
 from boebot.errors import BoardError
+from boebot_can.frames import CanFrame
 
 CHANNEL = "can0"
 MOST_CLIENTS = 32
@@ -49,7 +49,7 @@ class _Client:
 
 
 class SocketcandBus:
-    """A bus that clients join on a TCP port of loopback (a `Bus` of boebot.can.bus).
+    """A bus that clients join on a TCP port of loopback (a `Bus` of boebot_can.bus).
 
     Attributes:
         name: how people call it.

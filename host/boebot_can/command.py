@@ -1,9 +1,11 @@
-"""`boebot bridge`: puts a board, emulated or real, on a CAN bus."""
+"""`boebot can bridge`: puts a board, emulated or real, on a CAN bus. `boebot can dbc`: the CAN database of the
+protocol's messages."""
 
 from __future__ import annotations
 
 import contextlib
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -11,8 +13,16 @@ import typer
 from boebot.boards import BoardRequest, is_live, open_board
 from boebot.cli import completion, options, output
 from boebot.description.robots import load_robot
+from boebot_can import COMMAND, database
+from boebot_can.bridge import Bridge
+from boebot_can.bus import Bus, BusName, PythonCanBus
+from boebot_can.extra import import_extra
+from boebot_can.socketcand_server import SocketcandBus
+
+app = typer.Typer(help=COMMAND.line, no_args_is_help=True, add_completion=False, **options.SETTINGS)
 
 
+@app.command()
 def bridge(
     board: Annotated[
         str,
@@ -47,11 +57,6 @@ def bridge(
     json: options.Json = False,
 ) -> None:
     """Put a board on a CAN bus: every message both ways, until Ctrl-C."""
-    from boebot.can.bridge import Bridge
-    from boebot.can.bus import Bus, BusName, PythonCanBus
-    from boebot.can.extra import import_extra
-    from boebot.can.socketcand_server import SocketcandBus
-
     if (can is None) == (socketcand is None):
         raise typer.BadParameter("give one of --can BUS and --socketcand PORT")
     import_extra("isotp")
@@ -101,3 +106,33 @@ def bridge(
 def _joining(port: int) -> str:
     """How python-can's tools join our bus."""
     return f"-i socketcand -c can0 --bus-kwargs host=localhost port={port}"
+
+
+@app.command()
+def dbc(
+    out: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="Where to write it; without it: standard output.")
+    ] = None,
+    node: Annotated[int, typer.Option("--node", metavar="N", min=1, max=7, help="The board's number on the bus.")] = 1,
+    check: Annotated[
+        Path | None, typer.Option("--check", metavar="FILE", help="Write nothing; say whether this file fits.")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Write the CAN database of a robot's messages, for CAN tools; or check one."""
+    if check is not None:
+        frames = database.check(check)
+        if json:
+            output.print_json({"file": str(check), "frames": frames})
+        else:
+            output.line(f"{check} fits this version: {frames} frames")
+        return
+    text = database.of_node(node)
+    if out is None:
+        output.line(text.rstrip("\n"))
+    else:
+        database.write(out, text)
+        if json:
+            output.print_json({"file": str(out), "node": node})
+        else:
+            output.line(f"wrote {out}, for node {node}")

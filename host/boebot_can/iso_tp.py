@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from boebot.can.extra import import_extra
-from boebot.can.frames import CanFrame
-from boebot.can.layout import ISO_TP_TO_BOARD, ISO_TP_TO_HOST, NODE_SHIFT
+from boebot_can.extra import import_extra
+from boebot_can.frames import CanFrame
+from boebot_can.layout import ISO_TP_TO_BOARD, ISO_TP_TO_HOST, NODE_SHIFT
 
 _LONGEST = 255  # bytes of a datagram
 _PARAMETERS = {

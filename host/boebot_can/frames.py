@@ -10,7 +10,8 @@ import struct
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from boebot.can.layout import (
+from boebot.link import messages
+from boebot_can.layout import (
     ISO_TP_TO_BOARD,
     ISO_TP_TO_HOST,
     LAYOUTS,
@@ -18,7 +19,6 @@ from boebot.can.layout import (
     TIME_TO_LIVE_MS,
     Layout,
 )
-from boebot.link import messages
 
 NODES = range(1, 8)
 ALL_NODES = 0

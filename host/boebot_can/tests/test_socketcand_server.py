@@ -11,9 +11,9 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from boebot.can.frames import CanFrame
-from boebot.can.socketcand_server import MOST_CLIENTS, QUEUE_BYTES, SocketcandBus
 from boebot.errors import BoardError
+from boebot_can.frames import CanFrame
+from boebot_can.socketcand_server import MOST_CLIENTS, QUEUE_BYTES, SocketcandBus
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.unsanitized]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from boebot.can.frames import CanFrame
+from boebot_can.frames import CanFrame
 
 DEFAULT_BITRATE = 500_000  # bit/s
 _CRC15 = 0x4599
