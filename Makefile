@@ -64,7 +64,7 @@ check:
 
 bench:
 	@$(SIDE_BY_SIDE) ready-bench
-	@$(PYTHON_VENV) -m tools.bench $(if $(ONLY),--only "$(ONLY)") $(if $(PAGE),--page $(PAGE))
+	@$(PYTHON_VENV) -m tools.tests.bench $(if $(ONLY),--only "$(ONLY)") $(if $(PAGE),--page $(PAGE))
 
 experiments:
 	@$(SIDE_BY_SIDE) ready-run
@@ -80,7 +80,7 @@ soak: experiments
 	@$(PYTHON_VENV) -m tools.other_emulators
 	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
 	@PYTHONMALLOC=malloc tools/test_sanitized.sh
-	@$(PYTHON_VENV) -m tools.error_rates --page docs/reference/error-rates.md
+	@$(PYTHON_VENV) -m tools.tests.error_rates --page docs/reference/error-rates.md
 
 EXAMPLES ?= 5000
 FUZZ_SECONDS ?= 60
@@ -226,7 +226,7 @@ build/simavr/.done: tools/fetch_simavr.py build/.done-system-run
 	@$$(tools/find_python.sh) tools/fetch_simavr.py
 	@touch $@
 
-build/avr8js/.done: tools/fetch_avr8js.py hil_tests/calibration/avr8js.py $(VENV)/.done-bench
+build/avr8js/.done: tools/fetch_avr8js.py tools/tests/calibration/avr8js.py $(VENV)/.done-bench
 	@$(PYTHON_VENV) -m tools.fetch_avr8js
 	@touch $@
 

@@ -40,7 +40,12 @@ HAS_SIMAVR = any(Path("build/simavr").glob("**/sim_avr.c"))
 PIN_HEADERS = FIRMWARE.glob("generated/pins_*.h")
 PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in PIN_HEADERS)
 
-GUESTS = ("avr_timing", "boebot_can", "boebot_course", "boebot_timing")  # packages beside the library, which join it by entry points
+GUESTS = (
+    "avr_timing",
+    "boebot_can",
+    "boebot_course",
+    "boebot_timing",
+)  # packages beside the library, which join it by entry points
 
 # What a wheel carries beside its modules: folder in the package <- (folder in the checkout, patterns).
 WHEEL_DATA = {

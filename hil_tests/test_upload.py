@@ -19,8 +19,6 @@ from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.ports import open_serial
 from hil_tests.bootloader import with_bootloader
-from hil_tests.calibration import board
-from hil_tests.calibration.talk import START, Talk
 from sim_bridge.serve import carry
 from sim_bridge.served_ports import PtyPort
 from sim_bridge.sessions.session import SimSession

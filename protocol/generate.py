@@ -59,7 +59,7 @@ def built() -> dict[Path, str]:
     return {
         **{GENERATED / name: text for name, text in headers.items()},
         ROOT / "host" / "boebot" / "link" / "messages.py": python_module.python_module(spec),
-        ROOT / "host" / "boebot" / "can" / "layout.py": can_module.can_module(spec),
+        ROOT / "host" / "boebot_can" / "layout.py": can_module.can_module(spec),
         attributes_stub.STUB: attributes_stub.stub(),
     }
 

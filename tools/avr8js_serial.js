@@ -5,7 +5,7 @@
 
 const fs = require('fs');
 const path = require('path');
-const { uno } = require('../hil_tests/calibration/avr8js_run.js');
+const { uno } = require('./tests/calibration/avr8js_run.js');
 
 const STEPS = 20000; // instructions between two looks at the input
 

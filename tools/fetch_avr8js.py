@@ -15,7 +15,7 @@ import tarfile
 import tempfile
 from pathlib import Path
 
-from hil_tests.calibration.avr8js import FOLDER, VERSION, find_tool
+from tools.tests.calibration.avr8js import FOLDER, VERSION, find_tool
 
 SHA512 = "lS1vPaB0gB2GXoPrHFQOUG/5CRORjvnmjbs8SiPZdJpt4HkV0+v6HnNeXxo/X9lPqumqphls2Qyql8zsw9rBaw=="
 MARK = FOLDER.parent / "fetched"  # holds the SHA-512 of what was unpacked

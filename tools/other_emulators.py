@@ -18,8 +18,8 @@ from pathlib import Path
 
 from avr_timing.closed_pipe import exit_as
 from boebot.link import frame, messages
-from hil_tests.calibration.avr8js import FOLDER, find_tool
 from tools.avr_program import IMAGES, ROOT
+from tools.tests.calibration.avr8js import FOLDER, find_tool
 
 AVR8JS = Path(__file__).with_name("avr8js_serial.js")
 QEMU = ["qemu-system-avr", "-M", "uno", "-nographic", "-monitor", "none", "-serial", "stdio", "-bios"]

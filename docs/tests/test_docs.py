@@ -30,9 +30,9 @@ def names(rows: list[tuple[Path, str]]) -> list[str]:
 
 
 @cache
-def help_of(subcommand: str) -> str:
-    shown = copied_process.command([subcommand, "--help"], ROOT, {"COLUMNS": "200", "TERM": "dumb"})
-    assert shown.returncode == 0, f"there is no command boebot {subcommand}"
+def help_of(*command: str) -> str:
+    shown = copied_process.command([*command, "--help"], ROOT, {"COLUMNS": "200", "TERM": "dumb"})
+    assert shown.returncode == 0, f"there is no command boebot {' '.join(command)}"
     return re.sub(r"\x1b\[[0-9;]*m", "", shown.stdout)
 
 
@@ -82,6 +82,8 @@ INLINE = sorted({(page, command) for page in PAGES for command in COMMAND.findal
 def test_command_in_a_sentence_exists_with_its_options(page: Path, command: str) -> None:
     words = shlex.split(command)[1:]
     shown = help_of(words[0])
+    if re.search(r"^Commands:", shown, re.MULTILINE):
+        shown = help_of(*words[:2])
     for option in (word for word in words[1:] if word.startswith("--") and word != "--help"):
         assert re.search(rf"{re.escape(option)}\b", shown), f"{page.name}: {command}: no option {option}"
 

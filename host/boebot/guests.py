@@ -5,8 +5,8 @@
     boebot.ports      a scheme of URLs               Callable[[str], Transport], given the whole URL
     boebot.commands   a sub-command                  Command
     boebot.lists      a list of `boebot list`        Callable[[], list[dict[str, Any]]]: rows with a name and a title
-    boebot.formats    a format of `boebot report`    Callable[[Mapping[int, Run], Path], list[Path]]: it writes a file of
-                                                     that name for robots, by their numbers, into a folder
+    boebot.formats    a format of `boebot report`    Callable[[Mapping[int, Run], Path], list[Path]]: it writes a file
+                                                     of that name for robots, by their numbers, into a folder
     boebot.records    a foreign record, by suffix    boebot.guests.ReadRecord
     boebot.checks     what cannot be in time         boebot.running.tasks.Check
 

@@ -20,8 +20,7 @@ import pytest
 
 from boebot import cli
 from boebot.boards import BoardRequest, board_kinds, open_world
-from boebot.cli import board_link, run_table, teleop
-from boebot.cli import link as link_command
+from boebot.cli import board_link, link_watch, run_table, teleop
 from boebot.link import finding, messages
 from boebot.link.link import Link
 from boebot.result import RunResult, read_run
@@ -589,12 +588,12 @@ def test_clock_of_a_session_that_has_just_begun_is_not_known(board: InProcess) -
     watched.open()
     while watched.transport.now() < 1.0:
         watched.poll(0.01)
-    before = link_command.Rates(watched)
-    assert link_command.look(watched, before)["clock_bound_s"] < 500e-6
+    before = link_watch.Rates(watched)
+    assert link_watch.look(watched, before)["clock_bound_s"] < 500e-6
     board.peer.reset()
     while watched.counts.sessions == 1:
         watched.poll(0.001)
-    seen = link_command.look(watched, before)
+    seen = link_watch.look(watched, before)
     assert watched.clock.estimate.probes > 0
     assert (seen["clock_bound_s"], seen["clock_offset_s"], seen["clock_drift"]) == (None, None, None)
 

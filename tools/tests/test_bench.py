@@ -14,15 +14,17 @@ import pytest
 from rich.console import Console
 
 import copied_process
-from tools.bench import report, scene
-from tools.bench.__main__ import figures
-from tools.bench.figures import Figure, Peer, figure
+from tools.printed import MARK
+from tools.tests.bench import report, scene
+from tools.tests.bench.__main__ import figures
+from tools.tests.bench.figures import Figure, Peer, figure
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def a_figure(better: str, target: float | None, *peers: Peer, measure: Any = lambda: 5.0, **more: Any) -> Figure:
-    return Figure("speed of a thing", "m/s", better, target, peers, measure, **more)  # type: ignore[arg-type]
+    of_peer = more.pop("of_peer", False)
+    return Figure("speed of a thing", "m/s", better, target, of_peer, peers, measure, **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -67,14 +69,23 @@ def test_peers_take_turns_and_the_best_or_the_median_of_the_rounds_counts() -> N
     assert median["rounds"] == [5.0, 8.0, 6.0] and report.spread(median) == "50 %"
 
 
+def test_a_bound_is_on_the_value_or_on_its_ratio_to_the_first_peer() -> None:
+    slow, fast = Peer("slow", lambda: 2.0), Peer("fast", lambda: 10.0)
+    for peers, met in (((slow, fast), True), ((fast, slow), False)):
+        row = report.measure(a_figure("more", 2.5, *peers, of_peer=True))
+        assert row["met"] is met and report.target(row) == "≥ × 2.5"
+
+
 def test_a_figure_has_at_most_one_bound() -> None:
     with pytest.raises(ValueError, match="two bounds"):
         figure("two bounds", "s", at_least=1.0, at_most=2.0)
+    with pytest.raises(ValueError, match="no peer"):
+        figure("no peer", "s", times_at_least=1.0)
 
 
 def test_the_table_shows_value_spread_bound_and_peers() -> None:
     rows = [
-        report.measure(a_figure("less", 4.0, Peer("somebody", 2.0), Peer("else", 10.0))),
+        report.measure(a_figure("less", 4.0, Peer("somebody", lambda: 2.0), Peer("else", lambda: 10.0))),
         report.failed(a_figure("more", None), RuntimeError("no such thing")),
     ]
     console = Console(width=140)
@@ -91,18 +102,18 @@ def test_the_table_shows_value_spread_bound_and_peers() -> None:
 
 
 def run(*options: str) -> copied_process.Done:
-    return copied_process.module("tools.bench", options, ROOT)
+    return copied_process.module("tools.tests.bench", options, ROOT)
 
 
 def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
     names = run("--list").stdout.splitlines()
-    assert len(set(names)) == len(names) > 50
+    assert len(set(names)) == len(names) > 25
     lasers = run("--list", "--only", "laser of 683", "--only", "no such thing").stdout.splitlines()
     assert lasers == [name for name in names if "laser of 683" in name] and len(lasers) == 4
     chosen = figures(["laser of 683"])
-    assert {(one.target, one.unit) for one in chosen} == {(target, "rays/s") for target in (100e6, 20e6)}
+    assert {(one.target, one.of_peer, one.unit) for one in chosen} == {(100, True, "rays/s")}
     (wandering,) = figures(["native board and world, wander"])
-    assert wandering.target == 300 and wandering.better == "more"
+    assert wandering.target == 4 and wandering.better == "more"
 
 
 def test_a_pattern_without_a_figure_is_one_sentence() -> None:
@@ -112,22 +123,24 @@ def test_a_pattern_without_a_figure_is_one_sentence() -> None:
 
 def test_json_page_and_progress(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    done = run("--only", "board's clock", "--json", "--page", str(page))
+    page.write_text(f"By hand.\n{MARK}old")
+    done = run("--only", "encodes telemetry", "--json", "--page", str(page))
     result = json.loads(done.stdout)
-    assert [row["unit"] for row in result["figures"]] == ["us", "us"] and result["complete"] is False
-    assert "[1/2] board's clock" in done.stderr and "[2/2]" in done.stderr
+    assert [row["unit"] for row in result["figures"]] == ["frames/s"] * 2 and result["complete"] is False
+    assert "[1/2] Python encodes" in done.stderr and "[2/2]" in done.stderr
     assert done.returncode == int(not all(row["met"] for row in result["figures"]))
-    assert "| board's clock, an observation's stamp |" in page.read_text()
+    assert page.read_text().startswith("By hand.\n") and "old" not in page.read_text()
+    assert "| Python encodes telemetry of 37 B: fields to frame |" in page.read_text()
 
 
 def test_ctrl_c_shows_what_was_measured_so_far() -> None:
-    """The board's clock is the first match, in a second; the run over 10 simulated minutes is the next one."""
+    """Frames are the first matches, in seconds; a run of 10 simulated minutes is the next one."""
     command = [
         sys.executable,
         "-m",
-        "tools.bench",
+        "tools.tests.bench",
         "--only",
-        "board's clock",
+        "encodes telemetry",
         "--only",
         "10 simulated minutes",
         "--json",

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from hil_tests.calibration.avr8js import VERSION
 from tools import fetch_avr8js
+from tools.tests.calibration.avr8js import VERSION
 
 
 @pytest.fixture

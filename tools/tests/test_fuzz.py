@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tools import fuzz
-from tools.error_rates.library import frame_source
+from tools.tests.error_rates.library import frame_source
 
 # The protection left out of frame.c, and the assertion that the fuzzer then breaks.
 MISSED = {

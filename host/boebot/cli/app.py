@@ -29,7 +29,8 @@ COMMANDS = {
         "List what is bundled, by the names that other commands and Python understand.", "boebot.cli.names:list_names"
     ),
     "show": Command(
-        "Show an arena or a robot: a picture, its measures, what stands there or how it is wired.", "boebot.cli.show:app"
+        "Show an arena or a robot: a picture, its measures, what stands there or how it is wired.",
+        "boebot.cli.show:app",
     ),
     "serve": Command("Offer the emulated robot to other programs, until Ctrl-C.", "boebot.cli.serve:serve"),
     "doctor": Command(

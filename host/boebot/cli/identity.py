@@ -1,5 +1,5 @@
-"""`boebot doctor --identity`: who is there. The handshake, firmware, compiler, image, devices, parameters, and the state
-of the board."""
+"""`boebot doctor --identity`: who is there. The handshake, firmware, compiler, image, devices, parameters, and the
+state of the board."""
 
 from __future__ import annotations
 

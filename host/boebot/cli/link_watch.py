@@ -1,4 +1,5 @@
-"""`boebot doctor --watch`: what both ends of the link count, how fast it is, and how well the board's clock is known, live."""
+"""`boebot doctor --watch`: what both ends of the link count, how fast it is, and how well the board's clock is
+known, live."""
 
 from __future__ import annotations
 

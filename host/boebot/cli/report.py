@@ -13,8 +13,8 @@ from boebot.cli.run_table import Detail, detail, print_run
 from boebot.errors import BoebotError, did_you_mean
 from boebot.guests import FORMATS, guests
 from boebot.record.reading import CutError, mend
-from boebot.record.run_folder import RECORD, RunFolder
 from boebot.record.run import Run
+from boebot.record.run_folder import RECORD, RunFolder
 from boebot.result import Result, read_run, robots_of
 from boebot.view import IncompleteError, save_for_foxglove
 

@@ -217,10 +217,10 @@ def test_name_that_leads_to_no_bus_is_one_sentence(name: str, sentence: str) -> 
 
 
 def test_port_that_does_not_greet_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boebot_can.bus.TIMEOUT_S", 0.1)
+    monkeypatch.setattr("boebot_can.bus.CONNECT_S", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         name = f"socketcand:can0?host=127.0.0.1&port={silent.getsockname()[1]}"
-        with pytest.raises(BoardError, match="cannot be joined: no answer within"):
+        with pytest.raises(BoardError, match="cannot be joined: no answer in time"):
             PythonCanBus(BusName.parse(name))
 
 
@@ -236,7 +236,7 @@ def test_settings_of_a_bus_reach_its_interface() -> None:
 
 
 def test_nothing_of_can_is_imported_before_it_is_used() -> None:
-    lines = "import sys, boebot.cli, boebot.boards, boebot.cli.bridge, boebot_can.bridge, boebot_can.transport\n"
+    lines = "import sys, boebot.cli, boebot.boards, boebot_can.command, boebot_can.bridge, boebot_can.transport\n"
     lines += "print(*{'can', 'isotp', 'cantools', 'msgpack'} & set(sys.modules))"
     ended = subprocess.run([sys.executable, "-c", lines], capture_output=True, text=True, check=True)
     assert ended.stdout.strip() == ""

@@ -15,7 +15,7 @@ import boebot
 from boebot.record.reading import attachments_of
 from boebot.record.record_file import RecordReader
 from boebot.record.run_folder import RECORD
-from hil_tests.calibration.avr8js import find_tool
+from tools.tests.calibration.avr8js import find_tool
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ROOT / "build" / "mcap-core"  # from package-lock.json in mcap_core

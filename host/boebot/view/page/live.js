@@ -325,9 +325,7 @@ function tellLink() {
     "round trip": link?.round_trip_s == null ? null : (1000 * link.round_trip_s).toFixed(1) + " ms",
     "sessions lost": link?.sessions_lost,
     resets: link?.resets,
-    "load of the bus": percent(link?.bus?.load),
-    "errors on the bus": link?.bus?.errors,
-    "lost on the bus": link?.bus?.lost,
+    ...Object.fromEntries(Object.entries(link?.transport ?? {}).map(([name, value]) => [name.replaceAll("_", " "), value])),
     "load of the tick": percent(robotState().load ?? run.load?.last),
   };
   const known = Object.entries(values).filter(([, value]) => value != null);

@@ -1,4 +1,4 @@
-"""Instructions and interrupts of the emulated ATmega328P; what each of them takes is in hil_tests/calibration."""
+"""Instructions and interrupts of the emulated ATmega328P; what each of them takes is in tools/tests/calibration."""
 
 from __future__ import annotations
 

@@ -1,0 +1,62 @@
+"""Measures the calibration's rows and prints them beside the data sheet: `python -m tools.tests.calibration`.
+
+The exit code is 1 when the emulator or the board differs from the data sheet in a row where that is not known, 2 when
+something could not be measured at all.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from boebot.errors import BoebotError
+from tools.printed import reprint
+from tools.tests.calibration import avr8js, board, emulator, table
+
+
+def measured(port: str | None, flash: bool) -> table.Calibration:
+    """All columns that can be had."""
+    with Console(stderr=True).status("assembling") as status:
+        real = None
+        if port is not None:
+            if flash:
+                status.update(f"flashing {port}")
+                board.flash(port)
+            real = board.listen(port, lambda awaited: status.update(f"{port}: {awaited}"))
+        status.update("emulator")
+        ours = emulator.measure()
+        status.update("avr8js")
+        theirs = avr8js.measure()
+    return table.Calibration(ours, theirs, real)
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.tests.calibration",
+        description="Calibration of the emulated board against the data sheet.",
+    )
+    parser.add_argument("--port", help="serial port of a board, which is flashed and measured too")
+    parser.add_argument("--no-flash", action="store_true", help="the board holds the program already")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="print the table onto this page of the documentation")
+    chosen = parser.parse_args(arguments)
+    try:
+        result = measured(chosen.port, not chosen.no_flash)
+        if chosen.page is not None:
+            reprint(chosen.page, table.printed(result))
+    except (BoebotError, OSError) as error:
+        print(f"calibration: {error}", file=sys.stderr)
+        return 2
+    wrong = table.wrong_rows(result)
+    console = Console(width=None if sys.stdout.isatty() else 180)
+    console.print(table.table(result))
+    console.print(table.summary(result), highlight=False)
+    for line in wrong:
+        console.print(f"Not as expected: {line}", markup=False, highlight=False)
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
