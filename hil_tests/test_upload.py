@@ -23,6 +23,8 @@ from sim_bridge.serve import carry
 from sim_bridge.served_ports import PtyPort
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sessions.world import AVR, open_on
+from tools.tests.calibration import board
+from tools.tests.calibration.talk import START, Talk
 
 pytestmark = pytest.mark.emulated
 
