@@ -42,7 +42,7 @@ def main() -> NoReturn:
         if interrupts.first is None:
             raise
         code = _interrupted("interrupted", error)  # an import that Ctrl-C cut may end as any other error
-    if _is_interrupted(code) and not others.issuperset(threading.enumerate()):
+    if _is_interrupted(code) and any(not one.daemon for one in set(threading.enumerate()) - others):
         interrupts.leave(interrupts.exit_code())  # a brain's thread may never end
     exec("")  # where Ctrl-C fell into an exec of a text, as classes are made by, CPython would end by the signal itself
     sys.exit(code if isinstance(code, int) else 0)
