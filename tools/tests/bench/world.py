@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import atexit
 import functools
-import json
-import subprocess
-import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from functools import partial
 
-from tools.tests.bench import peers
+from tools.tests.bench import peers, worlds
 from tools.tests.bench.figures import Peer, figure
 from tools.tests.bench.scene import BEAMS
 
-ROOT = Path(__file__).resolve().parents[3]
 STEPS = "robot-steps/s"
 RAYS = "rays/s"
 ROUNDS = 5
@@ -23,42 +16,11 @@ PAIRS = 15  # of rates that are compared
 
 
 @functools.cache
-def side() -> subprocess.Popen[str]:
-    """The process that measures."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tools.tests.bench.world_side"],
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    atexit.register(process.kill)
-    return process
-
-
-def ask(what: str, **question: Any) -> float:
-    """A measurement by world_side.py. Raises RuntimeError if it failed."""
-    process = side()
-    assert process.stdin is not None and process.stdout is not None
-    process.stdin.write(json.dumps({"what": what, **question}) + "\n")
-    process.stdin.flush()
-    answer = json.loads(process.stdout.readline() or '{"error": "its process ended"}')
-    if "error" in answer:
-        raise RuntimeError(f"{what}: {answer['error']}")
-    return float(answer["value"])
-
-
-def asked(what: str, **question: Any) -> Callable[[], float]:
-    return lambda: ask(what, **question)
-
-
-@functools.cache
 def of_steps(edges: int) -> list[Peer]:
     """Their steps on the same scene: neither motors, sensor models nor brain; pymunk without noise."""
     return [
-        Peer("pymunk", functools.partial(peers.pymunk, edges)),
-        Peer("ir-sim", functools.partial(peers.ir_sim, edges)),
+        Peer("pymunk", partial(peers.pymunk, edges)),
+        Peer("ir-sim", partial(peers.ir_sim, edges)),
     ]
 
 
@@ -73,16 +35,20 @@ def of_rays(edges: int) -> list[Peer]:
 def rows_of_steps() -> None:
     for edges, target in ((48, 15), (1000, 12)):
         name = f"world: compiled brain, {edges:,} edges"
-        figure(name, STEPS, times_at_least=target, peers=of_steps(edges), rounds=ROUNDS)(asked("compiled", edges=edges))
+        figure(name, STEPS, times_at_least=target, peers=of_steps(edges), rounds=ROUNDS)(
+            partial(worlds.compiled, edges=edges)
+        )
     name = "world: Python brain at each step, 48 edges"
-    figure(name, STEPS, times_at_least=4, peers=of_steps(48), rounds=ROUNDS)(asked("python", edges=48))
+    figure(name, STEPS, times_at_least=4, peers=of_steps(48), rounds=ROUNDS)(partial(worlds.python, edges=48))
     name = "world: batch of 1,000, compiled brain"
-    figure(name, STEPS, times_at_least=20, peers=of_steps(48), rounds=ROUNDS)(asked("compiled", edges=48, worlds=1000))
+    figure(name, STEPS, times_at_least=20, peers=of_steps(48), rounds=ROUNDS)(
+        partial(worlds.compiled, edges=48, worlds=1000)
+    )
     name = "world: batch of 1,000, compiled brain, two threads"
-    figure(name, STEPS, peers=of_steps(48), rounds=ROUNDS)(asked("compiled", edges=48, worlds=1000, threads=2))
+    figure(name, STEPS, peers=of_steps(48), rounds=ROUNDS)(partial(worlds.compiled, edges=48, worlds=1000, threads=2))
     name = "world: 4,000 edges against 48, compiled brain"
     figure(name, "× slower", at_most=2.5, rounds=PAIRS, of="median")(
-        lambda: ask("compiled", edges=48) / ask("compiled", edges=4000)
+        lambda: worlds.compiled(edges=48) / worlds.compiled(edges=4000)
     )
 
 
@@ -91,7 +57,7 @@ def rows_of_rays() -> None:
         for noise in (True, False):
             name = f"laser of 683 beams, {edges:,} edges, {'noise' if noise else 'no noise'}"
             figure(name, RAYS, times_at_least=100, peers=of_rays(edges), rounds=ROUNDS)(
-                asked("scan", edges=edges, noise=noise)
+                partial(worlds.scan, edges=edges, noise=noise)
             )
 
 

@@ -1,15 +1,9 @@
-"""A process that measures worlds on demand: `python -m tools.tests.bench.world_side`.
-
-Each line on standard input is a question in JSON, such as {"what": "compiled", "edges": 48}; each line on standard
-output its answer, {"value": ...} or {"error": ...}. Worlds are made once and go on where they were. Rates are by the
-processor's time, where one thread works.
-"""
+"""How fast worlds go: robot-steps and rays a second, by the processor's time where one thread works. Worlds are made
+once and go on where they were."""
 
 from __future__ import annotations
 
 import functools
-import json
-import sys
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -97,20 +91,3 @@ def python(edges: int, steps: int = 100_000) -> float:
     started = time.process_time()
     done = vehicle.run(wander, steps)
     return done / (time.process_time() - started)
-
-
-QUESTIONS: dict[str, Callable[..., float]] = {function.__name__: function for function in (compiled, scan, python)}
-
-
-def main() -> None:
-    for line in sys.stdin:
-        question = json.loads(line)
-        try:
-            answer: dict[str, Any] = {"value": QUESTIONS[question.pop("what")](**question)}
-        except Exception as error:  # it belongs to one row of the table
-            answer = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(answer), flush=True)
-
-
-if __name__ == "__main__":
-    main()
