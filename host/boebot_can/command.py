@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from boebot.boards import BoardRequest, is_live, open_board
-from boebot.cli import completion, options, output
+from boebot.cli import options, output
 from boebot.description.robots import load_robot
 from boebot_can import COMMAND, database
 from boebot_can.bridge import Bridge
@@ -28,7 +28,7 @@ def bridge(
         str,
         typer.Argument(
             metavar="BOARD",
-            autocompletion=completion.boards,
+            autocompletion=options.complete_boards,
             help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT.",
         ),
     ] = "native",

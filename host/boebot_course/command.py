@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import completion, options, output
+from boebot.cli import options, output
 from boebot.errors import BoebotError, did_you_mean
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def listed() -> list[dict[str, Any]]:
 def _complete(incomplete: str) -> list[str]:
     from boebot_course.experiments import all_experiments
 
-    return completion.beginning(incomplete, dict.fromkeys(one.bare_name for one in all_experiments().values()))
+    return options.beginning(incomplete, dict.fromkeys(one.bare_name for one in all_experiments().values()))
 
 
 def experiment(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import resources
-from boebot.cli import completion, options, output, quantity, streams
+from boebot.cli import options, output, quantity, streams
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def timing(
         typer.Option(
             "--brain",
             metavar="B",
-            autocompletion=completion.brains,
+            autocompletion=options.complete_brains,
             help="Measure the steps of this brain in a simulated run.",
         ),
     ] = None,

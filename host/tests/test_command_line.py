@@ -20,7 +20,7 @@ import pytest
 
 from boebot import cli
 from boebot.boards import BoardRequest, board_kinds, open_world
-from boebot.cli import board_link, link_watch, run_table, teleop
+from boebot.cli import board_link, ending, link_watch, teleop
 from boebot.link import finding, messages
 from boebot.link.link import Link
 from boebot.result import RunResult, read_run
@@ -64,10 +64,10 @@ def test_run_prints_five_rows_all_figures_or_nothing(
 
 def test_run_names_what_should_be_zero_and_is_not(peer: Peer, capsys: pytest.CaptureFixture[str]) -> None:
     result = run(seconds=1)
-    assert run_table.not_zero(result) == []
+    assert ending.not_zero(result) == []
     shown = dataclasses.replace(result, late_steps=3, lost_frames=1200, resets=1)
-    assert run_table.not_zero(shown) == ["late steps 3", "lost frames 1,200", "resets 1"]
-    run_table.print_run(shown, run_table.Detail.FEW)
+    assert ending.not_zero(shown) == ["late steps 3", "lost frames 1,200", "resets 1"]
+    ending.print_run(shown, ending.Detail.FEW)
     assert "expected none: late steps 3, lost frames 1,200, resets 1" in capsys.readouterr().out
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from boebot.arenas import arena_names
 from boebot.brains import bundled
-from boebot.cli import app
+from boebot.cli import app, options
 from command import boebot
 
 
@@ -89,6 +89,4 @@ def test_bash_completes_with_its_script() -> None:
 
 
 def test_bundled_brains_are_completed_without_being_read() -> None:
-    from boebot.cli.completion import brains
-
-    assert set(bundled()) <= set(brains(""))
+    assert set(bundled()) <= set(options.complete_brains(""))

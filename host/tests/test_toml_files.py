@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from boebot.description import toml_files
 from boebot.description.robots import load_robot
-from boebot.description.toml_limits import DEPTH_MAXIMUM, KEY_MAXIMUM, SIZE_MAXIMUM, TEXT_MAXIMUM
+from boebot.description.toml_files import DEPTH_MAXIMUM, KEY_MAXIMUM, SIZE_MAXIMUM, TEXT_MAXIMUM
 from boebot.description.toml_lines import line_of
 from boebot.errors import ArenaError, RobotError
 

@@ -6,19 +6,146 @@ import contextlib
 import struct
 import traceback
 from collections.abc import Iterator, Sequence
+from enum import Enum
 from pathlib import Path
+from typing import Any
 
 import typer
 
 from boebot.cli import output
-from boebot.cli.run_table import Detail, print_run
-from boebot.errors import BoebotError, InterruptedRunError
+from boebot.errors import BoebotError, InterruptedRunError, brief
+from boebot.record import figures
 from boebot.record.reading import CutError
 from boebot.record.record_file import NoRecordError
 from boebot.record.run import Run
 from boebot.record.run_folder import RECORD
-from boebot.result import Result
+from boebot.result import Result, RunResult
 from boebot.view import IncompleteError
+
+# ---- the run as a terminal shows it: five rows of what matters, and below them what should be zero and is not --------
+
+ZERO = (
+    "late_steps",
+    "long_steps",
+    "lost_frames",
+    "bad_frames",
+    "overruns",
+    "dead_man_stops",
+    "fallback_takeovers",
+    "resets",
+    "sessions_lost",
+    "hung_at",
+    "unrealisable",
+)
+"""Figures that should be zero, or nothing."""
+
+HEADER = ("robot", "true distance (m)", "true contacts", "whisker touches", "brain")
+
+
+_EARLY = "early, by an error"
+
+
+class Detail(Enum):
+    """How much is printed of a run."""
+
+    FEW = "what matters"
+    ALL = "all figures"
+    NOTHING = "nothing but errors"
+    JSON = "all figures as JSON"
+
+
+def detail(*, json: bool, verbose: bool, quiet: bool) -> Detail:
+    """By the options of that name; one of them at most."""
+    chosen = [kind for kind, wanted in ((Detail.JSON, json), (Detail.ALL, verbose), (Detail.NOTHING, quiet)) if wanted]
+    if len(chosen) > 1:
+        raise typer.BadParameter("expected one of --json, --verbose and --quiet")
+    return chosen[0] if chosen else Detail.FEW
+
+
+def print_run(result: Result, wanted: Detail, *, is_said: bool = False) -> None:
+    """The table of a run, if any time has passed in it. JSON is for the caller, who knows its files. `is_said`: the
+    sentence of the error that has ended it follows, and is not printed here."""
+    robots = result.robots
+    several = len(robots) > 1
+    if is_said and not any(robot.run_time for robot in robots):
+        return
+    if wanted is Detail.ALL:
+        for number, robot in enumerate(robots, 1):
+            if several:
+                output.line(f"robot {number}")
+            output.print_table(robot.table() | ({"ended": _EARLY} if is_said else {}))
+            output.line("by this computer's clock:")
+            output.print_table(robot.wall_clock())
+    elif wanted is Detail.FEW:
+        if several:
+            output.print_rows(HEADER, [_row(number, robot) for number, robot in enumerate(robots, 1)])
+        else:
+            table = output.empty_table(show_header=False)
+            table.add_column(style="dim")
+            table.add_column(overflow="fold")
+            for name, words in five_rows(robots[0]):
+                table.add_row(name, _EARLY if is_said and name == "ended" else words)
+            output.console().print(table)
+        for number, robot in enumerate(robots, 1):
+            if wrong := not_zero(robot):
+                output.line(f"{f'robot {number}: ' if several else ''}expected none: {', '.join(wrong)}")
+
+
+def five_rows(result: RunResult) -> list[tuple[str, str]]:
+    """Name and words of each."""
+    table = result.table()
+    where = f" in {table['arena']}" if table["arena"] else ""
+    faster = f", {result.real_time_factor:.3g} times real time" if result.real_time_factor else ""
+    way = result.way_in_words()
+    if (error_m := result.odometry_error) is not None:
+        way.append(f"odometry off by {error_m:.2f} m at the end")
+    return [
+        ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{_changed(table)}"),
+        ("time", f"{result.run_time:g} s{faster}"),
+        ("way", ", ".join(way)),
+        ("brain", _brain(result, table)),
+        ("ended", table["ended"] + _touched(result)),
+    ]
+
+
+def _changed(table: dict[str, Any]) -> str:
+    """What the simulated robot was without, and what it and the brain had in other magnitudes than usual."""
+    parts = ("without", table["without"]), ("with", table["imperfections"]), ("with", table["parameters"])
+    return "".join(f", {word} {names}" for word, names in parts if names)
+
+
+def _touched(result: RunResult) -> str:
+    """That somebody interfered with the run, in words."""
+    return f", touched {figures.counted(result.touched, 'time', 'times')} by hand" if result.touched else ""
+
+
+def not_zero(result: RunResult) -> list[str]:
+    """What should be zero and is not, in words."""
+    table = result.table() | result.wall_clock()
+    wrong = {name: table[name] for name in ZERO if table[name]}
+    return [f"{name} {value}" for name, value, _ in figures.rows(wrong)]
+
+
+def _brain(result: RunResult, table: dict[str, Any]) -> str:
+    parts = [f"{figures.counted(result.steps, 'step', 'steps')}, {result.period:g} s apart"]
+    record = result.overview.brain
+    if record is not None:
+        shares = record.shares(result.run_time)
+        parts.append(figures.counted(record.behavior_switches, "switch", "switches"))
+        parts.append(", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share > 0))
+    return "; ".join(parts)
+
+
+def _row(number: int, robot: RunResult) -> tuple[str, ...]:
+    """Of one of several, under `HEADER`."""
+    table = robot.table()
+    ended = (brief(robot.error) or ["complete"])[0]
+    values = (table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches"))
+    cells = ("-" if value is None else figures.text(value) for value in values)
+    return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}{_changed(table)}"
+
+
+# ---- its end ---------------------------------------------------------------------------------------------------------
 
 
 @contextlib.contextmanager

@@ -16,7 +16,7 @@ from boebot import behaviors
 from boebot.arenas import arena_names, load_arena
 from boebot.brain.process import MotorBehavior
 from boebot.brains import bundled_files
-from boebot.cli import completion, options, output
+from boebot.cli import options, output
 from boebot.description.robots import load_robot, robot_names
 from boebot.errors import did_you_mean
 from boebot.guests import LISTS, guests
@@ -31,7 +31,7 @@ def list_names(
         str | None,
         typer.Argument(
             metavar="WHAT",
-            autocompletion=completion.one_of(*KINDS),
+            autocompletion=options.one_of(*KINDS),
             help=f"One of {', '.join(KINDS)}; without it all of them.",
         ),
     ] = None,

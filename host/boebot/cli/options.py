@@ -1,13 +1,16 @@
-"""Options that several sub-commands share."""
+"""Options that several sub-commands share, and what the shell completes them to."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from boebot.cli import completion, quantity
+from boebot.cli import quantity
 from boebot.errors import BoebotError
 from boebot.guests import PORTS, guests
 
@@ -18,6 +21,72 @@ SETTINGS: dict[str, Any] = {
 }
 """Of everything that typer makes."""
 
+# ---- what the shell offers when TAB is pressed: names of what is bundled, and files ----------------------------------
+
+Complete = Callable[[str], list[str]]
+
+
+def complete_robots(incomplete: str) -> list[str]:
+    """Bundled robots, and TOML files."""
+    from boebot.description.robots import robot_names
+
+    return [*beginning(incomplete, robot_names()), *_files(incomplete, ".toml")]
+
+
+def complete_arenas(incomplete: str) -> list[str]:
+    """Bundled arenas, and TOML files."""
+    from boebot.arenas import arena_names
+
+    return [*beginning(incomplete, arena_names()), *_files(incomplete, ".toml")]
+
+
+def complete_brains(incomplete: str) -> list[str]:
+    """Bundled brains, and files that may hold one."""
+    from boebot.brains import bundled
+
+    return [*beginning(incomplete, bundled()), *_files(incomplete, ".py", ".toml")]
+
+
+def complete_boards(incomplete: str) -> list[str]:
+    """What robots with boards run on."""
+    return [*beginning(incomplete, ("native", "avr", "direct")), *_files(incomplete)]
+
+
+def complete_imperfections(incomplete: str) -> list[str]:
+    """Names of imperfections, for a value to follow."""
+    from boebot import imperfections as table
+
+    return [f"{name}=" for name in beginning(incomplete, table.imperfections())]
+
+
+def one_of(*names: str) -> Complete:
+    """These names."""
+    return lambda incomplete: beginning(incomplete, names)
+
+
+def beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+    """Those of these names."""
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def _files(incomplete: str, *suffixes: str) -> list[str]:
+    """Those of these suffixes, and folders to go on with; without suffixes all of them, once a path has begun."""
+    head, slash, begun = incomplete.rpartition("/")
+    if not suffixes and not slash:
+        return []
+    found = []
+    for path in sorted(Path(head or slash or ".").glob(f"{begun}*")):
+        if path.name.startswith(".") and not begun:
+            continue
+        if path.is_dir():
+            found.append(f"{head}{slash}{path.name}/")
+        elif not suffixes or path.suffix in suffixes:
+            found.append(f"{head}{slash}{path.name}")
+    return found
+
+
+# ---- options ---------------------------------------------------------------------------------------------------------
+
 _PORTS = ", ".join(["/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT", *(f"{name}:..." for name in guests(PORTS))])
 
 On = Annotated[
@@ -25,7 +94,7 @@ On = Annotated[
     typer.Option(
         "--on",
         metavar="BOARD",
-        autocompletion=completion.boards,
+        autocompletion=complete_boards,
         help=f"avr, native, or a port: {_PORTS}.",
     ),
 ]
@@ -34,19 +103,19 @@ RunOn = Annotated[
     typer.Option(
         "--on",
         metavar="BOARD",
-        autocompletion=completion.boards,
+        autocompletion=complete_boards,
         help=f"avr, native, or a port: {_PORTS}; direct for a robot without a board. Else native, or direct.",
     ),
 ]
 RobotName = Annotated[
-    str, typer.Option("--robot", metavar="R", autocompletion=completion.robots, help="Bundled robot or .toml file.")
+    str, typer.Option("--robot", metavar="R", autocompletion=complete_robots, help="Bundled robot or .toml file.")
 ]
 ArenaName = Annotated[
     str | None,
     typer.Option(
         "--arena",
         metavar="A",
-        autocompletion=completion.arenas,
+        autocompletion=complete_arenas,
         help="Bundled arena or .toml file (simulated runs).",
     ),
 ]
@@ -73,7 +142,7 @@ Imperfections = Annotated[
     typer.Option(
         "--imperfection",
         metavar="NAME=VALUE",
-        autocompletion=completion.imperfections,
+        autocompletion=complete_imperfections,
         help="Give an imperfection of simulated robots another magnitude, as in servo_lag_s=80ms; again for each "
         "further one; `boebot list imperfections` names them.",
     ),
@@ -146,3 +215,26 @@ def magnitudes(given: list[str] | None) -> dict[str, float]:
 def names(text: str | None) -> tuple[str, ...]:
     """Of "NAME,NAME"."""
     return () if text is None else tuple(name.strip() for name in text.split(","))
+
+
+def live_view(*, view: bool, speed: float | None, port: int | None) -> contextlib.AbstractContextManager[Any]:
+    """The live view (boebot.live) that those options want, open; None: none.
+
+    Raises:
+        BoebotError: the port is taken, or options of a live view are given without one.
+    """
+    if not view:
+        if speed is not None or port is not None:
+            raise BoebotError("--speed and --view-port are of a live view; expected --view with them")
+        return contextlib.nullcontext()
+    from boebot.live.controls import usual_speed
+    from boebot.live.session import opened
+
+    return opened(say_where, port=port or 0, speed=1.0 if speed is None else usual_speed(speed))
+
+
+def say_where(url: str) -> None:
+    """Where a live view is."""
+    from boebot.cli import output
+
+    output.say(f"watch it: {url}")

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from boebot.cli import completion, ending, options, output, streams
+from boebot.cli import ending, options, output, streams
 from boebot.errors import BoebotError
 from boebot.guests import RECORDS, ReadRecord, guests
 from boebot.record.reading import CutError
@@ -39,7 +39,7 @@ def replay(
         typer.Option(
             "--brain",
             metavar="BRAIN",
-            autocompletion=completion.brains,
+            autocompletion=options.complete_brains,
             help="Bundled brain, or a Python or TOML file, as of boebot run.",
         ),
     ] = None,
@@ -49,7 +49,7 @@ def replay(
         typer.Option(
             "--kind",
             metavar="R",
-            autocompletion=completion.robots,
+            autocompletion=options.complete_robots,
             help="Of a FILE: bundled robot or .toml file; else the one that its board names.",
         ),
     ] = None,

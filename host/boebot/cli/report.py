@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from boebot.cli import completion, ending, options, output
-from boebot.cli.run_table import Detail, detail, print_run
+from boebot.cli import ending, options, output
+from boebot.cli.ending import Detail, detail, print_run
 from boebot.errors import BoebotError, did_you_mean
 from boebot.guests import FORMATS, guests
 from boebot.record.reading import CutError, mend
@@ -34,7 +34,7 @@ def report(
         typer.Option(
             "--as",
             metavar="FORMAT",
-            autocompletion=completion.one_of(*_KINDS),
+            autocompletion=options.one_of(*_KINDS),
             help=f"Write the run in a format for other programs, too: {', '.join(_KINDS)}; again for each further one.",
         ),
     ] = None,

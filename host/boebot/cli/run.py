@@ -11,9 +11,8 @@ from typing import Annotated, Any
 import typer
 
 from boebot.brains import bundled
-from boebot.cli import completion, options, output, quantity, streams, watched
-from boebot.cli.ending import end
-from boebot.cli.run_table import detail
+from boebot.cli import options, output, quantity, streams
+from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError
 from boebot.record import run_folder
 from boebot.running.loop import execute
@@ -44,7 +43,7 @@ def run(
         list[str],
         typer.Argument(
             metavar="BRAIN",
-            autocompletion=completion.brains,
+            autocompletion=options.complete_brains,
             help="What drives it: a bundled brain by its name, a Python file with step(robot), main(robot), a class "
             "Brain or brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
         ),
@@ -55,7 +54,7 @@ def run(
         typer.Option(
             "--robot",
             metavar="R",
-            autocompletion=completion.robots,
+            autocompletion=options.complete_robots,
             help="Bundled robot or .toml file; again for each further robot.",
         ),
     ] = None,
@@ -152,12 +151,14 @@ def run(
             title = name if on is None else f"{name} on {on}"
             bar = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
             progress = None if view else shown.enter_context(output.step_watch(bar))
-            page = shown.enter_context(watched.view(view=view, speed=speed, port=view_port))
+            page = shown.enter_context(options.live_view(view=view, speed=speed, port=view_port))
             shown.enter_context(streams.kept(for_the_answer=json))
             if page is None:
                 result = execute(request, progress, folder)
             else:
-                result = watched.run(page, request, lambda wanted: execute(wanted, progress, folder, page))
+                from boebot.live.session import run_viewed
+
+                result = run_viewed(page, request, lambda wanted: execute(wanted, progress, folder, page), waits=True)
         end(result, out, wanted)
 
 

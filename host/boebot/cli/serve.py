@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
-from typing import Annotated
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from boebot.boards import BoardRequest, Visit, board_kinds, check_board, find_server
-from boebot.cli import options, output, streams, watched
+from boebot.cli import options, output, streams
 from boebot.description.robots import load_robot
-from boebot.errors import BoardError
+from boebot.errors import BoardError, BoebotError
+
+if TYPE_CHECKING:
+    from boebot.live.served_view import ServedView
 
 _WORDS = {"came": "came; the board is reset", "went": "went", "refused": "was refused", "notes": "notes"}
 
@@ -69,7 +73,7 @@ def serve(
         except OSError:  # what started this has read where the robot is, and listens no more
             streams.discard()
 
-    with contextlib.suppress(KeyboardInterrupt), watched.served_view(request, on, view=view, port=view_port) as page:
+    with contextlib.suppress(KeyboardInterrupt), _view(request, on, view=view, port=view_port) as page:
 
         def heard(event: Visit) -> None:
             visit(event)
@@ -78,3 +82,26 @@ def serve(
 
         look = None if page is None else page.look
         find_server()(on, request, tcp=tcp, announce=announce, visit=heard, running=lambda: True, look=look)
+
+
+@contextlib.contextmanager
+def _view(request: BoardRequest, kind: str, *, view: bool, port: int | None) -> Iterator[ServedView | None]:
+    """The live view of the robot on that kind of board, if one is wanted.
+
+    Raises:
+        BoebotError: the port is taken, or is given without --view.
+    """
+    if not view:
+        if port is not None:
+            raise BoebotError("--view-port is of a live view; expected --view with it")
+        yield None
+        return
+    from boebot.live.served_view import ServedView
+    from boebot.live.session import show
+
+    page = ServedView(request, kind, port=port or 0)
+    try:
+        show(page.url, options.say_where)
+        yield page
+    finally:
+        page.close()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from boebot.cli import completion, options, output
+from boebot.cli import options, output
 
 if TYPE_CHECKING:
     from boebot.arenas.description import Moving
@@ -42,7 +42,7 @@ def show_arena(
         str,
         typer.Argument(
             metavar="ARENA",
-            autocompletion=completion.arenas,
+            autocompletion=options.complete_arenas,
             help="Bundled arena, as `boebot list arenas` names them, or .toml file.",
         ),
     ],
@@ -88,7 +88,7 @@ def show_robot(
         str,
         typer.Argument(
             metavar="ROBOT",
-            autocompletion=completion.robots,
+            autocompletion=options.complete_robots,
             help="Bundled robot, as `boebot list robots` names them, or .toml file.",
         ),
     ],

@@ -15,9 +15,8 @@ from typing import Annotated, TextIO
 
 import typer
 
-from boebot.cli import options, output, quantity, watched
-from boebot.cli.ending import end
-from boebot.cli.run_table import detail
+from boebot.cli import options, output, quantity
+from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError
 from boebot.record import run_folder
 from boebot.robot import Robot
@@ -138,13 +137,14 @@ def teleop(
                 without=options.names(without),
                 imperfections=options.magnitudes(imperfection),
             )
-            with watched.view(view=view, speed=None, port=view_port) as page:
+            with options.live_view(view=view, speed=None, port=view_port) as page:
                 if page is None:
                     result = execute(request, folder=folder)
                 else:
-                    result = watched.run(
-                        page, request, functools.partial(execute, folder=folder, onlooker=page), waits=False
-                    )
+                    from boebot.live.session import run_viewed
+
+                    watched = functools.partial(execute, folder=folder, onlooker=page)
+                    result = run_viewed(page, request, watched, waits=False)
         with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
             output.line(file=screen)
         end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, wanted)

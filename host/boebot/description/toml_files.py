@@ -19,14 +19,20 @@ from typing import Any, NamedTuple, TypeVar
 import msgspec
 
 from boebot import resources
-from boebot.description import toml_limits
-from boebot.description.toml_limits import SIZE_MAXIMUM
-from boebot.description.toml_lines import line_of
 from boebot.errors import BoebotError, did_you_mean, printable
 
 _T = TypeVar("_T")
 
 _CONVERTING = threading.Lock()  # msgspec looks at a type when it first meets it, and no two threads may do that at once
+# A hostile file ends in one sentence and in bounded time. Parts of a dotted key are counted before tomllib reads the
+# text: its time grows with their square.
+SIZE_MAXIMUM = 8_000_000  # bytes of a file
+DEPTH_MAXIMUM = 16  # tables and arrays inside one another, and parts of a dotted key
+KEY_MAXIMUM = 100  # characters of a key, or of one part of a dotted key
+TEXT_MAXIMUM = 1000  # characters of a text
+
+_PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\]++|\\.)*"?|'[^']*'?)"""
+_KEY = re.compile(rf"#.*|{_PART}(?:[ \t]*+\.[ \t]*+{_PART})*")
 SLOW = 2_000_000  # bytes that take about a second: a notice says why nothing happens
 
 
@@ -85,7 +91,7 @@ def read(path: Path, error: type[BoebotError]) -> Table:
         if size > SLOW:
             print(f"reading {printable(path.name)}, {size / 1e6:.1f} MB ...", file=sys.stderr)
         text = path.read_text(encoding="utf-8-sig")  # some editors begin with a byte order mark
-        if fault := toml_limits.fault_of_text(text):
+        if fault := fault_of_text(text):
             raise error(f"{path.name}{fault}")
         table = Table(tomllib.loads(text))
     except (OSError, UnicodeDecodeError) as cause:
@@ -94,7 +100,7 @@ def read(path: Path, error: type[BoebotError]) -> Table:
         raise error(f"{path.name} is nested too deeply; expected a flat description") from None
     except ValueError as cause:  # also a number of thousands of digits, which tomllib passes on
         raise error(_no_toml(path.name, text, cause)) from None
-    if fault := toml_limits.fault_of_table(table):
+    if fault := fault_of_table(table):
         raise error(f"{path.name}{fault}")
     table.sources = ((path.name, text),)
     return table
@@ -120,6 +126,38 @@ def _no_toml(name: str, text: str, cause: ValueError) -> str:
     return f"{name} is no valid TOML: {what}"
 
 
+def fault_of_text(text: str) -> str:
+    """The error in a text that has not been read, one too long or too deep, with its line first; "": none."""
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") < DEPTH_MAXIMUM:
+            continue
+        for key in _KEY.finditer(line):
+            if key[0].startswith("#"):
+                break
+            if key[0].count(".") >= DEPTH_MAXIMUM and (parts := len(re.findall(_PART, key[0]))) > DEPTH_MAXIMUM:
+                return f":{number}: a key has {parts:,} parts; expected at most {DEPTH_MAXIMUM}"
+    return ""
+
+
+def fault_of_table(table: dict[str, Any]) -> str:
+    """The error in a table that is too long or too deep; "": none."""
+    level: list[Any] = [table]
+    for _ in range(DEPTH_MAXIMUM):
+        below: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                if (longest := max(map(len, value), default=0)) > KEY_MAXIMUM:
+                    return f": a key has {longest:,} characters; expected at most {KEY_MAXIMUM}"
+                value = value.values()
+            below += [entry for entry in value if isinstance(entry, (dict, list, str))]
+        if (longest := max((len(entry) for entry in below if isinstance(entry, str)), default=0)) > TEXT_MAXIMUM:
+            return f": a text has {longest:,} characters; expected at most {TEXT_MAXIMUM:,}"
+        level = [entry for entry in below if not isinstance(entry, str)]
+        if not level:
+            return ""
+    return f" is nested too deeply; expected at most {DEPTH_MAXIMUM} tables and arrays inside one another"
+
+
 def overlaid(merged: dict[str, Any], top: dict[str, Any], base: dict[str, Any]) -> Table:
     """`merged` as a table that came from `top`, and where that says nothing from `base`."""
     table = Table(merged)
@@ -129,6 +167,8 @@ def overlaid(merged: dict[str, Any], top: dict[str, Any], base: dict[str, Any]) 
 
 def where(table: dict[str, Any], file: str, place: str) -> str:
     """The file, with the line of the place if the table was read from it: "room.toml:12"."""
+    from boebot.description.toml_lines import line_of  # few files have errors
+
     sources = table.sources if isinstance(table, Table) and place else ()
     found = [(name, *line_of(text, place)) for name, text in sources]
     for name, line, is_exact in found:

@@ -14,8 +14,8 @@ import pytest
 import boebot
 from boebot import Member
 from boebot.boards import BoardRequest, open_board
+from boebot.cli.ending import Detail, print_run
 from boebot.cli.options import magnitudes
-from boebot.cli.run_table import Detail, print_run
 from boebot.description.robots import RobotDescription, load_robot, magnitude, owners, robot_names
 from boebot.devices.accelerometer import Accelerometer
 from boebot.devices.light import Phototransistor
