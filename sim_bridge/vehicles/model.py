@@ -16,10 +16,10 @@ from boebot.description.robots import RobotDescription
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices.catalogue import SensorKind, sensor_kinds
-from sim_bridge.motor import dc_parameters, regulated_parameters, servo_parameters
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.robots.imperfections import collision_outline
-from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct, values_of
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, known, number, struct, values_of
+from sim_bridge.vehicles.drives import dc_parameters, defaults, regulated_parameters, servo_parameters
 
 SIDES: Final = ("left", "right")
 MOUNTS: Final = {"left": 1, "right": -1}  # of servos: which way drives forward
@@ -169,10 +169,7 @@ class VehicleModel:
     ) -> None:
         """The notes' battery, read as a voltage; `energy`: idle_per_s, signal_per_s, charger_per_s."""
         where = self._named(name)
-        usual = ffi.new("energy_parameters *")
-        lib.energy_default(usual)
-        values = {key: getattr(usual, key) for key in keys_of("energy_parameters")}
-        rates = struct("energy_parameters", where, energy, values)
+        rates = struct("energy_parameters", where, energy, defaults("energy"))
         if lib.vehicle_model_battery(self._open, rates) == lib.VEHICLE_TOO_MANY:
             raise RobotError(f"{where}: it has a battery already; expected one")
         self.sensor("charge", name, empty=empty, full=full, sigma=sigma)

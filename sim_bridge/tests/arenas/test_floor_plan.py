@@ -11,11 +11,11 @@ from boebot.arenas import Arena, ArenaDescription, Disc, Moving, Polygon, Wall, 
 from boebot.arenas.floor_plan import SAMPLES_MAXIMUM, Solid, floor_plan, path_end, poses_of
 from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
+from boebot_course.vehicle_view import View
 from sim_bridge.sessions.session import DirectSession
 from sim_bridge.sessions.world import NATIVE, direct_world, open_on
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import Vehicle, arsim
-from sim_bridge.view import View
 
 
 def test_showcase_is_told_whole() -> None:

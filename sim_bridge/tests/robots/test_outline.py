@@ -17,12 +17,12 @@ import boebot
 from boebot.description.outlines import polygon_fault
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, RobotError
+from boebot_course.vehicle_view import View
 from sim_bridge.robots import imperfections
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import arena_of, script_board, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
 from sim_bridge.vehicles.model_file import vehicle_model
-from sim_bridge.view import View
 
 pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
 

@@ -19,12 +19,12 @@ from boebot.description.robots import load_robot
 from boebot.record.record import Record
 from boebot.record.truth import lateness
 from boebot_course.recorder import Recorder
+from boebot_course.vehicle_view import View
 from sim_bridge._core import ffi, lib
 from sim_bridge.sessions.session import DirectSession, truth_of
 from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
-from sim_bridge.view import View
 
 pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
 

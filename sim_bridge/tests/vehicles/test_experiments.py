@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from boebot.arenas import load_arena
-from boebot.arenas.rays import ray_segment
+from boebot_course.rays import ray_segment
 from boebot_course.recorder import Recorder
 from sim_bridge._core import ffi, lib
 from sim_bridge.batch import WANDER, Batch

@@ -13,13 +13,13 @@ from PIL import Image
 from shapely.geometry import LineString, Point
 
 from boebot.arenas import load_arena
-from boebot.arenas.rays import bearing_interval, ray_segment
 from boebot.errors import ArenaError, RobotError
+from boebot_course.motor import DCMotor
+from boebot_course.rays import bearing_interval, ray_segment
 from boebot_course.recorder import Recorder
-from sim_bridge.motor import DCMotor
+from boebot_course.vehicle_view import View
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, arsim
-from sim_bridge.view import View
 
 coordinate = st.floats(-3, 3)
 point = st.tuples(coordinate, coordinate)

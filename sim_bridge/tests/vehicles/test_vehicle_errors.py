@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError, BoebotError, RobotError
-from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
+from boebot_course.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.sim import Sim
 from sim_bridge.tests.simulated import arena_of, square

@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 
 from boebot.arenas import load_arena
 from boebot.errors import RobotError
-from sim_bridge.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
+from boebot_course.motor import DCMotor, PositionServo, RegulatedMotor, ServoMotor
 from sim_bridge.tests.simulated import arena_of
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
 from sim_bridge.vehicles.model_file import vehicle_model

@@ -11,16 +11,8 @@ from typing import Any
 
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.devices.servo import RPM
-from sim_bridge.robots.imperfections import AS_BUILT
-from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, keys_of, known, number, struct
-
-
-def _defaults(kind: str) -> dict[str, float]:
-    """What `NAME_default` of a C struct `NAME_parameters` gives."""
-    pointer = ffi.new(f"{kind}_parameters *")
-    getattr(lib, f"{kind}_default")(pointer)
-    return {key: getattr(pointer, key) for key in keys_of(f"{kind}_parameters")}
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, number, struct
+from sim_bridge.vehicles.drives import dc_parameters, defaults, regulated_parameters, servo_parameters
 
 
 class DCMotor:
@@ -67,14 +59,6 @@ def _question(voltage: float, axis_speed: float) -> tuple[float, float]:
     return number("motor", "voltage", voltage), number("motor", "axis_speed", axis_speed)
 
 
-def dc_parameters(where: str, changes: Any) -> Any:
-    """C struct of the notes' default DC motor with `changes`."""
-    return struct("motor_dc_parameters", where, changes, _defaults("motor_dc"))
-
-
-REGULATED_KEYS = ("gain_n_s", "torque_maximum_n_m", "speed_maximum_m_s")
-
-
 class RegulatedMotor:
     """The velocity-regulated motor (3.15), world/motor_regulated.h.
 
@@ -98,12 +82,6 @@ class RegulatedMotor:
         """Torque (N m) on the wheel whose rim moves at `speed` (m/s): K (v_ref - v), limited."""
         wanted, now = number("motor", "reference", reference), number("motor", "speed", speed)
         return float(lib.motor_regulated(self.parameters, wanted, now, 1.0))
-
-
-def regulated_parameters(where: str, changes: Any) -> Any:
-    """C struct of the default regulated motor with `changes`; it never coasts, so what says how is no key of it."""
-    usual = _defaults("motor_regulated")
-    return struct("motor_regulated_parameters", where, known(where, changes, REGULATED_KEYS), usual)
 
 
 class ServoMotor:
@@ -131,29 +109,6 @@ class ServoMotor:
         return float(lib.servo_motor_curve(self.parameters, number("servo", "pulse_us", pulse_us)))
 
 
-def servo_parameters(where: str, changes: Any, mount: int = 1, wheel_radius: float = 0.0331) -> Any:
-    """C struct of the nominal servo with `changes`; magnitudes as in the table of imperfections."""
-    top = AS_BUILT["servo_top_rpm"] * RPM
-    usual = {
-        "mount": mount,
-        "wheel_radius": wheel_radius,
-        "centre_us": 1500.0,
-        "dead_band_us": AS_BUILT["servo_dead_band_us"],
-        "top_ccw_rad_s": top,
-        "scale_ccw_us": AS_BUILT["servo_scale_us"],
-        "top_cw_rad_s": top,
-        "scale_cw_us": AS_BUILT["servo_scale_us"],
-        "lag_s": AS_BUILT["servo_lag_s"],
-        "motor": {
-            "gain_n_s": AS_BUILT["servo_gain_n_s"],
-            "torque_maximum_n_m": AS_BUILT["servo_torque_n_m"],
-            "coast_n_s": AS_BUILT["servo_coast_n_s"],
-            "coast_maximum_n_m": AS_BUILT["servo_coast_n_m"],
-        },
-    }
-    return struct("servo_motor_parameters", where, changes, usual)
-
-
 class PositionServo:
     """A servo that turns to the angle of its pulses (world/motor_position.h); a turret sits on one.
 
@@ -171,7 +126,7 @@ class PositionServo:
         Raises:
             RobotError: there is no parameter of that name, or it is outside its range.
         """
-        usual = _defaults("motor_position")
+        usual = defaults("motor_position")
         self.parameters = struct("motor_position_parameters", "servo", parameters, usual)
         self._state = ffi.new("motor_position *")
         lib.motor_position_init(self._state, number("servo", "angle", angle))
