@@ -20,10 +20,12 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -35,7 +37,9 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
-from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
+from google.protobuf import message_factory
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from boebot.arenas.floor_plan import floor_plan, moving_solids
@@ -45,12 +49,13 @@ from boebot.record.brain_record import each_switch, shown_names
 from boebot.record.columns import Columns, columns, events
 from boebot.record.truth import lateness, shifts
 from boebot.showing import SKETCH, VALUES, Sketch
-from boebot.view import foxglove_numbers, foxglove_scene, scene, style
+from boebot.view import foxglove_scene, scene, style
 
 if TYPE_CHECKING:
-    from boebot.devices.device import Column
+    from numpy.typing import NDArray
+
     from boebot.record.run import Run
-    from boebot.record.truth import Pose
+    from boebot.record.truth import Floats, Pose
 
 WORLD = "world"
 FIELD = re.compile(r"\W|^(?=\d)", re.ASCII)  # what no name of a Protobuf field has
@@ -58,14 +63,9 @@ MOVERS_AT_ONCE_S = 100.0  # of the moving shapes' ways
 SAME_S = 1e-6  # sweeps nearer in time than this are one
 
 
-class Entry(NamedTuple):
-    """A message, on its way into the file."""
-
-    time_ns: int
-    topic: str
-    schema: Any
-    """descriptor of the message"""
-    data: bytes
+Entry = tuple[float, str, Any]
+"""Time (s), topic and message, on its way into the file."""
+_TIME = itemgetter(0)
 
 
 def write(results: Sequence[Run], path: Path) -> None:
@@ -76,37 +76,26 @@ def write(results: Sequence[Run], path: Path) -> None:
     for result, prefix in zip(results, prefixes, strict=True):
         streams += [_ticks(result, prefix), _shown(result, prefix), _sketches(result, prefix), _log(result, prefix)]
     with path.open("wb") as file:
-        out = _File(file)
-        for entry in heapq.merge(*streams, key=lambda entry: entry.time_ns):
-            out.add(entry)
-        out.finish()
+        _write(heapq.merge(*streams, key=_TIME), file)
 
 
-class _File:
-    """The file, and what it has said of its topics so far."""
+def _write(entries: Iterable[Entry], file: Any) -> None:
+    """Messages, oldest first: each topic is a channel, and says once what its messages are made of."""
+    from mcap.writer import Writer
 
-    def __init__(self, file: Any) -> None:
-        from mcap.writer import Writer
-
-        self._writer: Any = Writer(file)
-        self._writer.start(library="boebot")
-        self._channels: dict[str, int] = {}
-        self._schemas: dict[tuple[str, bytes], int] = {}
-
-    def add(self, entry: Entry) -> None:
-        """A message; those before it are older, or as old."""
-        if entry.topic not in self._channels:
-            name, files = entry.schema.full_name, _files_of(entry.schema.file)
-            if (name, files) not in self._schemas:
-                self._schemas[name, files] = self._writer.register_schema(name, "protobuf", files)
-            self._channels[entry.topic] = self._writer.register_channel(
-                entry.topic, "protobuf", self._schemas[name, files]
-            )
-        self._writer.add_message(self._channels[entry.topic], entry.time_ns, entry.data, entry.time_ns)
-
-    def finish(self) -> None:
-        """The end of the file."""
-        self._writer.finish()
+    out: Any = Writer(file)
+    out.start(library="boebot")
+    channels: dict[str, int] = {}
+    schemas: dict[tuple[str, bytes], int] = {}
+    for time_s, topic, message in entries:
+        if topic not in channels:
+            name, files = message.DESCRIPTOR.full_name, _files_of(message.DESCRIPTOR.file)
+            if (name, files) not in schemas:
+                schemas[name, files] = out.register_schema(name, "protobuf", files)
+            channels[topic] = out.register_channel(topic, "protobuf", schemas[name, files])
+        time_ns = _ns(time_s)
+        out.add_message(channels[topic], time_ns, message.SerializeToString(), time_ns)
+    out.finish()
 
 
 def _files_of(file: Any) -> bytes:
@@ -122,10 +111,6 @@ def _files_of(file: Any) -> bytes:
 
     add(file)
     return FileDescriptorSet(file=found.values()).SerializeToString()
-
-
-def _entry(time_s: float, topic: str, message: Any) -> Entry:
-    return Entry(_ns(time_s), topic, message.DESCRIPTOR, message.SerializeToString())
 
 
 def _ns(time_s: float) -> int:
@@ -164,18 +149,18 @@ def _scene(results: Sequence[Run], prefixes: Sequence[str], colours: Sequence[st
         if result.overview.columns.odometry is not None:
             frame = f"{prefix}odometry"
             entities.append(foxglove_scene.items(scene.ghost_items(result.robot), frame, frame))
-    yield _entry(0.0, "/scene", SceneUpdate(entities=entities))
+    yield 0.0, "/scene", SceneUpdate(entities=entities)
     for result, prefix in zip(results, prefixes, strict=True):
         few, true = result.overview, result.overview.columns.true_pose
         odometry = few.columns.odometry
         if true is None and odometry is None:  # it stays at the middle, for all that is known
-            yield _entry(0.0, "/tf", FrameTransforms(transforms=[_transform(0.0, f"{prefix}robot", 0.0, 0.0, 0.0)]))
+            yield 0.0, "/tf", FrameTransforms(transforms=[_transform(0.0, f"{prefix}robot", 0.0, 0.0, 0.0)])
         for topic, path in (
             ("path", odometry if true is None else true),
             ("odometry_path", few.placed_odometry),
         ):
             if path is not None:
-                yield _entry(0.0, f"/{prefix}{topic}", _path(path))
+                yield 0.0, f"/{prefix}{topic}", _path(path)
 
 
 def _path(path: Pose) -> PosesInFrame:
@@ -202,7 +187,7 @@ def _movers(result: Run) -> Iterator[Entry]:
         for index, time_s in enumerate(moving[0].time[:-1].tolist()):
             poses = [(float(one.x[index]), float(one.y[index]), float(one.heading[index])) for one in moving]
             transforms = [_transform(time_s - offset_s, _mover(k), *pose) for k, pose in enumerate(poses)]
-            yield _entry(time_s - offset_s, "/tf", FrameTransforms(transforms=transforms))
+            yield time_s - offset_s, "/tf", FrameTransforms(transforms=transforms)
         begin_s = until_s
 
 
@@ -217,15 +202,17 @@ def _ticks(result: Run, prefix: str) -> Iterator[Entry]:
         if start is None:
             start = (0.0, 0.0, 0.0) if part.true_pose is None else part.true_pose.at(0)
         estimate = None if part.odometry is None else part.odometry.placed(*start)
+        steps = part.steps[part.steps >= part.first]
+        commands = {name: part.command[name][steps] for name in ("kind", "left", "right")}
         yield from heapq.merge(
             _poses(part, estimate, prefix),
             _sweeps(result, part, prefix),
             *(
-                _numbers(part, f"/{prefix}{name}", name, columns, kinds)
-                for name, columns in _columns_of(result, part).items()
+                _numbers(f"/{prefix}{name}", part.time[part.first :], table, kinds)
+                for name, table in _tables(result, part).items()
             ),
-            _commands(part, prefix, kinds),
-            key=lambda entry: entry.time_ns,
+            _numbers(f"/{prefix}command", part.time[steps], commands, kinds),
+            key=_TIME,
         )
 
 
@@ -240,8 +227,8 @@ def _poses(part: Columns, estimate: Pose | None, prefix: str) -> Iterator[Entry]
             x, y, heading = path.at(index)
             transforms.append(_transform(time_s, f"{prefix}{frame}", x, y, heading))
             pose = foxglove_scene.pose(x, y, heading)
-            yield _entry(time_s, f"/{prefix}{topic}", PoseInFrame(timestamp=_stamp(time_s), frame_id=WORLD, pose=pose))
-        yield _entry(time_s, "/tf", FrameTransforms(transforms=transforms))
+            yield time_s, f"/{prefix}{topic}", PoseInFrame(timestamp=_stamp(time_s), frame_id=WORLD, pose=pose)
+        yield time_s, "/tf", FrameTransforms(transforms=transforms)
 
 
 def _sweeps(result: Run, part: Columns, prefix: str) -> Iterator[Entry]:
@@ -264,35 +251,42 @@ def _sweeps(result: Run, part: Columns, prefix: str) -> Iterator[Entry]:
                 end_angle=half,
                 ranges=np.where(row < 0, np.inf, row).tolist(),
             )
-            yield _entry(part.time[index], f"/{prefix}{name}", sweep)
+            yield part.time[index], f"/{prefix}{name}", sweep
 
 
-def _columns_of(result: Run, part: Columns) -> dict[str, Sequence[Column]]:
-    """Of each device that has no topic of another kind, and of the board."""
+def _tables(result: Run, part: Columns) -> dict[str, dict[str, NDArray[Any]]]:
+    """Numbers at each new tick, by their names: of each device that has no topic of another kind, and of the board."""
     devices = {
         name: list(part.device_columns(name).values())
         for name, device in result.robot.device.items()
         if not isinstance(device, Laser)
     }
-    return {name: columns for name, columns in devices.items() if columns} | {"board": part.own_columns()}
+    return {
+        name: {"_".join(filter(None, (one.name, one.unit))): one.values[part.first :] for one in columns}
+        for name, columns in (devices | {"board": part.own_columns()}).items()
+        if columns
+    }
 
 
-def _numbers(part: Columns, topic: str, name: str, columns: Sequence[Column], kinds: dict[str, Any]) -> Iterator[Entry]:
-    table = {"_".join(filter(None, (column.name, column.unit))): column.values for column in columns}
-    if name not in kinds:
-        kinds[name] = foxglove_numbers.descriptor(name, list(table))
-    rows = zip(part.time.tolist(), foxglove_numbers.packed(table), strict=True)
-    for time_s, data in itertools.islice(rows, part.first, None):
-        yield Entry(_ns(time_s), topic, kinds[name], data)
+def _numbers(topic: str, time: Floats, table: dict[str, NDArray[Any]], kinds: dict[str, Any]) -> Iterator[Entry]:
+    """A message for each row of these columns of equal length. `kinds`: of messages, by their topics, so far."""
+    if topic not in kinds:
+        kinds[topic] = _kind(topic.rpartition("/")[2], table)
+    columns = (values.astype(np.float64).tolist() for values in table.values())
+    for time_s, *row in zip(time.tolist(), *columns, strict=True):
+        yield time_s, topic, kinds[topic](**dict(zip(table, row, strict=True)))
 
 
-def _commands(part: Columns, prefix: str, kinds: dict[str, Any]) -> Iterator[Entry]:
-    steps = part.steps[part.steps >= part.first]
-    table = {name: part.command[name][steps] for name in ("kind", "left", "right")}
-    if "command" not in kinds:
-        kinds["command"] = foxglove_numbers.descriptor("command", list(table))
-    for time_s, data in zip(part.time[steps].tolist(), foxglove_numbers.packed(table), strict=True):
-        yield Entry(_ns(time_s), f"/{prefix}command", kinds["command"], data)
+def _kind(name: str, fields: Iterable[str]) -> Any:
+    """The class of messages `boebot.NAME`, whose fields are doubles: what Foxglove can plot over time."""
+    name = "".join(letter if letter.isascii() else "_" for letter in name)  # as Protobuf's names are
+    file = FileDescriptorProto(name=f"boebot/{name}.proto", package="boebot", syntax="proto3")
+    message, kinds = file.message_type.add(name=name), FieldDescriptorProto
+    for number, field in enumerate(fields, 1):
+        message.field.add(name=field, number=number, label=kinds.LABEL_OPTIONAL, type=kinds.TYPE_DOUBLE)
+    pool = DescriptorPool()
+    pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(f"boebot.{name}"))
 
 
 # ---- what the brain shows ----------------------------------------------------------------------------------------
@@ -303,14 +297,13 @@ def _shown(result: Run, prefix: str) -> Iterator[Entry]:
     names = shown_names(result.record)
     numbers = [name for name, is_text in names.items() if not is_text]
     fields = [f"{FIELD.sub('_', name)}_{place}" if FIELD.search(name) else name for place, name in enumerate(numbers)]
-    kind = foxglove_numbers.descriptor("shown", fields) if numbers else None
+    kind = _kind("shown", fields) if numbers else None
     before: dict[str, Any] = {}
     for time_s, data in result.record.each_row(VALUES):
         row = msgspec.json.decode(data)
         if kind is not None:
-            values = [row.get(name) for name in numbers]
-            table = {name: np.array([value], dtype=np.float64) for name, value in zip(fields, values, strict=True)}
-            yield Entry(_ns(time_s), f"/{prefix}shown", kind, foxglove_numbers.packed(table)[0])
+            values = {field: row.get(name, math.nan) for field, name in zip(fields, numbers, strict=True)}
+            yield time_s, f"/{prefix}shown", kind(**values)
         for name, is_text in names.items():
             if is_text and row.get(name, "") != before.get(name, ""):
                 yield _line(time_s, Log.INFO, f"{prefix}brain", f"{name}: {row.get(name, '')}")
@@ -325,7 +318,7 @@ def _sketches(result: Run, prefix: str) -> Iterator[Entry]:
     for number, (time_s, data) in enumerate(result.record.each_row(SKETCH)):
         if number == 0:
             frame = FrameTransforms(transforms=[_transform(0.0, f"{prefix}start", *place)])
-            yield _entry(0.0, "/tf", frame)
+            yield 0.0, "/tf", frame
         drawn = msgspec.json.decode(data, type=Sketch)
         if drawn.layer not in layers:
             layers.append(drawn.layer)
@@ -333,7 +326,7 @@ def _sketches(result: Run, prefix: str) -> Iterator[Entry]:
         frame_id = WORLD if drawn.frame == "arena" else f"{prefix}{drawn.frame}"
         entity = foxglove_scene.sketch(drawn, f"{prefix}{drawn.layer}", frame_id, colour)
         entity.timestamp.CopyFrom(_stamp(time_s))
-        yield _entry(time_s, "/sketch", SceneUpdate(entities=[entity]))
+        yield time_s, "/sketch", SceneUpdate(entities=[entity])
 
 
 # ---- what is said ----------------------------------------------------------------------------------------------------
@@ -341,7 +334,7 @@ def _sketches(result: Run, prefix: str) -> Iterator[Entry]:
 
 def _log(result: Run, prefix: str) -> Iterator[Entry]:
     """Events and switches when they happened; at the end notices, and why it ended early."""
-    yield from heapq.merge(_events(result, prefix), _switches(result, prefix), key=lambda entry: entry.time_ns)
+    yield from heapq.merge(_events(result, prefix), _switches(result, prefix), key=_TIME)
     said = [(Log.WARNING, notice) for notice in result.notices]
     if result.error is not None:
         said.append((Log.ERROR, f"{brief(result.error)[0]}: {result.table()['ended']}"))
@@ -350,7 +343,7 @@ def _log(result: Run, prefix: str) -> Iterator[Entry]:
 
 
 def _line(time_s: float, level: Any, name: str, sentence: str) -> Entry:
-    return _entry(time_s, "/log", Log(timestamp=_stamp(time_s), level=level, message=sentence, name=name))
+    return time_s, "/log", Log(timestamp=_stamp(time_s), level=level, message=sentence, name=name)
 
 
 def _events(result: Run, prefix: str) -> Iterator[Entry]:
