@@ -24,14 +24,11 @@ BYE_S = 0.5  # for the last messages
 class Stage(Protocol):
     """What pages look at, told of them in the server's thread."""
 
-    def came(self, page: int) -> None:
-        """A page is there; its number."""
-
     def went(self, page: int) -> None:
-        """It is gone."""
+        """A page is gone; its number."""
 
     def asked(self, page: int, what: messages.Asked) -> None:
-        """It wants something.
+        """A page wants something.
 
         Raises:
             BoebotError: that cannot be done; the page is told.
@@ -82,7 +79,6 @@ class Audience:
                 self._pages[page.number] = page
                 self._begin_page(page)
                 self.changed.notify_all()
-            self._stage.came(page.number)
             return None
         if page.number not in self._pages:
             return "expected hello first"

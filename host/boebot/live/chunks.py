@@ -7,10 +7,10 @@ It holds few ticks, so many in a second of the wall clock: the page is for the e
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from operator import itemgetter
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -23,8 +23,6 @@ from boebot.record.interventions import STREAM, in_words
 from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.record.truth import Floats, Pose
-from boebot.running.hands import Hands
-from boebot.running.loop import gather_rows
 from boebot.showing import SKETCH
 from boebot.view import page_data, scene
 
@@ -35,39 +33,6 @@ MORE = 6  # times as many in one that comes after a longer time
 COGNITIVE_AT_MOST = 4
 
 
-class Source(Protocol):
-    """Where the rows of a robot come from."""
-
-    @property
-    def session(self) -> BoardSession | VehicleSession:
-        """The robot as it was opened."""
-
-    @property
-    def clock_offset_s(self) -> float:
-        """The transport's clock at the run's time 0, once there are rows."""
-
-    def news(self) -> Group:
-        """The rows of a record that came since this was last asked."""
-
-
-class OfRun:
-    """A robot of a run, whose rows go into its record (a `Source`)."""
-
-    def __init__(self, hands: Hands) -> None:
-        self._driver, self._task = hands.driver, hands.task
-        self.session = hands.driver.session
-
-    @property
-    def clock_offset_s(self) -> float:
-        """See `Source`."""
-        return self._driver.status().clock_offset
-
-    def news(self) -> Group:
-        """See `Source`."""
-        gather_rows(self._driver, self._task)
-        return self._task.record.news()
-
-
 class Chunks:
     """Of one robot.
 
@@ -75,10 +40,25 @@ class Chunks:
         content: what the page knows of the robot from the start; None before the first chunk.
     """
 
-    def __init__(self, source: Source, result: Run, number: int, *, title: str = "") -> None:
-        """`result`: what is known as the run begins. `number`: of the robot, from 1. `title`: "": by the result."""
+    def __init__(
+        self,
+        session: BoardSession | VehicleSession,
+        news: Callable[[], Group],
+        result: Run,
+        number: int,
+        *,
+        title: str = "",
+    ) -> None:
+        """
+        Args:
+            session: the robot as it was opened.
+            news: gives the rows of its record that came since it was last called.
+            result: what is known as the run begins.
+            number: of the robot, from 1.
+            title: "": by the result.
+        """
         self.content: dict[str, Any] | None = None
-        self._source, self._result, self._number = source, result, number
+        self._session, self._news, self._result, self._number = session, news, result, number
         self._title = title or f"{result.brain} on {result.robot.name} ({result.board})"
         self._reader = Reader(result)
         self._others: dict[str, Block] = {}  # of streams that are no columns, since the last chunk
@@ -88,7 +68,9 @@ class Chunks:
 
     def gather(self) -> bool:
         """Takes what has happened since the last chunk; whether there is anything to show."""
-        news = self._source.news()
+        news = self._news()
+        if "clock" in news:
+            self._reader.offset_s = Record.of({"clock": news["clock"]}).clock_offset
         self._reader.feed(news)
         for name in OTHERS & news.keys():
             self._others[name] = joined(self._others.get(name), news[name])
@@ -99,15 +81,13 @@ class Chunks:
         """The rows of a chunk; None: nothing has happened."""
         if not self.gather():
             return None
-        if self.content is None:
-            self._reader.offset_s = self._source.clock_offset_s
         columns, news, self._others = self._reader.read(), self._others, {}
         events = page_data.events(columns, self._result.whiskers)
         events += [(time_s, "intervention", in_words(data)) for time_s, data in _rows(news, STREAM)]
         view = self._view(columns, news, events)
         if self.content is None:
             self.content = self._content(view)
-        before, self._counters = self._counters, self._source.session.counters()
+        before, self._counters = self._counters, self._session.counters()
         return page_data.rows_data(
             view,
             events=sorted(events, key=itemgetter(0)),
@@ -147,7 +127,7 @@ class Chunks:
 
     def moving(self, plan: FloorPlan) -> list[Moving]:
         """The moving shapes of that plan where they are now."""
-        now = self._source.session.truth_now()
+        now = self._session.truth_now()
         time = self._reader.truth.times[-1:]
         if now is None or not len(time):
             return []

@@ -10,12 +10,13 @@ import math
 import threading
 import time
 from collections import deque
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.pace import Pace
-from boebot.record.interventions import Arm, Deed, Hand, Parameter, Place, Release, Shape, Stop
+from boebot.record.interventions import Deed, Hand, Parameter, Place, Release, Shape
 
 SILENT_S = 0.3  # of the wall clock, after which a robot that is driven by hand stops
 WAITING = 100  # deeds of a robot that wait at most
@@ -27,10 +28,10 @@ _NEEDS: dict[type, str] = {
     messages.Step: "step",
     messages.Speed: "speed",
     messages.Restart: "restart",
-    messages.Place: "drag",
-    messages.Shape: "drag",
-    messages.Parameter: "parameters",
-    messages.Hand: "hand",
+    Place: "drag",
+    Shape: "drag",
+    Parameter: "parameters",
+    Hand: "hand",
 }
 
 
@@ -40,8 +41,7 @@ class Wheel:
 
     page: int
     """its number"""
-    left: float
-    right: float
+    hand: Hand
     heard_s: float
     """when it last said so, by the wall clock"""
 
@@ -56,31 +56,26 @@ class Controls:
         is_idle: nothing is to be done to any robot, nobody drives one by hand, and no other run is asked for.
     """
 
-    def __init__(self, robots: int, shapes: int, can: frozenset[str], pace: Pace) -> None:
-        """`shapes`: how many of them move in the arena."""
+    def __init__(
+        self, robots: int, shapes: int, can: frozenset[str], pace: Pace, pages: Callable[[], Collection[int]]
+    ) -> None:
+        """`shapes`: how many of them move in the arena. `pages`: those that are open now."""
         self.can, self.pace = can, pace
         self.restart: messages.Restart | None = None
         self.is_idle = True
-        self._robots, self._shapes = robots, shapes
+        self._robots, self._shapes, self._pages = robots, shapes, pages
         self._lock = threading.Lock()
         self._deeds: list[deque[Deed]] = [deque() for _ in range(robots)]
         self._wheels: list[Wheel | None] = [None] * robots
         self._hidden: set[int] = set()
-        self._open: set[int] = set()
 
     # ---- from pages ------------------------------------------------------------------------------------------------
-
-    def came(self, page: int) -> None:
-        """A page is open."""
-        with self._lock:
-            self._open.add(page)
 
     def went(self, page: int) -> None:
         """It is gone. What it drove stops; a run that stands still goes on if that was the last page."""
         with self._lock:
-            self._open.discard(page)
             self._hidden.discard(page)
-            if not self._open and self.pace.paused:
+            if not self._pages() and self.pace.paused:
                 self.pace.resume()
 
     def heard(self, page: int, asked: messages.Asked) -> None:
@@ -89,17 +84,14 @@ class Controls:
         Raises:
             BoebotError: it cannot be done.
         """
-        need = _NEEDS.get(type(asked))
+        need = _NEEDS.get(type(asked.deed if isinstance(asked, messages.Do) else asked))
         if need is not None and need not in self.can:
             raise BoebotError(f"{need} cannot be done here: {_why_not(need)}")
-        robot = getattr(asked, "robot", 0)
-        if robot >= self._robots:
-            raise BoebotError(f"there is no robot {robot + 1}; expected 1 to {self._robots}")
         with self._lock:
-            self._take(page, robot, asked)
+            self._take(page, asked)
         self.pace.changed.set()
 
-    def _take(self, page: int, robot: int, asked: messages.Asked) -> None:
+    def _take(self, page: int, asked: messages.Asked) -> None:
         match asked:
             case messages.Pause():
                 self.pace.pause()
@@ -111,24 +103,8 @@ class Controls:
                 self.pace.set_speed(speed)
             case messages.Restart():
                 self.begin_afresh(asked)
-            case messages.Place(_, pose):
-                self._put(robot, Place(*pose))
-            case messages.Shape(shape, pose):
-                if shape >= self._shapes:
-                    raise BoebotError(f"there is no moving shape {shape + 1}; expected 1 to {self._shapes}")
-                self._put(0, Shape(shape, *pose))
-            case messages.Parameter(_, name, value):
-                self._put(robot, Parameter(name, value))
-            case messages.Hand(_, left, right):
-                self._drive(page, robot, left, right)
-            case messages.Release():
-                self._may_drive(page, robot)
-                self._wheels[robot] = None
-                self._put(robot, Release())
-            case messages.Stop():
-                self._put(robot, Stop())
-            case messages.Arm():
-                self._put(robot, Arm())
+            case messages.Do(robot, deed):
+                self._do(page, robot, deed)
             case messages.Visible(visible):
                 (self._hidden.discard if visible else self._hidden.add)(page)
 
@@ -136,7 +112,17 @@ class Controls:
         """Another run is asked for."""
         self.restart, self.is_idle = restart, False
 
-    def _put(self, robot: int, deed: Deed) -> None:
+    def _do(self, page: int, robot: int, deed: Deed) -> None:
+        if robot >= self._robots:
+            raise BoebotError(f"there is no robot {robot + 1}; expected 1 to {self._robots}")
+        if isinstance(deed, Shape) and deed.index >= self._shapes:
+            raise BoebotError(f"there is no moving shape {deed.index + 1}; expected 1 to {self._shapes}")
+        if isinstance(deed, Hand):
+            self._drive(page, robot, deed)
+            return
+        if isinstance(deed, Release):
+            self._may_drive(page, robot)
+            self._wheels[robot] = None
         if len(self._deeds[robot]) >= WAITING:
             raise BoebotError(f"{WAITING} interventions wait already; expected fewer at once")
         self._deeds[robot].append(deed)
@@ -144,16 +130,16 @@ class Controls:
 
     def _may_drive(self, page: int, robot: int) -> None:
         wheel = self._wheels[robot]
-        if wheel is not None and wheel.page != page and wheel.page in self._open:
+        if wheel is not None and wheel.page != page and wheel.page in self._pages():
             raise BoebotError(f"another page drives robot {robot + 1}; expected it to let go first")
 
-    def _drive(self, page: int, robot: int, left: float, right: float) -> None:
+    def _drive(self, page: int, robot: int, hand: Hand) -> None:
         self._may_drive(page, robot)
         if self._wheels[robot] is None and "speed" in self.can:  # nobody can drive faster than real time
             speed = self.pace.speed
             if speed is None or speed > REAL_TIME:
                 self.pace.set_speed(REAL_TIME)
-        self._wheels[robot] = Wheel(page, left, right, time.monotonic())
+        self._wheels[robot] = Wheel(page, hand, time.monotonic())
         self.is_idle = False
 
     # ---- to the run ------------------------------------------------------------------------------------------------
@@ -169,8 +155,8 @@ class Controls:
             if wheel is None:
                 return deeds
             is_silent = time.monotonic() - wheel.heard_s > SILENT_S
-            is_absent = wheel.page in self._hidden or wheel.page not in self._open
-            hand = Hand(0.0, 0.0) if is_silent or is_absent else Hand(wheel.left, wheel.right)
+            is_absent = wheel.page in self._hidden or wheel.page not in self._pages()
+            hand = Hand(0.0, 0.0) if is_silent or is_absent else wheel.hand
             return deeds if hand == held else [*deeds, hand]
 
     def drivers(self) -> list[int | None]:

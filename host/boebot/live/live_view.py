@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
@@ -19,15 +20,17 @@ from boebot.imperfections import switched_off, switches
 from boebot.link.transport import Measures
 from boebot.live import messages
 from boebot.live.audience import Audience
-from boebot.live.chunks import EACH_S, Chunks, OfRun
+from boebot.live.chunks import EACH_S, Chunks
 from boebot.live.controls import Controls
 from boebot.live.outbox import LETTERS, Message
 from boebot.live.pace import Pace
 from boebot.live.page_server import LOOPBACK
+from boebot.record.blocks import Group
 from boebot.record.interventions import Deed
 from boebot.record.run import Run
 from boebot.running.brain_parameters import bounds, meaning, sliders
 from boebot.running.hands import Hands
+from boebot.running.loop import gather_rows
 
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
@@ -78,12 +81,6 @@ class LiveView:
 
     # ---- pages: in the server's thread -----------------------------------------------------------------------------
 
-    def came(self, page: int) -> None:
-        """See `Stage`."""
-        with self._changing:
-            if self._controls is not None:
-                self._controls.came(page)
-
     def went(self, page: int) -> None:
         """See `Stage`."""
         with self._changing:
@@ -105,15 +102,14 @@ class LiveView:
         self._pace = Pace(self._speed if "speed" in can else None)
         self._robots = list(robots)
         self._chunks = [
-            Chunks(OfRun(each), result, n) for n, (each, result) in enumerate(zip(robots, results, strict=True), 1)
+            Chunks(each.driver.session, partial(_news, each), result, n)
+            for n, (each, result) in enumerate(zip(robots, results, strict=True), 1)
         ]
         world = results[0].world
         self._plan = FloorPlan() if world is None else floor_plan(world, 0.0, 0.0)
         self._audience.forget(len(robots))
-        controls = Controls(len(robots), len(self._plan.moving), can, self._pace)
+        controls = Controls(len(robots), len(self._plan.moving), can, self._pace, self._audience.pages)
         with self._changing:
-            for page in self._audience.pages():
-                controls.came(page)
             if self.restart is not None:  # asked for since the last run has ended
                 controls.begin_afresh(self.restart)
             self._controls, self._has_ended = controls, False
@@ -292,6 +288,12 @@ class Heard:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._own, name)
+
+
+def _news(robot: Hands) -> Group:
+    """Rows of its record that came since this was last asked."""
+    gather_rows(robot.driver, robot.task)
+    return robot.task.record.news()
 
 
 def _possible(robots: Sequence[Hands]) -> frozenset[str]:

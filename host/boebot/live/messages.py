@@ -8,9 +8,8 @@ from typing import Annotated
 import msgspec
 
 from boebot.errors import BoebotError
+from boebot.record.interventions import Deed
 
-Signal = Annotated[float, msgspec.Meta(ge=-1, le=1)]
-Index = Annotated[int, msgspec.Meta(ge=0, le=1000)]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 
 
@@ -49,52 +48,11 @@ class Restart(_Message, frozen=True):
     without: Annotated[list[Name], msgspec.Meta(max_length=200)]
 
 
-class Place(_Message, frozen=True):
-    """A robot is put there: m, m, rad."""
+class Do(_Message, frozen=True):
+    """Something is done to a robot: `Hand` again at least every 0.1 s while it is to move."""
 
-    robot: Index
-    pose: tuple[float, float, float]
-
-
-class Shape(_Message, frozen=True):
-    """A moving shape is put there: m, m, rad."""
-
-    shape: Index
-    pose: tuple[float, float, float]
-
-
-class Parameter(_Message, frozen=True):
-    """A parameter of a robot's brain gets a value."""
-
-    robot: Index
-    name: Name
-    value: float
-
-
-class Hand(_Message, frozen=True):
-    """A robot is driven by hand; said again at least every 0.1 s while it is to move."""
-
-    robot: Index
-    left: Signal
-    right: Signal
-
-
-class Release(_Message, frozen=True):
-    """Its brain drives it again."""
-
-    robot: Index
-
-
-class Stop(_Message, frozen=True):
-    """Its motors are latched off."""
-
-    robot: Index
-
-
-class Arm(_Message, frozen=True):
-    """They are no longer."""
-
-    robot: Index
+    robot: Annotated[int, msgspec.Meta(ge=0)]
+    deed: Deed
 
 
 class Visible(_Message, frozen=True):
@@ -103,9 +61,7 @@ class Visible(_Message, frozen=True):
     visible: bool
 
 
-Asked = (
-    Hello | Pause | Resume | Step | Speed | Restart | Place | Shape | Parameter | Hand | Release | Stop | Arm | Visible
-)
+Asked = Hello | Pause | Resume | Step | Speed | Restart | Do | Visible
 _DECODER: msgspec.json.Decoder[Asked] = msgspec.json.Decoder(Asked)
 
 
@@ -119,7 +75,7 @@ def decode(data: str) -> Asked:
         message = _DECODER.decode(data)
     except (msgspec.MsgspecError, RecursionError, UnicodeError) as error:
         raise BoebotError(f"a page has sent what this boebot does not know: {error}") from None
-    numbers = getattr(message, "pose", ()) or (getattr(message, "value", 0.0),)
-    if not all(math.isfinite(number) for number in numbers):
+    numbers = msgspec.structs.astuple(message.deed) if isinstance(message, Do) else ()
+    if not all(math.isfinite(number) for number in numbers if isinstance(number, float)):
         raise BoebotError("a page has sent a number that is not finite")
     return message

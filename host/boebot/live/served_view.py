@@ -26,9 +26,7 @@ _NOTHING = bytes(Telemetry.LENGTH)  # telemetry of a board that says nothing
 
 
 class ReadAlong:
-    """The rows of a served robot: what its board sends, and the truth (a `boebot.live.chunks.Source`)."""
-
-    clock_offset_s = 0.0
+    """The rows of a served robot: what its board sends, and the truth."""
 
     def __init__(self, session: BoardSession) -> None:
         self.session = session
@@ -42,7 +40,7 @@ class ReadAlong:
         self._data += data
 
     def news(self) -> Group:
-        """See `Source`. Nothing but the truth is known while no program has the port."""
+        """The rows that came since this was last asked; nothing but the truth, while no program has the port."""
         record, now_s = Record(), self.session.counters()["time_s"]
         telemetry = [payload for number, payload in self._messages(record, now_s) if number == Telemetry.ID]
         if telemetry:
@@ -97,9 +95,6 @@ class ServedView:
         self._audience.forget(1)
         self.url = self._audience.url
 
-    def came(self, page: int) -> None:
-        """See `Stage`."""
-
     def went(self, page: int) -> None:
         """See `Stage`."""
 
@@ -117,7 +112,7 @@ class ServedView:
         if self._source is None or self._chunks is None:
             self._source = ReadAlong(session)
             title = f"{self._request.robot.name} ({self._kind}), served"
-            self._chunks = Chunks(self._source, self._result(session), 1, title=title)
+            self._chunks = Chunks(session, self._source.news, self._result(session), 1, title=title)
         self._source.hear(data)
         rows = self._chunks.make()
         if rows is None:
@@ -147,12 +142,8 @@ class ServedView:
             seed=request.seed,
             period=TICK_S,
             tick=TICK_S,
-            error=None,
             record=Record(),
             world=session.arena,
-            clock_offset=0.0,
-            steps=0,
-            run_time=0.0,
             without=request.without,
             imperfections=request.imperfections,
         )

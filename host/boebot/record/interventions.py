@@ -4,12 +4,14 @@ changes a parameter (boebot.running.hands carries it out)."""
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import msgspec
 
 from boebot.record.record import Record
 
 STREAM = "intervention"  # of the record
+Signal = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 SLIDE_S = 1.0  # of the run; a slider that is dragged gives new values all the time
 
 
@@ -20,8 +22,8 @@ class Intervention(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower)
 class Hand(Intervention, frozen=True):
     """The robot is driven by these motor signals (-1 to 1), whatever its brain says, until `Release`."""
 
-    left: float
-    right: float
+    left: Signal
+    right: Signal
 
 
 class Release(Intervention, frozen=True):
@@ -47,7 +49,7 @@ class Place(Intervention, frozen=True):
 class Shape(Intervention, frozen=True):
     """So is a moving shape of the arena, the `index`-th from 0."""
 
-    index: int
+    index: Annotated[int, msgspec.Meta(ge=0)]
     x: float
     y: float
     heading: float

@@ -77,6 +77,10 @@ class Page:
         """Sends it."""
         self.stream.send(json.dumps(message))
 
+    def do(self, kind: str, **deed: Any) -> None:
+        """Does it to the first robot."""
+        self.say(type="do", robot=0, deed={"kind": kind, **deed})
+
     def until(self, kind: str, *, where: Any = lambda message: True) -> Any:
         """The next message of a kind of which that is true."""
         deadline = time.monotonic() + LIMIT_S
@@ -178,12 +182,12 @@ def test_rubbish_floods_and_old_pages_are_let_go_and_the_run_goes_on(endless: Ru
 def test_two_pages_one_drives(endless: Run) -> None:
     with endless.stream() as one, endless.stream() as two:
         pages = Page(one), Page(two)
-        pages[0].say(type="hand", robot=0, left=0.4, right=0.4)
+        pages[0].do("hand", left=0.4, right=0.4)
         assert pages[0].state(lambda state: state["robots"][0]["driver"])["robots"][0]["driver"] == "you"
         assert pages[1].state(lambda state: state["robots"][0]["driver"])["robots"][0]["driver"] == "another"
-        pages[1].say(type="hand", robot=0, left=-1, right=-1)
+        pages[1].do("hand", left=-1, right=-1)
         assert "another page drives" in pages[1].until("refused")["sentence"]
-        pages[0].say(type="release", robot=0)
+        pages[0].do("release")
         pages[0].state(lambda state: not state["robots"][0]["driver"])
 
 
@@ -196,18 +200,18 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, caps
         page.until("run")
         page.say(type="pause")
         page.state(lambda state: state["paused"])
-        page.say(type="place", robot=0, pose=[0.0, 0.0, 1.0])
+        page.do("place", x=0.0, y=0.0, heading=1.0)
         state = page.state(lambda state: state["touched"] == 1)
         assert state["robots"][0]["pose"] == [0.0, 0.0, 1.0]
-        page.say(type="place", robot=0, pose=[9.0, 9.0, 0.0])
+        page.do("place", x=9.0, y=9.0, heading=0.0)
         assert "cannot stand at 9.00 m, 9.00 m" in page.until("refused")["sentence"]
-        page.say(type="shape", shape=0, pose=[1.2, 0.3, 0.5])
+        page.do("shape", index=0, x=1.2, y=0.3, heading=0.5)
         page.state(lambda state: state["touched"] == 2)
-        page.say(type="parameter", robot=0, name="wander.forward", value=0.3)
+        page.do("parameter", name="wander.forward", value=0.3)
         page.say(type="step")
         later = page.state(lambda now: now["time"] > state["time"])
         assert later["paused"] and later["robots"][0]["parameters"]["wander.forward"] == 0.3
-        page.say(type="hand", robot=0, left=0.5, right=-0.5)
+        page.do("hand", left=0.5, right=-0.5)
         page.say(type="resume")
         page.state(lambda now: now["robots"][0]["driver"] == "you")
         page.say(type="speed", speed=None)
@@ -325,7 +329,7 @@ def test_served_robot_is_shown_and_driven_only_by_who_has_its_port() -> None:
         page = Page(stream)
         assert page.until("run")["live"]["can"] == []
         first = page.until("chunk")["state"]["time"]
-        page.say(type="hand", robot=0, left=1, right=1)
+        page.do("hand", left=1, right=1)
         assert "is driven by the program that has its port" in page.until("refused")["sentence"]
         assert page.state(lambda state: state["time"] > first + 0.2)
         run.process.send_signal(signal.SIGINT)

@@ -6,6 +6,7 @@ import base64
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +30,11 @@ from boebot.running.tasks import Member, Request
 ALL = frozenset({"pause", "step", "speed", "restart", "drag", "hand", "parameters"})
 
 
-def controls(can: frozenset[str] = ALL, *, robots: int = 1, speed: float | None = 1.0) -> Controls:
-    """With pages 1 and 2 open."""
-    made = Controls(robots, 0, can, Pace(speed))
-    for page in (1, 2):
-        made.came(page)
-    return made
+def controls(
+    can: frozenset[str] = ALL, *, pages: Sequence[int] = (1, 2), robots: int = 1, speed: float | None = 1.0
+) -> Controls:
+    """`pages`: that are open."""
+    return Controls(robots, 0, can, Pace(speed), lambda: pages)
 
 
 def test_past_of_a_long_run_is_bounded_and_even() -> None:
@@ -49,7 +49,7 @@ def test_past_of_a_long_run_is_bounded_and_even() -> None:
 
 def test_deeds_are_given_once_and_in_their_order() -> None:
     wanted = controls()
-    for asked in (messages.Stop(0), messages.Place(0, (1.0, 2.0, 3.0)), messages.Arm(0)):
+    for asked in (messages.Do(0, Stop()), messages.Do(0, Place(1.0, 2.0, 3.0)), messages.Do(0, Arm())):
         wanted.heard(1, asked)
     assert wanted.due(0, None) == [Stop(), Place(1.0, 2.0, 3.0), Arm()]
     assert wanted.due(0, None) == []
@@ -57,70 +57,76 @@ def test_deeds_are_given_once_and_in_their_order() -> None:
 
 def test_hand_that_falls_silent_stops_the_robot_and_keeps_it() -> None:
     wanted = controls()
-    wanted.heard(1, messages.Hand(0, 0.5, -0.5))
+    wanted.heard(1, messages.Do(0, Hand(0.5, -0.5)))
     (hand,) = wanted.due(0, None)
     assert hand == Hand(0.5, -0.5)
     assert wanted.due(0, hand) == []  # the same: said once
     time.sleep(SILENT_S + 0.05)
     assert wanted.due(0, hand) == [Hand(0.0, 0.0)]
-    wanted.heard(1, messages.Release(0))
+    wanted.heard(1, messages.Do(0, Release()))
     assert wanted.due(0, Hand(0.0, 0.0)) == [Release()]
 
 
 @pytest.mark.parametrize("how", ["hidden", "closed"])
 def test_page_that_is_hidden_or_closed_drives_nothing(how: str) -> None:
-    wanted = controls()
-    wanted.heard(1, messages.Hand(0, 0.5, 0.5))
+    pages = [1, 2]
+    wanted = controls(pages=pages)
+    wanted.heard(1, messages.Do(0, Hand(0.5, 0.5)))
     if how == "hidden":
         wanted.heard(1, messages.Visible(False))
     else:
+        pages.remove(1)
         wanted.went(1)
     assert wanted.due(0, Hand(0.5, 0.5)) == [Hand(0.0, 0.0)]
 
 
 def test_one_page_drives_at_a_time() -> None:
-    wanted = controls(robots=2)
-    wanted.heard(1, messages.Hand(0, 0.5, 0.5))
-    wanted.heard(2, messages.Hand(1, 0.1, 0.1))  # the other robot is free
+    pages = [1, 2]
+    wanted = controls(pages=pages, robots=2)
+    wanted.heard(1, messages.Do(0, Hand(0.5, 0.5)))
+    wanted.heard(2, messages.Do(1, Hand(0.1, 0.1)))  # the other robot is free
     with pytest.raises(BoebotError, match="another page drives robot 1"):
-        wanted.heard(2, messages.Hand(0, 0.1, 0.1))
+        wanted.heard(2, messages.Do(0, Hand(0.1, 0.1)))
     with pytest.raises(BoebotError, match="another page drives robot 1"):
-        wanted.heard(2, messages.Release(0))
-    wanted.heard(2, messages.Stop(0))  # anybody may stop it
+        wanted.heard(2, messages.Do(0, Release()))
+    wanted.heard(2, messages.Do(0, Stop()))  # anybody may stop it
+    pages.remove(1)
     wanted.went(1)
-    wanted.heard(2, messages.Hand(0, 0.1, 0.1))
+    wanted.heard(2, messages.Do(0, Hand(0.1, 0.1)))
     assert wanted.drivers() == [2, 2]
 
 
 def test_driving_by_hand_is_never_faster_than_real_time() -> None:
     wanted = controls(speed=None)
-    wanted.heard(1, messages.Hand(0, 0.5, 0.5))
+    wanted.heard(1, messages.Do(0, Hand(0.5, 0.5)))
     assert wanted.pace.speed == 1.0
 
 
 def test_what_cannot_be_done_here_is_refused() -> None:
     wanted = controls(frozenset({"hand"}))
-    for asked in (messages.Pause(), messages.Speed(2.0), messages.Place(0, (0.0, 0.0, 0.0)), messages.Restart(1, [])):
+    for asked in (messages.Pause(), messages.Speed(2.0), messages.Do(0, Place(0.0, 0.0, 0.0)), messages.Restart(1, [])):
         with pytest.raises(BoebotError, match="cannot be done here"):
             wanted.heard(1, asked)
     with pytest.raises(BoebotError, match="there is no robot 2"):
-        wanted.heard(1, messages.Stop(1))
+        wanted.heard(1, messages.Do(1, Stop()))
 
 
 def test_deeds_are_not_queued_without_end() -> None:
     wanted = controls()
     for _ in range(100):
-        wanted.heard(1, messages.Stop(0))
+        wanted.heard(1, messages.Do(0, Stop()))
     with pytest.raises(BoebotError, match="wait already"):
-        wanted.heard(1, messages.Stop(0))
+        wanted.heard(1, messages.Do(0, Stop()))
 
 
 def test_run_that_stands_still_goes_on_with_its_last_page() -> None:
-    wanted = controls()
+    pages = [1, 2]
+    wanted = controls(pages=pages)
     wanted.heard(1, messages.Pause())
-    wanted.went(1)
-    assert wanted.pace.paused
-    wanted.went(2)
+    for page in (1, 2):
+        assert wanted.pace.paused
+        pages.remove(page)
+        wanted.went(page)
     assert not wanted.pace.paused
 
 
@@ -184,9 +190,12 @@ def test_outbox_is_bounded() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "[]", '{"type":"fly"}', '{"type":"speed","speed":0}', '{"type":"place","robot":0,"pose":[1,2]}',
-     '{"type":"hand","robot":0,"left":2,"right":0}', '{"type":"hand","robot":-1,"left":0,"right":0}',
-     '{"type":"place","robot":0,"pose":[1,2,1e999]}', '{"type":"parameter","robot":0,"name":"a","value":1e999}',
+    ["", "{", "[]", '{"type":"fly"}', '{"type":"speed","speed":0}',
+     '{"type":"do","robot":0,"deed":{"kind":"place","x":1}}',
+     '{"type":"do","robot":0,"deed":{"kind":"hand","left":2,"right":0}}',
+     '{"type":"do","robot":-1,"deed":{"kind":"hand","left":0,"right":0}}',
+     '{"type":"do","robot":0,"deed":{"kind":"place","x":1,"y":2,"heading":1e999}}',
+     '{"type":"do","robot":0,"deed":{"kind":"parameter","name":"a","value":1e999}}',
      "[" * 10_000],
 )  # fmt: skip
 def test_rubbish_is_one_sentence(text: str) -> None:

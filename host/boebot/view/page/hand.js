@@ -1,8 +1,7 @@
-// What people do by hand to a run that goes on. Driving: keys, arrows on the screen, a gamepad; and the emergency stop.
+// What people do by hand to a run that goes on. Driving: keys, arrows on the screen; and the emergency stop.
 // While something is held the server hears of it again and again; it stops the robot when it hears nothing for 0.3 s.
 
 const AGAIN_MS = 80;
-const DEAD_ZONE = 0.12;
 const TURN = 0.6; // how much of the speed a turn takes
 const KEYS = {
   w: "ahead",
@@ -16,72 +15,42 @@ const KEYS = {
 };
 const held = new Set(); // of "ahead", "left", "back", "right"
 let handTimer = null;
-let pads = false;
-let padStops = false; // its button for that is down
 
-// Motor signals for what is held, by keys or arrows or else by the gamepad.
+// Motor signals for what is held.
 function wanted() {
-  const power = Number($("power").value) / 100;
-  let ahead = held.has("ahead") - held.has("back"),
-    turn = held.has("left") - held.has("right");
-  if (!held.size) [ahead, turn] = padSticks();
-  if (!held.size && !ahead && !turn) return null;
-  const left = ahead - TURN * turn,
+  const power = Number($("power").value) / 100,
+    ahead = held.has("ahead") - held.has("back"),
+    turn = held.has("left") - held.has("right"),
+    left = ahead - TURN * turn,
     right = ahead + TURN * turn,
     most = Math.max(1, Math.abs(left), Math.abs(right));
   return [left, right].map(v => Math.round(((1000 * v) / most) * power) / 1000);
 }
-// Ahead and turn, each -1 to 1.
-function padSticks() {
-  const pad = pads && [...navigator.getGamepads()].find(one => one && one.connected);
-  if (!pad) return [0, 0];
-  const stops = !!pad.buttons[1]?.pressed;
-  if (stops && !padStops) stopRobot(); // once for each time that it is pressed
-  padStops = stops;
-  if (stops) return [0, 0];
-  const stick = v => (Math.abs(v) < DEAD_ZONE ? 0 : -v);
-  return [stick(pad.axes[1]), stick(pad.axes[0])];
-}
-let driving = false;
 function sayHand() {
-  const signals = wanted();
-  if (signals) {
-    driving = true;
-    if (!newest) setNewest(true);
-    send({ type: "hand", robot: runs.indexOf(run), left: signals[0], right: signals[1] });
-  } else if (driving) {
-    driving = false;
-    send({ type: "hand", robot: runs.indexOf(run), left: 0, right: 0 });
-  }
-  if (!signals && !pads) {
-    clearInterval(handTimer);
-    handTimer = null;
-  }
+  const [left, right] = wanted();
+  if (held.size && !newest) setNewest(true);
+  act({ kind: "hand", left, right });
 }
 function hold(name, on) {
-  if (!can.has("hand") || ended !== null || held.has(name) === on) return;
+  if (held.has(name) === on || (on && (!can.has("hand") || ended !== null))) return;
   if (on) held.add(name);
   else held.delete(name);
   $("drive").querySelector(`[data-way=${name}]`)?.classList.toggle("held", on);
   sayHand();
-  if (held.size || pads) handTimer ??= setInterval(sayHand, AGAIN_MS);
+  if (held.size) handTimer ??= setInterval(sayHand, AGAIN_MS);
+  else {
+    clearInterval(handTimer);
+    handTimer = null;
+  }
 }
 function letGo() {
   for (const name of [...held]) hold(name, false);
 }
 function stopRobot() {
   letGo();
-  driving = false;
-  send({ type: "stop", robot: runs.indexOf(run) });
+  act({ kind: "stop" });
 }
 addEventListener("blur", letGo);
-addEventListener("gamepadconnected", () => {
-  pads = true;
-  if (can.has("hand")) handTimer ??= setInterval(sayHand, AGAIN_MS);
-});
-addEventListener("gamepaddisconnected", () => {
-  pads = [...navigator.getGamepads()].some(Boolean);
-});
 
 // ---- the panel ----
 function listenToHand() {
@@ -105,9 +74,9 @@ function listenToHand() {
   }
   $("release").onclick = () => {
     letGo();
-    send({ type: "release", robot: runs.indexOf(run) });
+    act({ kind: "release" });
   };
-  $("arm").onclick = () => send({ type: "arm", robot: runs.indexOf(run) });
+  $("arm").onclick = () => act({ kind: "arm" });
 }
 function tellDrive() {
   if (!can.has("hand")) return;
@@ -205,7 +174,9 @@ function put() {
   grabbed = null;
   requestDraw();
   say("event", "");
-  if (moved) send({ type: kind === "robot" ? "place" : "shape", [kind]: index, pose });
+  const [x, y, heading] = pose;
+  if (moved && kind === "robot") act({ kind: "place", x, y, heading }, index);
+  else if (moved) act({ kind: "shape", index, x, y, heading }, 0);
 }
 function letGoOfDrag() {
   if (grabbed) {

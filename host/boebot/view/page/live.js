@@ -51,6 +51,8 @@ function disconnected(event) {
 function send(message) {
   if (socket && socket.readyState === 1) socket.send(JSON.stringify(message));
 }
+// What is to be done to a robot: the one that is chosen, or another.
+const act = (deed, robot = runs.indexOf(run)) => send({ type: "do", robot, deed });
 const receive = {
   run(content) {
     const chosen = run ? runs.indexOf(run) : 0;
@@ -379,7 +381,7 @@ function sendSoon(one) {
   const robot = runs.indexOf(run);
   one.due ??= setTimeout(() => {
     one.due = null;
-    send({ type: "parameter", robot, name: one.parameter.name, value: Number(one.input.value) });
+    act({ kind: "parameter", name: one.parameter.name, value: Number(one.input.value) }, robot);
   }, 100);
 }
 function tellParameters() {
