@@ -100,7 +100,7 @@ pictures:
 	@cp build/pictures/echoes/run.png docs/images/echoes.png
 	@$(VENV)/bin/boebot run explore --robot roller --arena office --seconds 1000 --out build/pictures/explored
 	@cp build/pictures/explored/run.png docs/images/explored.png
-	@$(PYTHON_VENV) -m boebot.arenas.reference --pictures
+	@$(PYTHON_VENV) -m tools.arena_pages --pictures
 	@$(VENV)/bin/boebot show robot shieldbot --out docs/images/robot-shieldbot.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
@@ -241,8 +241,8 @@ build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) bu
 	@$(PYTHON_VENV) setup.py --quiet build_ext --inplace >build/core.log 2>&1 || { cat build/core.log; exit 1; }
 	@touch $@
 
-$(ARENA_SCHEMA): host/boebot/arenas/description.py host/boebot/arenas/reference.py | $(VENV)/.done-boebot
-	@$(PYTHON_VENV) -m boebot.arenas.reference --schema
+$(ARENA_SCHEMA): host/boebot/arenas/description.py tools/arena_pages.py | $(VENV)/.done-boebot
+	@$(PYTHON_VENV) -m tools.arena_pages --schema
 
 build/platformio-core/appstate.json: tools/prepare_platformio.py $(VENV)/.done-firmware \
 		$(shell find tools/platformio -name '*.py' -o -name '*.json')

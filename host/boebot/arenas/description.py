@@ -1,6 +1,6 @@
 """What an arena file says: its keys with their units and limits, and what a description has to keep beyond its types.
 
-The JSON schema for editors and the tables in docs/reference/arenas.md are made from these types (reference.py).
+The JSON schema for editors and the tables in docs/reference/arenas.md are made from these types (tools/arena_pages.py).
 """
 
 from __future__ import annotations

@@ -24,12 +24,12 @@ from boebot.arenas import (
     Waypoint,
     arena_names,
     load_arena,
-    reference,
 )
 from boebot.arenas.floor_plan import floor_plan, poses_of
 from boebot.errors import ArenaError
 from boebot.view import arena_picture
 from sim_bridge._core import ffi, lib
+from tools import arena_pages
 
 ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "docs" / "reference").is_dir())
 PAGE = (ROOT / "docs/reference/arenas.md").read_text(encoding="utf-8")
@@ -212,12 +212,12 @@ def test_moving_shapes_are_where_their_path_says() -> None:
 @pytest.mark.unsanitized
 def test_schema_and_page_are_fresh() -> None:
     """`make` renews the schema, `make pictures` the page."""
-    assert (resources.folder("arenas") / "schema.json").read_text(encoding="utf-8") == reference.schema()
-    assert reference.page(PAGE) == PAGE
+    assert (resources.folder("arenas") / "schema.json").read_text(encoding="utf-8") == arena_pages.schema()
+    assert arena_pages.page(PAGE) == PAGE
 
 
 def test_schema_names_every_key_with_its_limits() -> None:
-    definitions = json.loads(reference.schema())["$defs"]
+    definitions = json.loads(arena_pages.schema())["$defs"]
     assert definitions["Disc"]["required"] == ["x_m", "y_m", "radius_m"]
     assert definitions["Disc"]["properties"]["radius_m"]["exclusiveMinimum"] == 0
     assert definitions["Polygon"]["properties"]["corners_m"]["minItems"] == 3

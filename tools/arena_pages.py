@@ -1,8 +1,8 @@
-"""Writes what documents arena files, from their types (description.py).
+"""Writes what documents arena files, from their types (boebot/arenas/description.py).
 
-python -m boebot.arenas.reference --schema      bundled/schema.json, the JSON schema of an arena file: `make`
-python -m boebot.arenas.reference --pictures    docs/images/arena-NAME.png of each bundled arena, and the tables of
-                                                keys in docs/reference/arenas.md: `make pictures`
+python -m tools.arena_pages --schema      bundled/schema.json, the JSON schema of an arena file: `make`
+python -m tools.arena_pages --pictures    docs/images/arena-NAME.png of each bundled arena, and the tables of keys in
+                                          docs/reference/arenas.md: `make pictures`
 """
 
 from __future__ import annotations
