@@ -153,5 +153,5 @@ def test_battery_is_divided_by_its_ratio(ratio: float) -> None:
 
 def test_picture_in_the_docs_is_of_this_kit(tmp_path: Path) -> None:
     """`make pictures` renews it."""
-    shown = Path(__file__).parents[2] / "docs" / "images" / "robot-shieldbot.svg"
+    shown = Path(__file__).parents[3] / "docs" / "images" / "robot-shieldbot.svg"
     assert texts(shown) == texts(robot_picture.write(load_robot("shieldbot"), tmp_path / "now.svg"))
