@@ -38,7 +38,7 @@ help:
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
-	@echo "make experiments  all experiments of the notes, and a page of them, build/experiments/index.html"
+	@echo "make experiments  all experiments of the notes, and a page of them, build/experiments/index.md"
 	@echo "make pictures  the pictures of the documentation, and the pages of experiments and of the timing"
 	@echo "make timing    what the pages of the timing show: bounds and measurements, a tick drawn to scale"
 	@echo "make format    format all sources"

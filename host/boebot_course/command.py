@@ -30,7 +30,7 @@ _HELP = """Run experiments of the notes: figures, measured against expected.
 
   boebot experiment --all         all of them on all robots, beside each other
 
-Each leaves NAME.png and NAME.svg, its figure; NAME.csv, the data; NAME.json, the verdict. Several leave index.html too,
+Each leaves NAME.png and NAME.svg, its figure; NAME.csv, the data; NAME.json, the verdict. Several leave index.md too,
 a page of all of them. The exit code is 1 when one is outside its criterion."""
 
 
@@ -114,7 +114,7 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
         BoebotError: some are outside their criteria, or the files cannot be written.
     """
     from boebot import view
-    from boebot_course import index_page, output_files, running
+    from boebot_course import output_files, pages, running
 
     view.make_folder(out)
     by_name: dict[str, Verdict] = {}
@@ -128,8 +128,9 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
             files += output_files.write(out, verdict.files)
     verdicts = [by_name[one.name] for one in experiments]
     if len(verdicts) > 1:
-        index = index_page.page(experiments, verdicts, seed)
-        files = output_files.write(out, {index_page.NAME: index}) + sorted(files)
+        met = sum(verdict.is_met for verdict in verdicts)
+        index = pages.page(f"Experiments: {met} of {len(verdicts)} met, seed {seed}", experiments, by_name)
+        files = output_files.write(out, {"index.md": index.encode()}) + sorted(files)
     if as_json:
         pairs = zip(experiments, verdicts, strict=True)
         found = [output_files.record(one, verdict.measured, verdict.error) for one, verdict in pairs]

@@ -5,19 +5,16 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Progress = Callable[[float], None]
-"""Called now and then with the share that is done, 0 to 1."""
-Thing = TypeVar("Thing")
 
 
 @dataclass(frozen=True)
@@ -126,7 +123,7 @@ class Experiment:
     """where the expected values come from, in sentences"""
     slow: bool = False
     """takes more than some two seconds"""
-    run: Callable[[int, Progress], Outcome]
+    run: Callable[[int], Outcome]
     """runs it with a seed"""
 
     @property
@@ -142,7 +139,7 @@ class Experiment:
 
 
 class Variant:
-    """A robot on which an experiment runs: in words, what its function is given before seed and progress, and whether
+    """A robot on which an experiment runs: in words, what its function is given before the seed, and whether
     it is slow there."""
 
     def __init__(self, robot: str, *given: Any, slow: bool = False) -> None:
@@ -182,10 +179,3 @@ def experiment(
         return run
 
     return register
-
-
-def with_progress(things: Sequence[Thing], progress: Progress) -> Iterator[Thing]:
-    """Each thing in turn; `progress` is called after each."""
-    for number, thing in enumerate(things, 1):
-        yield thing
-        progress(number / len(things))

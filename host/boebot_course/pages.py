@@ -1,4 +1,5 @@
-"""Writes docs/experiments: a page for each chapter of the notes with its experiments' pictures, and the list of all.
+"""Pages of experiments, in Markdown. Run as a program it writes docs/experiments: a page for each chapter of the notes
+with its experiments' pictures, and the list of all.
 
     python -m boebot_course.pages [CHAPTER ...]
 
@@ -33,22 +34,30 @@ def chapter_of(experiment: Experiment) -> str:
     return experiment.section.partition(".")[0]
 
 
-def page(chapter: str, experiments: Iterable[Experiment], measured: Mapping[str, Iterable[Measured]]) -> str:
-    """The page of a chapter, with what was measured with the seed `SEED`, by name."""
-    parts = [f"# Experiments of chapter {chapter}"]
+def page(title: str, experiments: Iterable[Experiment], verdicts: Mapping[str, running.Verdict]) -> str:
+    """The page of some experiments, with what came of them, by name."""
+    parts = [f"# {title}"]
     last = ""
-    for one in (one for one in experiments if chapter_of(one) == chapter):
+    for one in experiments:
         if one.bare_name != last:
             last = one.bare_name
             parts += [f"## {last}: {plain(one.title)}", f"{capital(plain(one.source))}. {plain(one.caption)}"]
         if one.on:
             parts.append(f"### On {one.on}")
-        parts += [
-            plain(one.criterion) if one.on == one.robot else f"{capital(robot(one))}. {plain(one.criterion)}",
-            f"![{one.name}]({one.name}.png)",
-            "\n".join(["figure | measured", "---|---", *map(row, measured.get(one.name, ()))]),
-        ]
+        parts.append(plain(one.criterion) if one.on == one.robot else f"{capital(robot(one))}. {plain(one.criterion)}")
+        verdict = verdicts.get(one.name, running.Verdict(one.name))
+        if verdict.error:
+            parts.append(f"**Failed**: {plain(verdict.error)}")
+        else:
+            rows = "\n".join(["figure | measured", "---|---", *map(row, verdict.measured)])
+            parts += [f"![{one.name}]({one.name}.png)", rows]
     return "\n\n".join(parts) + "\n"
+
+
+def chapter_page(chapter: str, verdicts: Mapping[str, running.Verdict]) -> str:
+    """The page of a chapter."""
+    ones = [one for one in all_experiments().values() if chapter_of(one) == chapter]
+    return page(f"Experiments of chapter {chapter}", ones, verdicts)
 
 
 def row(one: Measured) -> str:
@@ -118,8 +127,7 @@ def main(chapters: list[str]) -> int:
         verdicts = {verdict.name: verdict for verdict in coming}
     for verdict in verdicts.values():
         output_files.write(FOLDER, verdict.files)
-    measured = {name: verdict.measured for name, verdict in verdicts.items()}
-    pages = {f"chapter-{chapter}.md": page(chapter, known, measured) for chapter in set(map(chapter_of, chosen))}
+    pages = {f"chapter-{chapter}.md": chapter_page(chapter, verdicts) for chapter in set(map(chapter_of, chosen))}
     pages["README.md"] = listing(known)
     output_files.write(FOLDER, {name: text.encode() for name, text in pages.items()})
     if not chapters:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 from boebot.errors import BoebotError
 from boebot.running.interrupts import SIGNALS
-from boebot_course.experiment import Experiment, Measured, Outcome, Progress
+from boebot_course.experiment import Experiment, Measured, Outcome
 from boebot_course.experiments import all_experiments
 
 Files = Callable[[Experiment, Outcome, int], dict[str, bytes]]
@@ -49,7 +49,7 @@ class Verdict:
 
 
 def run(
-    experiments: Sequence[Experiment], seed: int, jobs: int, watch: Progress, files: Files
+    experiments: Sequence[Experiment], seed: int, jobs: int, watch: Callable[[float], None], files: Files
 ) -> Generator[Verdict, None, None]:
     """Runs them, with up to that many processes beside each other; the verdicts, as they come. `watch` is told how many
     are done.
@@ -58,8 +58,9 @@ def run(
     is closed.
     """
     if jobs == 1 or len(experiments) == 1:
-        for number, one in enumerate(experiments):
-            yield _run(one, seed, lambda share, number=number: watch(number + share), files)  # type: ignore[misc]
+        for number, one in enumerate(experiments, 1):
+            yield _run(one, seed, files)
+            watch(number)
         return
     waiting = {one.name: one for one in sorted(experiments, key=_length)}
     with contextlib.closing(_in_processes(list(waiting), seed, jobs, files)) as verdicts:
@@ -78,9 +79,9 @@ def _length(experiment: Experiment) -> tuple[bool, int]:
     return not experiment.slow, board
 
 
-def _run(experiment: Experiment, seed: int, progress: Progress, files: Files) -> Verdict:
+def _run(experiment: Experiment, seed: int, files: Files) -> Verdict:
     try:
-        outcome = experiment.run(seed, progress)
+        outcome = experiment.run(seed)
         if not outcome.measured:
             raise ValueError("nothing was measured")
         return Verdict(experiment.name, tuple(outcome.measured), "", files(experiment, outcome, seed))
@@ -145,4 +146,4 @@ def _end_with_parent() -> None:
 
 def _run_there(name: str, seed: int, files: Files) -> Verdict:
     """One experiment, by name, in one of the processes."""
-    return _run(all_experiments()[name], seed, lambda share: None, files)
+    return _run(all_experiments()[name], seed, files)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from boebot.brain import Utility
 from boebot.brain.utility import Utilities
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 
 USE = 0.02  # 1/s, of each
 INTAKE = 0.10  # 1/s at cue 1, of what it takes in, times its cue
@@ -93,7 +93,7 @@ CUES = (1.0, 0.6)  # of water and nutrients
 
 
 @experiment("isocline")
-def isocline(seed: int, progress: Progress) -> Outcome:
+def isocline(seed: int) -> Outcome:
     """An animal with two needs keeps away from the lethal boundary
 
     In the notes: section 7.2, Fig. 7.2

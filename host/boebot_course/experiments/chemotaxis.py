@@ -22,7 +22,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.motor import RegulatedMotor
 from boebot.link import messages
 from boebot.robot import Observation, Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import varied
 
@@ -57,7 +57,7 @@ def utility_of(stimulus: Floats, a: float, b: float, step: float) -> Floats:
 
 
 @experiment("E29")
-def triangle(seed: int, progress: Progress) -> Outcome:
+def triangle(seed: int) -> Outcome:
     """E. coli's utility follows a rise and a fall
 
     In the notes: section 4.4.2, equation (4.1), Fig. 4.1
@@ -95,7 +95,7 @@ def triangle(seed: int, progress: Progress) -> Outcome:
 
 
 @experiment("E30")
-def sign(seed: int, progress: Progress) -> Outcome:
+def sign(seed: int) -> Outcome:
     """With b > a a constant attractant ends in tumbling
 
     In the notes: section 4.4.2, equation (4.1)
@@ -184,7 +184,6 @@ def bacterium() -> RobotDescription:
 def swarm(
     seed: int,
     attractant: Attractant,
-    progress: Progress = lambda share: None,
     *,
     run_on: float = RUN_ON,
     count: int = COUNT,
@@ -201,7 +200,7 @@ def swarm(
     source = np.random.default_rng([seed, 31])
     robot, every = bacterium(), round(STRIDE / STEP)
     paths, running = [], []
-    for number in with_progress(range(count), progress):
+    for number in range(count):
         x, y = source.uniform(-SIZE / 2, SIZE / 2, 2).tolist()
         behavior = RunAndTumble(stimulus=_smelling(attractant), signal=1.0, turn=1.0, run_on=run_on)
         result = run(
@@ -250,7 +249,7 @@ def _draw_swarm(figure: Figure, group: Swarm, title: str) -> None:
 
 
 @experiment("E31", robot="arsim, as narrow as a bacterium", slow=True)
-def accumulation(seed: int, progress: Progress) -> Outcome:
+def accumulation(seed: int) -> Outcome:
     """A hundred bacteria find the attractant
 
     In the notes: section 4.4.2, Fig. 4.2
@@ -260,8 +259,8 @@ def accumulation(seed: int, progress: Progress) -> Outcome:
     Expected: As Fig. 4.2: mean distance below 0.3 of the first, 85 % within the width; without, it stays (± 5 %).
     """
     first = trial_seeds(seed, COUNT)[0]
-    group = swarm(first, gaussian, lambda share: progress(share / 2))
-    control = swarm(first + COUNT, uniform, lambda share: progress(0.5 + share / 2))
+    group = swarm(first, gaussian)
+    control = swarm(first + COUNT, uniform)
     measured = [
         Measured("mean distance against the beginning", group.ratio, most=0.3),
         Measured("share within the width at the end", group.share, least=0.85),
@@ -271,7 +270,7 @@ def accumulation(seed: int, progress: Progress) -> Outcome:
 
 
 @experiment("E32", robot="arsim, as narrow as a bacterium", slow=True)
-def trap(seed: int, progress: Progress) -> Outcome:
+def trap(seed: int) -> Outcome:
     """Bacteria that tumble on the spot do not gather
 
     In the notes: section 4.4.2, Fig. 4.2
@@ -281,7 +280,7 @@ def trap(seed: int, progress: Progress) -> Outcome:
 
     Expected: With T = 0 a tumble never ends: at most 1 % of the steps are runs, the mean distance stays (± 5 %).
     """
-    group = swarm(trial_seeds(seed, COUNT)[0] + 2 * COUNT, gaussian, progress, run_on=0.0)
+    group = swarm(trial_seeds(seed, COUNT)[0] + 2 * COUNT, gaussian, run_on=0.0)
     measured = [
         Measured("share of steps that were runs", group.running, most=0.01),
         about("mean distance against the beginning", group.ratio, 1.0, 0.05),

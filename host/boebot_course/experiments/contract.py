@@ -26,7 +26,7 @@ from matplotlib.figure import Figure
 
 import boebot
 from boebot.robot import Robot
-from boebot_course.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, exactly, experiment
 
 ROOMS = ("boebot.brain", "boebot.behaviors", "boebot.cognition", "boebot.navigation", "boebot.brains")
 """Packages that brains are made of."""
@@ -190,7 +190,7 @@ RUNS = (("shieldbot", "native"), ("arsim", "direct"))
 
 
 @experiment("E66", robot="shieldbot (native), arsim")
-def no_truth(seed: int, progress: Progress) -> Outcome:
+def no_truth(seed: int) -> Outcome:
     """No truth can be reached from a brain
 
     In the notes: section 1.2.4, Fig. 1.18; section 3.2.3
@@ -207,7 +207,7 @@ def no_truth(seed: int, progress: Progress) -> Outcome:
         exactly("imports of the simulator or of what knows the truth", guilty, 0),
     ]
     counts: dict[str, Counter[str]] = {}
-    for robot, on in with_progress(RUNS, progress):
+    for robot, on in RUNS:
         walker = Walker(0.5)
         boebot.run(walker, robot=robot, on=on, seconds=1, seed=seed)
         counts[robot] = Counter(one.kind.rpartition(".")[0] for one in walker.met)

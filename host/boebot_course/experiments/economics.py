@@ -24,7 +24,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import Trial, decisions
 
 SECONDS = 300.0
@@ -117,7 +117,7 @@ def live(charge: Utility, seed: int, seconds: float = SECONDS) -> Life:
 
 
 @experiment("robot-economics", robot="shieldbot-charging (native)")
-def economics(seed: int, progress: Progress) -> Outcome:
+def economics(seed: int) -> Outcome:
     """Charging earns nothing, and yet who charges earns most
 
     In the notes: chapter 8, opening
@@ -133,7 +133,7 @@ def economics(seed: int, progress: Progress) -> Outcome:
     notices all but the first second of some 7.5 s: 0.109 ± 0.02. The other 262 s it works, 5.4 times 48.5 s: with a
     quarter off for turns and searches 4 times. Standing earns nothing but some millimetres.
     """
-    never, always, utility = (live(charge, seed) for charge in with_progress(list(NAMES.values()), progress))
+    never, always, utility = (live(charge, seed) for charge in NAMES.values())
     stands = utility.stands
     earned = float(np.diff(utility.work, prepend=0.0)[stands].sum())
     measured = [

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from boebot.brain import Utility
 from boebot.brain.utility import Utilities
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 
 PATROL = Utility(b=0.5)
 DRAIN, CHARGE = 0.02, 0.1  # 1/s
@@ -139,16 +139,14 @@ class Evolved:
     """of the best of all"""
 
 
-def evolve(
-    seed: int, progress: Progress = lambda share: None, generations: int = GENERATIONS, seconds: float = SECONDS
-) -> Evolved:
+def evolve(seed: int, generations: int = GENERATIONS, seconds: float = SECONDS) -> Evolved:
     """All restarts, each with its own generator."""
     sources = [np.random.default_rng([seed, number]) for number in range(RESTARTS)]
     genes = np.stack([source.normal(0.0, SPREAD, (POPULATION, 4)) for source in sources])
     genes[..., 3] = math.log(0.3) + genes[..., 3] / 4
     genes[..., 3] = np.clip(genes[..., 3], math.log(0.1), math.log(3.0))
     best = []
-    for _ in with_progress(range(generations), progress):
+    for _ in range(generations):
         fitness = live(genes.reshape(-1, 4), seconds=seconds).work.reshape(RESTARTS, POPULATION)
         best.append(fitness.max(axis=1))
         winner = genes.reshape(-1, 4)[fitness.argmax()]
@@ -157,7 +155,7 @@ def evolve(
 
 
 @experiment("E65", slow=True)
-def evolution(seed: int, progress: Progress) -> Outcome:
+def evolution(seed: int) -> Outcome:
     """Evolution finds when to charge
 
     In the notes: section 8.2 and Wahde (2003)
@@ -170,7 +168,7 @@ def evolution(seed: int, progress: Progress) -> Outcome:
     mostly at never charging, 50 s: all of three do so at one seed in twelve, not at 1 to 10. Without selection, or
     without mutation, the best gets worse or stays where chance put it.
     """
-    evolved = evolve(seed, progress)
+    evolved = evolve(seed)
     known = live(np.array([NEVER, ALWAYS, THRESHOLD, BY_HAND]))
     best = live(evolved.genes[None], traced=True)
     worse = int((np.diff(evolved.best, axis=0) < -1e-9).sum())

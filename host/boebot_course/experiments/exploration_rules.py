@@ -19,7 +19,7 @@ from boebot.navigation import Scan
 from boebot.navigation.exploration_graph import ExplorationGraph, Placement
 from boebot.view import style
 from boebot.view.painter import HATCH, frame
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 
 Point = tuple[float, float]
 
@@ -119,7 +119,7 @@ def _wrong_paths(panel: Panel) -> int:
 
 
 @experiment("E36")
-def moving_on(seed: int, progress: Progress) -> Outcome:
+def moving_on(seed: int) -> Outcome:
     """Paths to pending nodes when the robot moves on
 
     In the notes: section 6.1, Fig. 6.2
@@ -203,7 +203,7 @@ def scan_of(wide: float = FREE[1][2]) -> Scan:
 
 
 @experiment("E37")
-def placed(seed: int, progress: Progress) -> Outcome:
+def placed(seed: int) -> Outcome:
     """Nodes where the way is free
 
     In the notes: section 6.1, Fig. 6.1

@@ -19,7 +19,7 @@ from boebot.cognition import Odometry
 from boebot.description.robots import RobotDescription
 from boebot.navigation import Coverage, Explore, Lattice, LineMap, Placement
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, varied
@@ -129,7 +129,7 @@ LOW_START = (1.0, 1.5, 0.0)  # m, m, rad: its second node is then at 22.5 degree
 
 
 @experiment("E38", robot="roller, with odometry that does not drift", slow=True)
-def low_obstacle(seed: int, progress: Progress) -> Outcome:
+def low_obstacle(seed: int) -> Outcome:
     """A node that cannot be reached
 
     In the notes: section 6.1, Fig. 6.2
@@ -145,7 +145,6 @@ def low_obstacle(seed: int, progress: Progress) -> Outcome:
     with arena_file("low", LOW) as arena:
         brain = Brain([Odometry(), watch, explore])
         trial = try_once(brain, roller(), arena, 250.0, pose=LOW_START, seed=seed)
-    progress(1.0)
     assert explore.graph is not None
     nodes = explore.graph.nodes
     unreachable = [node for node in nodes if node.status == "unreachable"]
@@ -180,16 +179,11 @@ def _status_at(watch: Watch, time: float, status: str) -> int:
 STARTS, BLOCK_STARTS = 12, 24
 
 
-def all_explored(
-    arena: str, seed: int, count: int, progress: Progress, *, second_pass: bool = True
-) -> list[Exploration]:
+def all_explored(arena: str, seed: int, count: int, *, second_pass: bool = True) -> list[Exploration]:
     """Explorations from as many starts."""
     seen = LineMap.of("exploration")
     given = list(zip(starts(arena, seed, count), trial_seeds(seed, count), strict=True))
-    return [
-        explored(arena, seen, pose, number, explorer(second_pass=second_pass))
-        for pose, number in with_progress(given, progress)
-    ]
+    return [explored(arena, seen, pose, number, explorer(second_pass=second_pass)) for pose, number in given]
 
 
 def data_of(runs: list[Exploration]) -> dict[str, list[float]]:
@@ -205,7 +199,7 @@ def data_of(runs: list[Exploration]) -> dict[str, list[float]]:
 
 
 @experiment("E39", robot="roller, with odometry that does not drift", slow=True)
-def coverage(seed: int, progress: Progress) -> Outcome:
+def coverage(seed: int) -> Outcome:
     """Sensory area coverage
 
     In the notes: section 6.1, Fig. 6.4
@@ -215,7 +209,7 @@ def coverage(seed: int, progress: Progress) -> Outcome:
 
     Expected: Fig. 6.4 says better than 99.5 %; the way is at most 45 m.
     """
-    runs = all_explored("exploration", seed, STARTS, progress)
+    runs = all_explored("exploration", seed, STARTS)
     measured = [
         exactly("starts with a coverage of 99.5 %", sum(run.share >= LEAST for run in runs), STARTS),
         exactly("explorations that are complete", sum(run.is_complete for run in runs), STARTS),
@@ -232,7 +226,7 @@ def coverage(seed: int, progress: Progress) -> Outcome:
 
 
 @experiment("E40", robot="roller, with odometry that does not drift", slow=True)
-def deadlocks(seed: int, progress: Progress) -> Outcome:
+def deadlocks(seed: int) -> Outcome:
     """A block that the laser does not see
 
     In the notes: section 6.1, Fig. 6.3
@@ -243,10 +237,8 @@ def deadlocks(seed: int, progress: Progress) -> Outcome:
     Expected: The notes have a method for deadlocks but do not say which; with R14, the kit's, all starts come to
     99.5 %, without it some do not.
     """
-    runs = all_explored("exploration-block", seed, BLOCK_STARTS, lambda share: progress(share / 2))
-    plain = all_explored(
-        "exploration-block", seed, BLOCK_STARTS, lambda share: progress(0.5 + share / 2), second_pass=False
-    )
+    runs = all_explored("exploration-block", seed, BLOCK_STARTS)
+    plain = all_explored("exploration-block", seed, BLOCK_STARTS, second_pass=False)
     measured = [
         exactly("starts with a coverage of 99.5 %", sum(run.share >= LEAST for run in runs), BLOCK_STARTS),
         Measured("explorations that have ended after 600 s", sum(run.is_complete for run in runs)),

@@ -21,7 +21,7 @@ from boebot.brain import Action, Brain, FixedActionPattern
 from boebot.description.robots import load_robot
 from boebot.result import RunResult
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, about, exactly, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.trials import decisions, true_pose
 from boebot_course.variants import arena_file
 
@@ -130,7 +130,7 @@ def compare(stays: Escape, gone: Escape, duration: float) -> list[Measured]:
         "shieldbot": Variant("shieldbot (native)", "shieldbot", (0.5, 1.0, 0.25)),
     },
 )
-def pattern(robot: str, at: tuple[float, float, float], seed: int, progress: Progress) -> Outcome:
+def pattern(robot: str, at: tuple[float, float, float], seed: int) -> Outcome:
     """A fixed action pattern runs to its end without its stimulus
 
     In the notes: section 4.4.3, fixed action patterns

@@ -27,7 +27,7 @@ from boebot.navigation.lattice import Cell
 from boebot.navigation.search import Method
 from boebot.navigation.tighten import length
 from boebot.view.painter import frame
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 
 Point = tuple[float, float]
 START, TARGET = (5, 3), (6, 17)  # row, column
@@ -125,7 +125,7 @@ BY_HAND = "By hand: the target lies 14 columns and one row from the start"
 
 
 @experiment("E41")
-def in_the_open(seed: int, progress: Progress) -> Outcome:
+def in_the_open(seed: int) -> Outcome:
     """Greedy search in the open
 
     In the notes: section 6.2, Figs. 6.7 and 6.8 (left)
@@ -158,7 +158,7 @@ ROUND_THE_C = (
 
 
 @experiment("E42")
-def detour(seed: int, progress: Progress) -> Outcome:
+def detour(seed: int) -> Outcome:
     """Greedy search makes a detour round an extended obstacle
 
     In the notes: section 6.2, Figs. 6.7 and 6.8 (right)
@@ -183,7 +183,7 @@ def detour(seed: int, progress: Progress) -> Outcome:
 
 
 @experiment("E43")
-def everywhere(seed: int, progress: Progress) -> Outcome:
+def everywhere(seed: int) -> Outcome:
     """Dijkstra's search finds the shortest path and looks everywhere
 
     In the notes: section 6.2, Figs. 6.9 and 6.10
@@ -224,7 +224,7 @@ def random_maps(seed: int) -> Iterator[NDArray[np.bool_]]:
 
 
 @experiment("E44")
-def star(seed: int, progress: Progress) -> Outcome:
+def star(seed: int) -> Outcome:
     """A* finds the shortest path, and looks at fewer cells
 
     In the notes: section 6.2, Dijkstra's algorithm
@@ -239,7 +239,7 @@ def star(seed: int, progress: Progress) -> Outcome:
     """
     maps = list(itertools.islice(random_maps(seed), MAPS))
     rows = []
-    for free in with_progress(maps, progress):
+    for free in maps:
         greedy, dijkstra, astar = (search(Lattice(free), START, TARGET, m) for m in ("greedy", "dijkstra", "astar"))
         rows.append((dijkstra.cost, astar.cost, greedy.cost, *(len(one.expanded) for one in (dijkstra, astar, greedy))))
     best, star_cost, greedy_cost, by_dijkstra, by_star, by_greedy = np.array(rows).T
@@ -351,7 +351,7 @@ def way(nodes: Nodes, path: Sequence[int]) -> float:
 
 
 @experiment("E45")
-def representations(seed: int, progress: Progress) -> Outcome:
+def representations(seed: int) -> Outcome:
     """Grids of nodes and of cells
 
     In the notes: section 6.2, Fig. 6.5
@@ -452,7 +452,7 @@ def clearance(plan: LineMap, path: Sequence[Point]) -> float:
 
 
 @experiment("E46")
-def tightening(seed: int, progress: Progress) -> Outcome:
+def tightening(seed: int) -> Outcome:
     """A grid made from a map, and a path tightened in it
 
     In the notes: section 6.2, Fig. 6.6
@@ -469,7 +469,7 @@ def tightening(seed: int, progress: Progress) -> Outcome:
     first, _ = next(ways(whole, seed))
     lattice = whole.reachable(first)
     raw, tight = [], []
-    for begin, end in with_progress(list(itertools.islice(ways(lattice, seed), WAYS)), progress):
+    for begin, end in itertools.islice(ways(lattice, seed), WAYS):
         raw.append([lattice.centre(cell) for cell in search(lattice, begin, end, "dijkstra").path])
         tight.append(tightened(raw[-1], plan, RADIUS + MARGIN))
     shares = [length(after) / length(before) for before, after in zip(raw, tight, strict=True)]

@@ -20,7 +20,7 @@ from boebot.cognition import Odometry, PathIntegration
 from boebot.description.robots import RobotDescription
 from boebot.devices.compass import TESLA_PER_COUNT
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, Variant, experiment
 from boebot_course.trials import PER_SEED, decisions, true_pose
 from boebot_course.variants import varied
 
@@ -150,7 +150,7 @@ def middle(points: Floats) -> tuple[float, float]:
         "shieldbot": Variant("shieldbot with its compass (native)", "native", slow=True),
     },
 )
-def cataglyphis(on: str | None, seed: int, progress: Progress) -> Outcome:
+def cataglyphis(on: str | None, seed: int) -> Outcome:
     """Cataglyphis finds home by path integration
 
     In the notes: section 4.4.4, Cataglyphis
@@ -169,8 +169,7 @@ def cataglyphis(on: str | None, seed: int, progress: Progress) -> Outcome:
     if on is None:
         noise = [(0.05, 0.02, number) for number in range(4)] + [(0.0, 0.0, number) for number in range(2)]
         journeys = [
-            journey(ant(compass, way), 200.0, SECONDS, seed + PER_SEED * number)
-            for compass, way, number in with_progress(noise, progress)
+            journey(ant(compass, way), 200.0, SECONDS, seed + PER_SEED * number) for compass, way, number in noise
         ]
         found, exact = journeys[:4], journeys[4:]
         measured = [
@@ -178,7 +177,7 @@ def cataglyphis(on: str | None, seed: int, progress: Progress) -> Outcome:
             Measured("the same without noise, the greater of 2", max(one.error for one in exact), "m", most=0.05),
         ]
     else:
-        seeds = with_progress((seed, seed + PER_SEED), progress)
+        seeds = (seed, seed + PER_SEED)
         found = [journey(calibrated(trial_seed), 20.0, 210.0, trial_seed) for trial_seed in seeds]
         farther = max(one.distance for one in found)
         measured = [Measured("search begins from the nest, the farther of 2", farther, "m", most=0.21)]

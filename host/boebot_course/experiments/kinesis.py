@@ -15,7 +15,7 @@ from boebot.behaviors import Kinesis
 from boebot.brain import Brain
 from boebot.devices.motor import RegulatedMotor
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, experiment
 from boebot_course.variants import varied
 
 FULL_SPEED = 2.0  # m/s at motor signal 1: half of it is left for turning
@@ -56,7 +56,7 @@ def humid_share(x: Floats, y: Floats) -> float:
 
 
 @experiment("E28", robot="arsim with velocity-regulated motors (3.15) of 25 N s", slow=True)
-def wood_louse(seed: int, progress: Progress) -> Outcome:
+def wood_louse(seed: int) -> Outcome:
     """Wood lice linger where it is humid
 
     In the notes: section 4.4.2, kinesis
@@ -79,7 +79,6 @@ def wood_louse(seed: int, progress: Progress) -> Outcome:
         seconds=SECONDS,
         seed=seed,
         record=False,
-        progress=lambda seconds: progress(min(seconds / SECONDS, 1.0)),
     )
     x, y = np.array(hygrometer.places).T
     time: Floats = np.arange(len(x), dtype=np.float64) * PERIOD

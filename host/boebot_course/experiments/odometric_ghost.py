@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from boebot.cognition import Odometry
 from boebot.view import scene, style
 from boebot.view.painter import draw_robot, paint
-from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
@@ -124,7 +124,7 @@ def judge_shieldbots(trials: Sequence[Straight]) -> list[Measured]:
 
 
 @experiment("E24", on={"arsim": Variant("arsim", False), "shieldbot": Variant("shieldbot (native)", True)})
-def ghosts(on_board: bool, seed: int, progress: Progress) -> Outcome:
+def ghosts(on_board: bool, seed: int) -> Outcome:
     """The odometric ghost
 
     In the notes: section 5.4, code listing 5.4
@@ -146,7 +146,7 @@ def ghosts(on_board: bool, seed: int, progress: Progress) -> Outcome:
         return Outcome(judge_notes(trial), columns(trial), lambda figure: _draw(figure, [trial]))
     seeds = trial_seeds(seed, RUNS)
     trials = []
-    for trial_seed in with_progress(seeds, progress):
+    for trial_seed in seeds:
         brain = runner(period=0.05, least=LEAST, hold=HOLD, factors=(FACTOR, 1.0))
         trials.append(drive(brain, "shieldbot", 14.0, trial_seed, "native"))
     data = {

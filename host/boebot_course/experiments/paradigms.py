@@ -28,7 +28,7 @@ from boebot.record.columns import VehicleColumns
 from boebot.record.truth import touch_indices
 from boebot.result import RunResult
 from boebot.robot import Command, Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, exactly, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.variants import narrow_arsim
 
@@ -138,7 +138,7 @@ def _reaction(result: RunResult) -> float:
 
 
 @experiment("paradigms", robot="arsim (infra-red sensors at ±0.3324 rad)", slow=True)
-def paradigms(seed: int, progress: Progress) -> Outcome:
+def paradigms(seed: int) -> Outcome:
     """Sense-model-plan-act against behavior-based control
 
     In the notes: sections 5.1 and 5.2, Fig. 5.1
@@ -154,7 +154,7 @@ def paradigms(seed: int, progress: Progress) -> Outcome:
     brains: dict[str, Callable[[], object]] = {"parallel": behavior_based}
     brains |= {f"serial_{planning:g}s".replace(".", "_"): partial(Serial, planning) for planning in PLANNINGS}
     runs: dict[str, list[Crossing]] = {name: [] for name in brains}
-    for start in with_progress(STARTS, progress):
+    for start in STARTS:
         for name, brain in brains.items():
             runs[name].append(cross(brain(), start, seed))
     parallel, quick, *_, serial = runs.values()

@@ -17,7 +17,7 @@ from boebot.cognition import Odometry
 from boebot.navigation import Estimator, FollowPath, LineMap, Localization, RandomSearch
 from boebot.navigation.frames import Pose, composed
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, Variant, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, true_pose, try_once
 
@@ -128,7 +128,6 @@ def patrol(
     every: float,
     box: Pose,
     seed: int,
-    progress: Progress,
 ) -> Outcome:
     """A patrol with localization and without
 
@@ -145,7 +144,7 @@ def patrol(
     Expected on avr: As the notes' figure shows it: the greatest error of a run with localization is less than half of
     that by odometry alone; medians.
     """
-    seeds = with_progress(trial_seeds(seed, count), progress)
+    seeds = trial_seeds(seed, count)
     runs = [patrolled(number, robot, seconds, every, RandomSearch(box=box), on) for number in seeds]
     alone = [float(run.odometry.max()) for run in runs]
     corrected = [float(run.localization.max()) for run in runs]

@@ -28,12 +28,10 @@ from boebot_course.experiment import (
     Floats,
     Measured,
     Outcome,
-    Progress,
     Variant,
     about,
     exactly,
     experiment,
-    with_progress,
 )
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
@@ -59,7 +57,7 @@ def difference(field: PotentialField, points: Floats, step: float) -> float:
 
 
 @experiment("E47")
-def gradient(seed: int, progress: Progress) -> Outcome:
+def gradient(seed: int) -> Outcome:
     """The gradient of a potential field
 
     In the notes: section 6.2, Fig. 6.11, equations (6.1) to (6.3)
@@ -240,7 +238,7 @@ STARTS: list[Pose] = [(1.3, -1.0, 0.0), (1.3, 1.3, 0.0), (-1.3, -1.3, 0.0), (0.0
         "avr": Variant(BOE_BOT, shieldbot, 32.0, slow=True),
     },
 )
-def among_pillars(make: Callable[[], World], seconds: float, seed: int, progress: Progress) -> Outcome:
+def among_pillars(make: Callable[[], World], seconds: float, seed: int) -> Outcome:
     """Down a potential field past four pillars
 
     In the notes: section 6.2, Fig. 6.12
@@ -260,7 +258,7 @@ def among_pillars(make: Callable[[], World], seconds: float, seed: int, progress
     starts = list(zip(STARTS, trial_seeds(seed, len(STARTS)), strict=True))
     with scaled_arena("pillars", world.scale) as arena:
         plan = LineMap.of(arena)
-        for start, trial_seed in with_progress(starts, progress):
+        for start, trial_seed in starts:
             followers.append(world.follower(CORNER, ROOM))
             trials.append(world.drive(followers[-1], arena, start, seconds, trial_seed))
     goal, arrival = followers[0].goal, followers[0].arrival
@@ -299,7 +297,7 @@ AHEAD: list[Pose] = [(-1.0, 0.0, 0.0), (-1.0, 0.05, 0.0)]
 
 
 @experiment("E49", robot="roller, its odometer without noise")
-def locked(seed: int, progress: Progress) -> Outcome:
+def locked(seed: int) -> Outcome:
     """Locked in a wedge
 
     In the notes: section 6.2, Fig. 6.13
@@ -316,7 +314,7 @@ def locked(seed: int, progress: Progress) -> Outcome:
     runs = [(WEDGE, AHEAD[0], "wedge", 40.0), (WEDGE, AHEAD[1], "wedge", 40.0)]
     runs += [([], AHEAD[0], "empty", 20.0), ([BESIDE], AHEAD[0], "empty", 20.0)]
     followers, trials = [], []
-    for hills, start, arena, seconds in with_progress(runs, progress):
+    for hills, start, arena, seconds in runs:
         followers.append(world.follower(BEHIND, hills))
         trials.append(world.drive(followers[-1], arena, start, seconds, seed))
     held, free = trials[:2], trials[2:]
@@ -377,7 +375,7 @@ class PutWaypoints(CognitiveProcess):
         "avr": Variant(BOE_BOT, shieldbot, slow=True),
     },
 )
-def past_the_wedge(make: Callable[[], World], seed: int, progress: Progress) -> Outcome:
+def past_the_wedge(make: Callable[[], World], seed: int) -> Outcome:
     """Waypoints lead around a wedge
 
     In the notes: section 6.2
@@ -401,7 +399,6 @@ def past_the_wedge(make: Callable[[], World], seed: int, progress: Progress) -> 
         put = PutWaypoints(field=given, valleys=valleys)
         detector = LockDetector(field=alone, plan=plan, lattice=lattice, clearance=keep, distance=0.05 * world.scale)
         first = world.drive(given, arena, AHEAD[0], seconds, seed, put)
-        progress(0.4)
         second = world.drive(alone, arena, AHEAD[0], 2 * seconds, seed, detector)
     measured = []
     for name, behavior, trial in (("given waypoints", given, first), ("lock detector", alone, second)):
@@ -492,9 +489,7 @@ def _begins_on_spot(one: Turn) -> bool:
         "avr": Variant(BOE_BOT, shieldbot, 0.02, BELOW + 0.016, 0.0065, slow=True),
     },
 )
-def facing_away(
-    make: Callable[[], World], least: float, most: float, shift: float, seed: int, progress: Progress
-) -> Outcome:
+def facing_away(make: Callable[[], World], least: float, most: float, shift: float, seed: int) -> Outcome:
     """Facing away from the goal it turns on the spot first
 
     In the notes: section 6.2, equations (6.5) to (6.7)
@@ -513,7 +508,7 @@ def facing_away(
     """
     # `least`, `most`: heading error at which it goes on (rad); `shift`: of its middle while it turns (m)
     world = make()
-    turns = [turned(world, heading, seed) for heading in with_progress(HEADINGS, progress)]
+    turns = [turned(world, heading, seed) for heading in HEADINGS]
     far = [one for one in turns if abs(one.heading) > ABOVE]
     near = [one for one in turns if abs(one.heading) <= ABOVE]
     errors = [abs(float(one.error[one.goes_on])) for one in far]

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, experiment
 from boebot_course.experiments.chemotaxis import (
     SIZE,
     SPEED,
@@ -54,7 +54,7 @@ def density_ratio(group: Swarm) -> float:
 
 
 @experiment("predator-prey", robot="arsim, as narrow as a bacterium", slow=True)
-def luring(seed: int, progress: Progress) -> Outcome:
+def luring(seed: int) -> Outcome:
     """M. xanthus lures E. coli
 
     In the notes: section 4.4.2
@@ -69,8 +69,8 @@ def luring(seed: int, progress: Progress) -> Outcome:
     """
     first = trial_seeds(seed, PREY)[0] + 400
     prey = partial(swarm, count=PREY, seconds=LASTS, period=PERIOD)
-    group = prey(first, lure, lambda share: progress(share / 2))
-    control = prey(first + PREY, uniform, lambda share: progress(0.5 + share / 2))
+    group = prey(first, lure)
+    control = prey(first + PREY, uniform)
     middle = group.path[LATE].mean(axis=(0, 1))
     measured = [
         Measured("density around the predator, times uniform", density_ratio(group), least=3.0),

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors.withdraw import ReflexIntensity
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, experiment
 
 STEP = 0.01  # s
 
@@ -36,7 +36,7 @@ def judge_step(times: Floats, values: Floats) -> list[Measured]:
 
 
 @experiment("E25")
-def step_response(seed: int, progress: Progress) -> Outcome:
+def step_response(seed: int) -> Outcome:
     """A reflex warms up and tires
 
     In the notes: section 4.4.1, reflexes
@@ -136,7 +136,7 @@ def judge(one: Larva) -> list[Measured]:
 
 
 @experiment("E26")
-def tunnel(seed: int, progress: Progress) -> Outcome:
+def tunnel(seed: int) -> Outcome:
     """A larva that shuns light crawls into it
 
     In the notes: section 4.4.1, reflexes

@@ -25,7 +25,7 @@ from boebot.cognition import near
 from boebot.record.compare import Difference, command_difference, telemetry_difference
 from boebot.result import RunResult
 from boebot.running.replayed import replayed
-from boebot_course.experiment import Measured, Outcome, Progress, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, exactly, experiment
 from boebot_course.experiments import wall
 from boebot_course.variants import arena_file
 
@@ -101,7 +101,7 @@ def judge_walls(runs: list[RunResult]) -> list[Measured]:
 
 
 @experiment("E68", robot="shieldbot (native, avr)", slow=True)
-def same_commands(seed: int, progress: Progress) -> Outcome:
+def same_commands(seed: int) -> Outcome:
     """The same brain and seed command the same on both boards, as long as telemetry agrees
 
     In the notes: section 3.1
@@ -120,7 +120,7 @@ def same_commands(seed: int, progress: Progress) -> Outcome:
     measured: list[Measured] = []
     data: dict[str, list[float]] = {}
     drawn: list[tuple[str, list[RunResult], list[Difference | None]]] = []
-    for name, brain in with_progress(list(BRAINS.items()), progress):
+    for name, brain in BRAINS.items():
         runs = [boebot.run(brain(), robot="shieldbot", on=on, seconds=SECONDS, seed=seed) for on in ("native", "avr")]
         a, b = runs
         seen, looked_at = telemetry_difference(a, b), telemetry_difference(a, b, LOOKED_AT)

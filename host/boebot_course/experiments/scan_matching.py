@@ -24,7 +24,7 @@ from boebot.navigation import Lattice, LineMap, Scan, TurretScan, laser_scan
 from boebot.navigation.frames import Pose
 from boebot.navigation.match import Match, search_pose
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, Variant, about, experiment, with_progress
+from boebot_course.experiment import Floats, Measured, Outcome, Variant, about, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
 
@@ -96,7 +96,7 @@ def turret_scan(pose: Pose, seed: int) -> Scan:
     "E52",
     on={"roller": Variant("roller", False), "avr": Variant("shieldbot-turret (avr)", True, slow=True)},
 )
-def at_the_true_pose(has_turret: bool, seed: int, progress: Progress) -> Outcome:
+def at_the_true_pose(has_turret: bool, seed: int) -> Outcome:
     """A scan fits the map at the true pose
 
     In the notes: section 6.3, equation (6.8)
@@ -114,14 +114,14 @@ def at_the_true_pose(has_turret: bool, seed: int, progress: Progress) -> Outcome
     error is three times as large in the median.
     """
     if has_turret:
-        return _by_turret(seed, progress)
+        return _by_turret(seed)
     plan, chance = LineMap.of(ARENA), np.random.default_rng(seed)
     poses = poses_in(plan, chance)
     scans = [scan_at(plan, pose, chance) for pose in poses]
     noisy = [float(scan.errors(plan, [pose])[0]) for scan, pose in zip(scans, poses, strict=True)]
     exact = [float(scan_at(plan, pose, chance, 0.0).errors(plan, [pose])[0]) for pose in poses]
     seeds = list(zip(poses, trial_seeds(seed, OWN), strict=False))
-    own = [float(own_scan(pose, one).errors(plan, [pose])[0]) for pose, one in with_progress(seeds, progress)]
+    own = [float(own_scan(pose, one).errors(plan, [pose])[0]) for pose, one in seeds]
     measured = [
         Measured("greatest error without noise", max(exact), most=1e-12),
         about("mean error with 1 % noise", float(np.mean(noisy)), 0.01, 0.0005),
@@ -148,11 +148,11 @@ def at_the_true_pose(has_turret: bool, seed: int, progress: Progress) -> Outcome
     return Outcome(measured, data, draw)
 
 
-def _by_turret(seed: int, progress: Progress) -> Outcome:
+def _by_turret(seed: int) -> Outcome:
     plan, chance = LineMap.of(TURRET_ARENA), np.random.default_rng(seed)
     poses = poses_in(plan, chance, TURRET_POSES, 0.07)
     seeds = list(zip(poses, trial_seeds(seed, TURRET_POSES), strict=True))
-    scans = [turret_scan(pose, one) for pose, one in with_progress(seeds, progress)]
+    scans = [turret_scan(pose, one) for pose, one in seeds]
     there = [float(scan.errors(plan, [pose])[0]) for scan, pose in zip(scans, poses, strict=True)]
     beside = [
         float(scan.errors(plan, [(pose[0] + 0.1, pose[1] + 0.1, pose[2] + 0.2)])[0])
@@ -208,7 +208,7 @@ NEARLY = 0.01  # m, m, rad: of the lower row of the figure
 
 
 @experiment("E53")
-def near_and_far(seed: int, progress: Progress) -> Outcome:
+def near_and_far(seed: int) -> Outcome:
     """A scan fits the map badly where the pose is wrong
 
     In the notes: section 6.3, Figs. 6.16 and 6.17
@@ -304,7 +304,7 @@ class Search:
 
 
 @experiment("E54")
-def found_by_chance(seed: int, progress: Progress) -> Outcome:
+def found_by_chance(seed: int) -> Outcome:
     """A random search finds the pose
 
     In the notes: section 6.3, Fig. 6.18
@@ -321,7 +321,7 @@ def found_by_chance(seed: int, progress: Progress) -> Outcome:
     poses = poses_in(plan, chance)
     source = random.Random(seed)
     searches = []
-    for pose in with_progress(poses, progress):
+    for pose in poses:
         scan, start = scan_at(plan, pose, chance), away(pose, chance)
         match = search_pose(scan, plan, start, source, box=BOX, tries=TRIES, enough=ENOUGH)
         searches.append(Search(pose, match))

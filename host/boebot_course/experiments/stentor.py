@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors.escalate import LeakyChain
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 
 DECAYS = np.array((8.5, 4.3, 1.6, 0.75))  # a_2..a_5 (1/s)
 GAINS = np.array((12.0, 6.6, 2.75, 1.45))  # b_2..b_5 (1/s)
@@ -164,7 +164,7 @@ def _data(found: Response) -> dict[str, Any]:
 
 
 @experiment("E59")
-def sequence(seed: int, progress: Progress) -> Outcome:
+def sequence(seed: int) -> Outcome:
     """Stentor avoids in steps
 
     In the notes: section 7.2, equations (7.11)-(7.15), Fig. 7.4
@@ -202,7 +202,7 @@ def _farthest(starts: list[tuple[int, float]], others: list[tuple[int, float]]) 
 
 
 @experiment("E60")
-def dose(seed: int, progress: Progress) -> Outcome:
+def dose(seed: int) -> Outcome:
     """Stentor: a weaker disturbance is answered by the costliest behavior only after hesitation
 
     In the notes: section 7.2, equation (7.14)
@@ -226,7 +226,7 @@ def dose(seed: int, progress: Progress) -> Outcome:
 
 
 @experiment("dose-response")
-def dose_response(seed: int, progress: Progress) -> Outcome:
+def dose_response(seed: int) -> Outcome:
     """Stentor's costliest behavior against the strength of the disturbance
 
     In the notes: section 7.2
@@ -246,7 +246,6 @@ def dose_response(seed: int, progress: Progress) -> Outcome:
         if len(found.starts) > 1:
             stopping[index] = found.starts[1][1]
         detaching[index] = found.first(5)
-        progress(index / len(doses))
     threshold, spacing = undisturbed(SECONDS), float(doses[1] - doses[0])
     answered = doses[highest > 1]
     measured = [

@@ -18,7 +18,7 @@ from boebot.behaviors import StraightRun
 from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.description.robots import RobotDescription
-from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.trials import Trial, trial_seeds, try_once
 
 AT_REST_S = 0.5  # without moving, at the end of a run
@@ -163,7 +163,7 @@ def judge_shieldbot(runs: Sequence[Straight]) -> list[Measured]:
         "avr": Variant("shieldbot (avr)", "avr", 3),
     },
 )
-def metre(on: str | None, count: int, seed: int, progress: Progress) -> Outcome:
+def metre(on: str | None, count: int, seed: int) -> Outcome:
     """A metre straight ahead by odometry
 
     In the notes: section 5.4, code listings 5.3 and 5.4, equation (5.1)
@@ -186,8 +186,7 @@ def metre(on: str | None, count: int, seed: int, progress: Progress) -> Outcome:
         return Outcome(judge_notes(trial), columns(trial), lambda figure: draw_runs(figure, [trial]))
     seeds = trial_seeds(seed, count)
     runs = [
-        drive(runner(period=0.05, least=LEAST, hold=HOLD), "shieldbot", RUN_S, trial_seed, on)
-        for trial_seed in with_progress(seeds, progress)
+        drive(runner(period=0.05, least=LEAST, hold=HOLD), "shieldbot", RUN_S, trial_seed, on) for trial_seed in seeds
     ]
     data = {
         "seed": list(seeds),

@@ -18,7 +18,7 @@ from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.robot import Observation, Robot
-from boebot_course.experiment import Measured, Outcome, Progress, Variant, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Variant, exactly, experiment
 from boebot_course.experiments.straight_line import Straight, drive, runner
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import varied
@@ -161,7 +161,7 @@ def judge_shieldbot(with_least: Straight, without: Straight) -> list[Measured]:
         "shieldbot": Variant("shieldbot (native)", True),
     },
 )
-def dead_band(on_board: bool, seed: int, progress: Progress) -> Outcome:
+def dead_band(on_board: bool, seed: int) -> Outcome:
     """A metre straight ahead on servos with a dead band
 
     In the notes: section 5.4, equation (5.1)
@@ -178,14 +178,13 @@ def dead_band(on_board: bool, seed: int, progress: Progress) -> Outcome:
     """
     if not on_board:
         with_least = on_servo_model(LEAST)
-        progress(0.5)
         without = on_servo_model(0.0)
         columns = [(run.times, run.distances, run.signals) for run in (with_least, without)]
         return _outcome(judge_model(with_least, without), DEAD_BAND, *columns)
     robot = coarse(load_robot("shieldbot").body.wheel_radius_m)
     runs = [
         drive(runner(period=0.05, least=least), robot, 20.0, trial_seed, "native", "encoder_errors")
-        for least, trial_seed in zip((LEAST, 0.0), with_progress(trial_seeds(seed, 2), progress), strict=True)
+        for least, trial_seed in zip((LEAST, 0.0), trial_seeds(seed, 2), strict=True)
     ]
     columns = [(list(run.time), list(run.distances), list(run.result.series.signals[0])) for run in runs]
     return _outcome(judge_shieldbot(*runs), 0.045, *columns)

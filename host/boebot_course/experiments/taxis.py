@@ -23,7 +23,7 @@ from boebot.devices.light import Phototransistor
 from boebot.robot import Robot
 from boebot.view import style
 from boebot.view.painter import draw_robot
-from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Variant, about, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import SMALL_RADIUS, arena_file, at_angle, small_arsim, varied
@@ -85,12 +85,12 @@ def time_to_lamp(trial: Trial) -> float:
     return float(trial.time[near[0]]) if len(near) else math.inf
 
 
-def trials(setting: Setting, seed: int, progress: Progress, *, flee: bool = False, starts: int = STARTS) -> list[Trial]:
+def trials(setting: Setting, seed: int, *, flee: bool = False, starts: int = STARTS) -> list[Trial]:
     """Runs from all around the lamp, headings by chance."""
     chance = random.Random(f"taxis {seed}")
     done = []
     with arena_file("lamp", LAMP) as arena:
-        for trial_seed in with_progress(trial_seeds(seed, starts), progress):
+        for trial_seed in trial_seeds(seed, starts):
             bearing, heading = (chance.uniform(-math.pi, math.pi) for _ in range(2))
             pose = (AWAY_M * math.cos(bearing), AWAY_M * math.sin(bearing), heading)
             brain = seeker(setting, flee=flee)
@@ -145,7 +145,7 @@ def _draw(figure: Figure, done: Sequence[Trial], times: Sequence[float], straigh
         "shieldbot": Variant("shieldbot (native)", SHIELDBOT, slow=True),
     },
 )
-def taxis(setting: Setting, seed: int, progress: Progress) -> Outcome:
+def taxis(setting: Setting, seed: int) -> Outcome:
     """Taxis: to the lamp from everywhere
 
     In the notes: section 4.4.2
@@ -161,7 +161,7 @@ def taxis(setting: Setting, seed: int, progress: Progress) -> Outcome:
     right angle, of 1.85 m of way: 1.2 times the straight time is kept by the median, and 24 s by all but the
     rarest.
     """
-    done = trials(setting, seed, progress)
+    done = trials(setting, seed)
     times, straight = [time_to_lamp(trial) for trial in done], straight_time(setting)
     poses = [trial.start for trial in done]
     data = {

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import NotRealisableError
 from boebot.running.runner import run
-from boebot_course.experiment import Outcome, Progress, about, exactly, experiment
+from boebot_course.experiment import Outcome, about, exactly, experiment
 from boebot_timing.realisable import Verdict, judge
 
 STEP_S = 0.01
@@ -36,7 +36,7 @@ def is_run(count: int) -> bool:
 
 
 @experiment("E17", robot="arsim")
-def timing_rule(seed: int, progress: Progress) -> Outcome:
+def timing_rule(seed: int) -> Outcome:
     """Timing: two IR sensors fit into the time step, four do not
 
     In the notes: section 3.2, Fig. 3.2

@@ -18,7 +18,7 @@ import boebot
 from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
 from boebot.brain.utility import Utilities
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import decisions
 
 
@@ -42,7 +42,7 @@ KICK = 3.0  # of E63
 
 
 @experiment("E61")
-def loss(seed: int, progress: Progress) -> Outcome:
+def loss(seed: int) -> Outcome:
     """A short loss of readings hardly moves a utility
 
     In the notes: section 8.2.2, Fig. 8.2
@@ -112,7 +112,7 @@ def by_convolution(settled: Floats, step: float, tau: float) -> Floats:
 
 
 @experiment("E62")
-def three_behaviors(seed: int, progress: Progress) -> Outcome:
+def three_behaviors(seed: int) -> Outcome:
     """Of three behaviors the one of the highest utility is active
 
     In the notes: section 8.2.3, Fig. 8.3
@@ -171,7 +171,7 @@ def three_behaviors(seed: int, progress: Progress) -> Outcome:
 
 
 @experiment("E63")
-def gamma(seed: int, progress: Progress) -> Outcome:
+def gamma(seed: int) -> Outcome:
     """A gamma parameter calls a process for a while
 
     In the notes: section 8.2.2, equation (8.6)
@@ -240,7 +240,7 @@ RISE, FALL = 1.0, 4.0  # s
 
 
 @experiment("E64", robot="arsim")
-def activation(seed: int, progress: Progress) -> Outcome:
+def activation(seed: int) -> Outcome:
     """One motor behavior, and every cognitive process above zero
 
     In the notes: section 8.2.3

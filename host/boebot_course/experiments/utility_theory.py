@@ -13,7 +13,7 @@ import boebot
 from boebot.behaviors import Stop
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Progress, about, exactly, experiment
+from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import decisions
 
 TERMS = 100  # of the sum in (7.3): those beyond are below 1e-25
@@ -56,7 +56,7 @@ def played(tosses: int, source: np.random.Generator) -> Measured:
 
 
 @experiment("E56")
-def saint_petersburg(seed: int, progress: Progress) -> Outcome:
+def saint_petersburg(seed: int) -> Outcome:
     """St. Petersburg: a game of infinite payoff has a fair price
 
     In the notes: section 7.1, equations (7.2), (7.3)
@@ -130,7 +130,7 @@ def crosses_from(staying: float, seed: int) -> float:
 
 
 @experiment("E57", robot="arsim")
-def street(seed: int, progress: Progress) -> Outcome:
+def street(seed: int) -> Outcome:
     """The street: expected utilities of two choices
 
     In the notes: section 7.1, equations (7.6) to (7.9)
@@ -201,7 +201,7 @@ def certainty_equivalent(
 
 
 @experiment("E58")
-def money(seed: int, progress: Progress) -> Outcome:
+def money(seed: int) -> Outcome:
     """Utility of money to somebody who avoids risks
 
     In the notes: section 7.1, equation (7.10), Fig. 7.1
@@ -294,7 +294,7 @@ def choices(amounts: Floats, utilities: Floats, seed: int) -> tuple[Floats, Floa
 
 
 @experiment("elicitation")
-def elicitation(seed: int, progress: Progress) -> Outcome:
+def elicitation(seed: int) -> Outcome:
     """A utility function from certainty equivalents
 
     In the notes: section 7.1, equation (7.10)

@@ -12,7 +12,7 @@ from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
 from boebot.result import RunResult
-from boebot_course.experiment import Measured, Outcome, Progress, Variant, experiment
+from boebot_course.experiment import Measured, Outcome, Variant, experiment
 from boebot_course.paths import floor
 from boebot_course.variants import SMALL_SPEED, arena_file, small_arsim, varied
 
@@ -38,7 +38,7 @@ def pinger() -> RobotDescription:
     return varied("shieldbot", "shieldbot-turret", turret={"on": True})
 
 
-def lap(robot: RobotDescription, on: str | None, seed: int, start: float, progress: Progress) -> RunResult:
+def lap(robot: RobotDescription, on: str | None, seed: int, start: float) -> RunResult:
     """A run along the walls, which begins `start` metres from one."""
     with arena_file("room", ROOM) as arena:
         return run(
@@ -49,7 +49,6 @@ def lap(robot: RobotDescription, on: str | None, seed: int, start: float, progre
             seconds=SECONDS,
             seed=seed,
             pose=(0.8 * LENGTH, start, 0.0),
-            progress=lambda seconds: progress(min(seconds / SECONDS, 1.0)),
         )
 
 
@@ -70,7 +69,6 @@ def wall(
     least: float,
     most: float,
     seed: int,
-    progress: Progress,
 ) -> Outcome:
     """A lap along the walls
 
@@ -90,7 +88,7 @@ def wall(
 
     Expected on avr: As on shieldbot.
     """
-    result = lap(robot(), on, seed, start, progress)
+    result = lap(robot(), on, seed, start)
     truth = result.truth
     assert truth is not None
     time, x, y = truth.time - result.clock_offset, truth.x, truth.y

@@ -21,7 +21,7 @@ from boebot.link import messages
 from boebot.robot import Observation, Robot
 from boebot.view import style
 from boebot.view.painter import draw_robot
-from boebot_course.experiment import Measured, Outcome, Progress, Variant, about, exactly, experiment, with_progress
+from boebot_course.experiment import Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.paths import draw_paths, floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import narrow_arsim, scaled_arena
@@ -32,7 +32,7 @@ STEPS = 400_000
 # ---- the machine by itself -------------------------------------------------------------------------------------------
 
 
-def stays(wander: Wander, seed: int, progress: Progress) -> tuple[list[int], list[int], list[bool]]:
+def stays(wander: Wander, seed: int) -> tuple[list[int], list[int], list[bool]]:
     """Steps that each stay in state 1 (forward) and in state 2 (turning) lasted, and whether each turn was to the left.
 
     The behavior looks at nothing: a robot whose readings never change is enough.
@@ -45,7 +45,7 @@ def stays(wander: Wander, seed: int, progress: Progress) -> tuple[list[int], lis
     lengths: dict[str, list[int]] = {"time_to_turn": [], "time_to_stop_turning": []}
     lefts: list[bool] = []
     state, length = wander.machine.state, 0
-    for step in range(STEPS):
+    for _ in range(STEPS):
         wander.step(robot)
         length += 1
         if wander.machine.state != state:
@@ -55,8 +55,6 @@ def stays(wander: Wander, seed: int, progress: Progress) -> tuple[list[int], lis
                 left, right = robot.command[1:]
                 lefts.append(left < right)  # by (2.19): the right wheel ahead turns counter-clockwise
             state, length = wander.machine.state, 0
-        if step % 20_000 == 0:
-            progress(step / STEPS)
     return lengths["time_to_turn"], lengths["time_to_stop_turning"], lefts
 
 
@@ -70,7 +68,7 @@ def judge_stays(forward: list[int], turning: list[int], lefts: list[bool]) -> li
 
 
 @experiment("E19")
-def stay_lengths(seed: int, progress: Progress) -> Outcome:
+def stay_lengths(seed: int) -> Outcome:
     """Wandering: stays in its states are geometric
 
     In the notes: section 5.3.2, code listings 5.1 and 5.2
@@ -80,7 +78,7 @@ def stay_lengths(seed: int, progress: Progress) -> Outcome:
 
     Expected: Means of 1 / 0.01 = 100 and 1 / 0.03 = 33.3 steps, known to 1.8 and 0.6: ± 5 and ± 2. Half turn left.
     """
-    forward, turning, lefts = stays(Wander(), seed, progress)
+    forward, turning, lefts = stays(Wander(), seed)
     count = min(len(forward), len(turning))
 
     def draw(figure: Figure) -> None:
@@ -149,12 +147,12 @@ def _wander(setting: Setting) -> Wander:
     )
 
 
-def trials(make: Make, setting: Setting, seed: int, progress: Progress) -> list[Trial]:
+def trials(make: Make, setting: Setting, seed: int) -> list[Trial]:
     """The setting's runs, each with its own brain and seed."""
     with scaled_arena("arsim", setting.scale) as arena:
         return [
             try_once(make(setting), setting.robot, arena, setting.seconds, on=setting.on, seed=trial_seed)
-            for trial_seed in with_progress(trial_seeds(seed, setting.runs), progress)
+            for trial_seed in trial_seeds(seed, setting.runs)
         ]
 
 
@@ -209,7 +207,7 @@ def _data(done: list[Trial], seed: int) -> dict[str, object]:
         "shieldbot": Variant("shieldbot (native)", SHIELDBOT, slow=True),
     },
 )
-def wandering(setting: Setting, seed: int, progress: Progress) -> Outcome:
+def wandering(setting: Setting, seed: int) -> Outcome:
     """Wandering alone ends at a wall
 
     In the notes: section 5.3.2, code listing 5.2
@@ -225,7 +223,7 @@ def wandering(setting: Setting, seed: int, progress: Progress) -> Outcome:
     takes 0.35 · 0.682 / 0.152 = 1.57 times as long: 47 s a run, turn_probability 0.01 / 1.57; it turns on the spot
     with 3.19 against 4.447 rad/s: stop_turn_probability 0.03 · 3.19 / 4.447. Paths are then alike.
     """
-    done = trials(wanderer, setting, seed, progress)
+    done = trials(wanderer, setting, seed)
 
     def draw(figure: Figure) -> None:
         left, right = figure.subplots(1, 2, width_ratios=(3, 2))
@@ -259,7 +257,7 @@ def _draw_survivors(axes: Axes, done: list[Trial], seconds: float) -> None:
         "avr": Variant("shieldbot (avr)", replace(SHIELDBOT, on="avr", runs=4), slow=True),
     },
 )
-def avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
+def avoiding(setting: Setting, seed: int) -> Outcome:
     """Wandering and avoiding
 
     In the notes: section 5.3.2 and Fig. 5.1
@@ -279,7 +277,7 @@ def avoiding(setting: Setting, seed: int, progress: Progress) -> Outcome:
     Expected on avr: As on shieldbot; 4 runs.
     """
     # IR beams: 0.25 to 0.65 rad from (0.05, 0.04) m, 0.20 m long; Ping: ±0.35 rad, nearness 0.10 at 0.36 m.
-    done = trials(avoider, setting, seed, progress)
+    done = trials(avoider, setting, seed)
 
     def draw(figure: Figure) -> None:
         left, right = figure.subplots(1, 2)

@@ -10,7 +10,3 @@ from boebot_course.experiment import Measured
 def missed(measured: Sequence[Measured]) -> list[str]:
     """Names of those that are outside their criteria."""
     return [one.name for one in measured if not one.is_met]
-
-
-def ignore(share: float) -> None:
-    assert 0 <= share <= 1

@@ -205,5 +205,5 @@ OLD = [
 @pytest.mark.parametrize("mutant", [*OLD, *NAVIGATION], ids=lambda mutant: f"{mutant.experiment} {mutant.taken_away}")
 def test_without_what_it_shows_an_experiment_fails(mutant: Mutant, monkeypatch: pytest.MonkeyPatch) -> None:
     mutant.patch(monkeypatch)
-    outcome = all_experiments()[mutant.experiment].run(1, lambda share: None)
+    outcome = all_experiments()[mutant.experiment].run(1)
     assert not outcome.is_met, f"passes without {mutant.taken_away}"

@@ -19,6 +19,7 @@ from boebot.description.robots import load_robot
 from boebot.navigation import RandomSearch
 from boebot_course import pages
 from boebot_course.experiments import Outcome, all_experiments, patrol
+from boebot_course.running import Verdict
 
 EXPERIMENTS = all_experiments()
 QUICK = [name for name, one in EXPERIMENTS.items() if not one.slow]
@@ -28,7 +29,7 @@ NOTHING = 1e-9  # and rounding alone
 
 @cache
 def outcome(name: str) -> Outcome:
-    return EXPERIMENTS[name].run(pages.SEED, lambda share: None)
+    return EXPERIMENTS[name].run(pages.SEED)
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -112,8 +113,8 @@ CHAPTERS = sorted(set(map(pages.chapter_of, EXPERIMENTS.values())))
 def test_page_of_a_chapter_is_as_the_kit_writes_it(chapter: str) -> None:
     """Measured figures only where they are quick: another computer's last digits may differ."""
     shown = (pages.FOLDER / f"chapter-{chapter}.md").read_text(encoding="utf-8")
-    measured = {name: outcome(name).measured for name in QUICK}
-    text = pages.page(chapter, EXPERIMENTS.values(), measured)
+    verdicts = {name: Verdict(name, tuple(outcome(name).measured)) for name in QUICK}
+    text = pages.chapter_page(chapter, verdicts)
     assert without_rows(shown) == without_rows(text), "stale: make pictures"
     there, now = rows_of(shown), rows_of(text)
     for name in now.keys() & set(QUICK) - {"E66"}:  # it counts kinds of objects inside the kit

@@ -10,7 +10,6 @@ from boebot_course.experiments import (
     all_experiments,
     wall,
 )
-from boebot_course.tests.criteria import ignore
 
 
 @pytest.mark.soak
@@ -19,4 +18,4 @@ from boebot_course.tests.criteria import ignore
 )
 def test_robots_that_do_not_follow_walls_fail(brain: FollowWall, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wall, "follower", lambda: Brain([brain]))
-    assert not all_experiments()["E35"].run(1, ignore).is_met
+    assert not all_experiments()["E35"].run(1).is_met

@@ -13,12 +13,14 @@ import numpy as np
 
 from boebot.navigation import LineMap
 from boebot.rates import interval
-from boebot_course.experiment import Measured, Progress
+from boebot_course.experiment import Measured
 from boebot_course.tests.navigation_figures import kidnapping, paths, tasks
 
 WHERE: dict[kidnapping.Outcome, str] = {"right": "in the right room", "wrong": "in the wrong one", "lost": "lost"}
 Thing = TypeVar("Thing")
 Result = TypeVar("Result")
+Progress = Callable[[float], None]
+"""Called now and then with the share that is done, 0 to 1."""
 
 
 def side_by_side(work: Callable[[Thing], Result], things: Sequence[Thing], progress: Progress) -> list[Result]:

@@ -12,9 +12,8 @@ from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from boebot.navigation import LineMap
 from boebot.view import figure_file, style
-from boebot_course.experiment import Progress
 from boebot_course.tests.navigation_figures import kidnapping
-from boebot_course.tests.navigation_figures.figures import side_by_side
+from boebot_course.tests.navigation_figures.figures import Progress, side_by_side
 
 COURSES = {
     "office, from a good start": ("office", False),
