@@ -10,10 +10,11 @@ is 0 at a call and behind it, and stores through pointers do not reach the regis
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+from avr_timing.flow.arithmetic import BYTES
 from avr_timing.flow.instructions import BRANCHES, SKIPS
 from avr_timing.flow.registers import ZERO, is_call, pushes_only, written
 from avr_timing.program import Block, Edge, Function, Instruction
@@ -229,7 +230,7 @@ def step(instruction: Instruction, state: State) -> State:
         flags = state.flags | {flag: value}
     elif name == "bst":
         flags = _stored(operands, state)
-    elif name in _BYTES:
+    elif name in BYTES:
         flags = _transfer(state) | _byte(name, operands, state, registers)
     elif name in ("adiw", "sbiw"):
         flags = _transfer(state) | _word(name, operands, state, registers)
@@ -388,80 +389,9 @@ def _pointer(name: str, operands: tuple[int, ...], state: State) -> Iterator[tup
         )
 
 
-@dataclass(frozen=True, slots=True)
-class _Kind:
-    """Arithmetic of one byte: from both operands and C, the result, which may leave 0..255, and V."""
-
-    compute: Callable[[int, int, int], int]
-    overflow: Callable[[int, int, int], bool]  # from both operands and the byte of the result
-    operands: int = 2  # that are registers
-    constant: bool = False  # the second one is a number
-    carries: bool = False  # C goes in
-    chained: bool = False  # Z stays false where it was
-    writes: bool = True
-    carry: Callable[[int, int], bool] | None = None  # C from the first operand and the whole result; None: it stays
-
-
-def _outside(_first: int, result: int) -> bool:
-    return not 0 <= result <= 255
-
-
-def _lowest(first: int, _result: int) -> bool:
-    return first & 1 == 1
-
-
-def _difference(a: int, b: int, r: int) -> bool:
-    return (a ^ b) & (a ^ r) & 0x80 != 0
-
-
-def _sum(a: int, b: int, r: int) -> bool:
-    return (a ^ r) & (b ^ r) & 0x80 != 0
-
-
-def _never(_a: int, _b: int, _r: int) -> bool:
-    return False
-
-
-def _shifted(a: int, _b: int, r: int) -> bool:
-    return (r >> 7) != (a & 1)
-
-
-def _less(a: int, b: int, c: int) -> int:
-    return a - b - c
-
-
-def _more(a: int, b: int, c: int) -> int:
-    return a + b + c
-
-
-_BYTES = {
-    "add": _Kind(_more, _sum, carry=_outside),
-    "adc": _Kind(_more, _sum, carries=True, carry=_outside),
-    "sub": _Kind(_less, _difference, carry=_outside),
-    "subi": _Kind(_less, _difference, constant=True, carry=_outside),
-    "sbc": _Kind(_less, _difference, carries=True, chained=True, carry=_outside),
-    "sbci": _Kind(_less, _difference, constant=True, carries=True, chained=True, carry=_outside),
-    "cp": _Kind(_less, _difference, writes=False, carry=_outside),
-    "cpi": _Kind(_less, _difference, constant=True, writes=False, carry=_outside),
-    "cpc": _Kind(_less, _difference, carries=True, chained=True, writes=False, carry=_outside),
-    "and": _Kind(lambda a, b, c: a & b, _never),
-    "andi": _Kind(lambda a, b, c: a & b, _never, constant=True),
-    "or": _Kind(lambda a, b, c: a | b, _never),
-    "ori": _Kind(lambda a, b, c: a | b, _never, constant=True),
-    "eor": _Kind(lambda a, b, c: a ^ b, _never),
-    "com": _Kind(lambda a, b, c: 255 - a, _never, operands=1, carry=lambda a, r: True),
-    "neg": _Kind(lambda a, b, c: -a, lambda a, b, r: r == 0x80, operands=1, carry=_outside),
-    "inc": _Kind(lambda a, b, c: a + 1, lambda a, b, r: r == 0x80, operands=1),
-    "dec": _Kind(lambda a, b, c: a - 1, lambda a, b, r: r == 0x7F, operands=1),
-    "lsr": _Kind(lambda a, b, c: a >> 1, _shifted, operands=1, carry=_lowest),
-    "ror": _Kind(lambda a, b, c: a >> 1 | c << 7, _shifted, operands=1, carries=True, carry=_lowest),
-    "asr": _Kind(lambda a, b, c: a >> 1 | a & 0x80, _shifted, operands=1, carry=_lowest),
-}
-
-
 def _byte(name: str, operands: tuple[int, ...], state: State, registers: dict[int, int]) -> dict[str, bool]:
-    """The flags behind an instruction of _BYTES; what it writes goes to `registers`."""
-    kind = _BYTES[name]
+    """The flags behind an instruction of BYTES; what it writes goes to `registers`."""
+    kind = BYTES[name]
     kept = {} if kind.carry is not None or "C" not in state.flags else {"C": state.flags["C"]}
     if name in ("eor", "sub") and operands[0] == operands[1]:
         first: int | None = 0  # whatever is in there

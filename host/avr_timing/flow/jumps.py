@@ -17,6 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from avr_timing.flow.arithmetic import BYTES
 from avr_timing.flow.instructions import BRANCHES, SKIPS
 from avr_timing.flow.registers import REGISTERS, ZERO
 from avr_timing.program import Instruction
@@ -30,8 +31,7 @@ SREG = 0x3F  # I/O address
 # Neither registers nor the flags C and Z change.
 INERT = frozenset(("nop", "std", "push", "cbi", "sbi", "sei", "cli", "wdr", "sleep", "bst", "jmp", "rjmp", "ijmp"))
 INERT |= BRANCHES | SKIPS | frozenset(("set", "clt", "sen", "cln", "ses", "cls", "sev", "clv", "seh", "clh"))
-LOADS = frozenset(("ld", "ldd", "lds", "pop", "in", "bld"))  # their first operand becomes unknown
-CHANGES = frozenset(("com", "neg", "swap", "inc", "dec", "asr"))  # and with these the flags too
+LOADS = frozenset(("ld", "ldd", "lds", "pop", "in", "bld", "swap"))  # their first operand becomes unknown
 PRODUCTS = frozenset(("mul", "muls", "mulsu", "fmul", "fmuls", "fmulsu"))  # into r1:r0
 
 
@@ -122,13 +122,10 @@ class _Machine:
         operation = getattr(self, f"_{name}", None)
         if operation is not None:
             operation(*operands)
-        elif name in _ARITHMETIC:
+        elif name in BYTES:
             self._arithmetic(name, *operands)
         elif name in LOADS:
             self._load(name, *operands)
-        elif name in CHANGES:
-            self._registers[operands[0]] = self._new()
-            self._forget_flags()
         elif name in PRODUCTS:
             self._forget_pair(0)
             self._forget_flags()
@@ -155,22 +152,22 @@ class _Machine:
         if name in ("breq", "brne"):
             self._conditions.append((self._zero, (name == "breq") == taken))
 
-    def _arithmetic(self, name: str, d: int, other: int) -> None:
-        kind = _ARITHMETIC[name]
-        second = _constant(other) if kind.immediate else self._registers[other]
-        if not kind.immediate and d == other and name in ("eor", "sub"):
+    def _arithmetic(self, name: str, d: int, other: int = 0) -> None:
+        kind = BYTES[name]
+        second = _constant(other) if kind.constant or kind.operands == 1 else self._registers[other]
+        if not kind.constant and d == other and name in ("eor", "sub"):
             first = second = _constant(0)  # whatever is in there
         else:
             first = self._registers[d]
-        carry = self._carry if kind.with_carry else _constant(0)
+        carry = self._carry if kind.carries else _constant(0)
         result = _term(kind.compute, first, second, carry)
         byte = _term(lambda result: result & 0xFF, result)
         zero = _term(lambda byte: byte == 0, byte)
-        if kind.with_carry and kind.subtracts:  # Z stays only where it was: so that 16 bits are compared
+        if kind.chained:  # Z stays only where it was: so that 16 bits are compared
             zero = _term(lambda zero, before: zero & (before != 0), zero, self._zero)
         self._zero = zero
-        if not kind.logic:
-            self._carry = _term(lambda result: result >> 8 & 1, result)
+        if kind.carry is not None:
+            self._carry = _term(kind.carry, first, result)
         if kind.writes:
             self._registers[d] = byte
 
@@ -203,34 +200,25 @@ class _Machine:
     def _movw(self, d: int, r: int) -> None:
         self._registers[d : d + 2] = self._registers[r : r + 2]
 
+    def _advance(self, low: int, number: int) -> Term:
+        """To a pair of registers, without flags; the sum."""
+        total = _term(lambda pair: pair + number, self.pair(low))
+        self._registers[low] = _term(lambda total: total & 0xFF, total)
+        self._registers[low + 1] = _term(lambda total: total >> 8 & 0xFF, total)
+        return total
+
     def _adiw(self, d: int, number: int) -> None:
-        total = _term(lambda pair: pair + number, self.pair(d))
-        self._registers[d] = _term(lambda total: total & 0xFF, total)
-        self._registers[d + 1] = _term(lambda total: total >> 8 & 0xFF, total)
+        total = self._advance(d, number)
         self._carry = _term(lambda total: total >> 16 & 1, total)
         self._zero = _term(lambda total: total & 0xFFFF == 0, total)
 
     def _sbiw(self, d: int, number: int) -> None:
         self._adiw(d, -number)
 
-    def _lsr(self, d: int) -> None:
-        self._shift(d, _constant(0))
-
-    def _ror(self, d: int) -> None:
-        self._shift(d, self._carry)
-
-    def _shift(self, d: int, highest: Term) -> None:
-        before = self._registers[d]
-        self._registers[d] = _term(lambda byte, bit: byte >> 1 | bit << 7, before, highest)
-        self._carry = _term(lambda byte: byte & 1, before)
-        self._zero = _term(lambda byte: byte == 0, self._registers[d])
-
     def _lpm(self, d: int, pointer: int, step: int) -> None:
         value = _term(self._read, self.pair(pointer))
         if step:
-            total = _term(lambda pair: pair + step, self.pair(pointer))
-            self._registers[pointer] = _term(lambda total: total & 0xFF, total)
-            self._registers[pointer + 1] = _term(lambda total: total >> 8 & 0xFF, total)
+            self._advance(pointer, step)
         self._registers[d] = value
 
     def _read(self, addresses: Values) -> Values:
@@ -245,41 +233,3 @@ class _Machine:
 
 def _never(number: int) -> Values:
     raise AssertionError(f"unknown byte {number} was asked for its value")
-
-
-@dataclass(frozen=True, slots=True)
-class _Kind:
-    """How an arithmetic instruction computes; its result may leave 0..255, bit 8 is the carry then."""
-
-    compute: Callable[[Values, Values, Values], Values]
-    immediate: bool = False
-    with_carry: bool = False
-    subtracts: bool = False
-    writes: bool = True
-    logic: bool = False  # the carry stays
-
-
-def _plus(a: Values, b: Values, carry: Values) -> Values:
-    return a + b + carry
-
-
-def _minus(a: Values, b: Values, carry: Values) -> Values:
-    return a - b - carry
-
-
-_ARITHMETIC = {
-    "add": _Kind(_plus),
-    "adc": _Kind(_plus, with_carry=True),
-    "sub": _Kind(_minus, subtracts=True),
-    "sbc": _Kind(_minus, subtracts=True, with_carry=True),
-    "subi": _Kind(_minus, subtracts=True, immediate=True),
-    "sbci": _Kind(_minus, subtracts=True, immediate=True, with_carry=True),
-    "cp": _Kind(_minus, subtracts=True, writes=False),
-    "cpc": _Kind(_minus, subtracts=True, with_carry=True, writes=False),
-    "cpi": _Kind(_minus, subtracts=True, immediate=True, writes=False),
-    "and": _Kind(lambda a, b, carry: a & b, logic=True),
-    "or": _Kind(lambda a, b, carry: a | b, logic=True),
-    "eor": _Kind(lambda a, b, carry: a ^ b, logic=True),
-    "andi": _Kind(lambda a, b, carry: a & b, immediate=True, logic=True),
-    "ori": _Kind(lambda a, b, carry: a | b, immediate=True, logic=True),
-}
