@@ -173,7 +173,7 @@ check-generated:
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
-ready-bench: ready-test build/.done-system-bench build/avr8js/.done build/mcap-core/.done
+ready-bench: ready-test build/avr8js/.done build/mcap-core/.done
 ready-soak: ready-bench build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
@@ -185,7 +185,7 @@ build/.done-system-%: tools/setup_system.sh tools/find_python.sh
 # one apt at a time
 build/.done-system-test: build/.done-system-run
 build/.done-system-check: build/.done-system-test
-build/.done-system-soak: build/.done-system-bench
+build/.done-system-soak: build/.done-system-test
 
 $(VENV)/.done-venv: build/.done-system-run
 	@echo "Making a virtual environment in $(VENV)"

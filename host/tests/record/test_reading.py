@@ -40,6 +40,24 @@ def test_report_prints_figures_though_its_files_cannot_be_written(
     assert err == f"boebot: the run's files cannot be written to {tmp_path}: Is a directory\n"
 
 
+def test_without_a_column_all_are_named(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    code, out, err = boebot(capsys, "report", str(folder), "--plot")
+    names = out.split()
+    assert (code, err) == (0, "") and names[:2] == ["time_s", "tick"]
+    assert {"ping_distance_m", "command_left", "true_x_m"} <= set(names)
+
+
+def test_options_of_another_way_are_refused(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    for asked, sentence in {
+        ("report", str(folder), "--as", "csvv"): "there is no format 'csvv'; expected one of csv, foxglove, can.",
+        ("report", str(folder), "tick"): "COLUMN, --robot and --out go with --plot",
+        ("replay", str(folder)): "expected --brain BRAIN, or --again",
+        ("replay", str(folder), "--brain", "wander", "--trust"): "expected --again with --trust",
+    }.items():
+        code, out, err = boebot(capsys, *asked)
+        assert (code, out) == (2, "") and sentence in " ".join(err.split()), asked
+
+
 def test_columns_are_drawn(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: Path
 ) -> None:
@@ -282,7 +300,7 @@ def zeros(data: bytearray) -> None:
     data[begin : begin + 512] = bytes(512)
 
 
-@pytest.mark.parametrize("change", [bit, zeros])
+@pytest.mark.parametrize("change", [bit, pytest.param(zeros, marks=pytest.mark.soak)])
 def test_damaged_record_is_not_silent_anywhere(
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
