@@ -79,7 +79,9 @@ soak: experiments
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
 	@$(PYTHON_VENV) -m tools.other_emulators
 	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
-	@PYTHONMALLOC=malloc tools/test_sanitized.sh
+	@PYTHONMALLOC=malloc tools/test_sanitized.sh all
+	@tools/pio test -e native_quad
+	@tools/pio check -e native --fail-on-defect low --fail-on-defect medium --fail-on-defect high
 	@$(PYTHON_VENV) -m tools.tests.error_rates --page docs/reference/error-rates.md
 
 EXAMPLES ?= 5000

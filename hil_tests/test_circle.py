@@ -20,7 +20,7 @@ def test_wander_keeps_moving_for_a_minute(board_url: str, seed: int) -> None:
     assert result.lost_frames == 0 and result.dead_man_stops == 0 and result.overruns == 0
 
 
-@pytest.mark.soak_on_avr
+@pytest.mark.soak
 def test_wander_visits_half_of_its_arena_in_five_minutes(board_url: str) -> None:
     """On average over three seeds: single runs spread by some 6 % of the cells (docs/decisions/0001)."""
     shares = []

@@ -171,7 +171,7 @@ def saturate(rig: DeviceRig, seconds: float) -> None:
     rig.transport.write(bytes(wire))
 
 
-@pytest.mark.parametrize("pin_map", ["shieldbot", "boebot"])
+@pytest.mark.parametrize("pin_map", [pytest.param("shieldbot", marks=pytest.mark.soak), "boebot"])
 def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, pin_map: str) -> None:
     """Every device of the map at work, encoders at 1.5 kHz, the UART saturated both ways: ±4 cycles, no tick missed,
     no byte lost."""

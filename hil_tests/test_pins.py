@@ -40,7 +40,7 @@ def levels(host: DeviceRig, seconds: float) -> dict[int, set[Level]]:
     return seen
 
 
-@pytest.mark.parametrize("kind", ["native", "avr"])
+@pytest.mark.parametrize("kind", [pytest.param("native", marks=pytest.mark.soak), "avr"])
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: str) -> None:
     host = DeviceRig(power_on(kind, pin_map))
@@ -53,7 +53,7 @@ def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: s
             assert seen[pin] == {Level.PULLED_UP}, device
 
 
-@pytest.mark.parametrize("kind", ["native", "avr"])
+@pytest.mark.parametrize("kind", [pytest.param("native", marks=pytest.mark.soak), "avr"])
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) -> None:
     """All devices on: an echo is awaited for 20 ms, a decay for 14 ms; what an analog sensor gives is not pulled at."""
@@ -70,7 +70,7 @@ def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) ->
             assert device in measured or Level.RELEASED not in seen[pin], device
 
 
-@pytest.mark.parametrize("kind", ["native", "avr"])
+@pytest.mark.parametrize("kind", [pytest.param("native", marks=pytest.mark.soak), "avr"])
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> None:
     """Who knows what is wired to the board before anyone says so?"""

@@ -79,6 +79,7 @@ def test_another_chip_is_not_written(tmp_path: Path) -> None:
         board.flash(port)
 
 
+@pytest.mark.soak
 def test_the_tutorials_upload_works_as_written(tmp_path: Path) -> None:
     """PlatformIO, avrdude, bootloader, firmware: afterwards the board says who it is."""
     found = re.search(r"^pio (.*)$", TUTORIAL.read_text(), re.MULTILINE)

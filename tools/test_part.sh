@@ -14,10 +14,14 @@ run() {
       build/venv/bin/python -m pytest -n "$(nproc)" --dist loadfile \
         -m "not wall_clock and not soak and (not simulator or unsanitized or hypothesis)" "$@"
       ;;
-    # All environments of tests but `native`, which is `native_sanitized` without sanitizers.
-    units) tools/pio test $(sed -n 's/^\[env:\(native_.*\)\]$/-e \1/p' platformio.ini) ;;
+    # All units for one pin map, and for two others what only they have. Quadrature encoders: hil_tests, and `make soak`.
+    units) tools/pio test -e native_sanitized -e native_boebot -e native_line ;;
     sanitized) tools/test_sanitized.sh ;;
-    wall_clock) build/venv/bin/python -m pytest -n 4 --dist loadfile -m wall_clock "$@" ;;
+    # Each of the four reads all files of tests that it is given, so it is given those that have such tests.
+    wall_clock)
+      build/venv/bin/python -m pytest -n 4 --dist loadfile -m "wall_clock and not soak" \
+        $(grep -rl --include='test_*.py' 'mark.wall_clock' docs hil_tests host protocol sim_bridge tools) "$@"
+      ;;
   esac
 }
 

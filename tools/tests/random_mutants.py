@@ -44,7 +44,7 @@ from tools.tests.mutations import KINDS, mutation
 
 LIST = Path(__file__).with_suffix(".json")
 PYTEST = 'build/venv/bin/python -m pytest -q -x -m "not wall_clock and not soak"'
-UNITS = "tools/pio test -e native_sanitized -e native_quad -e native_boebot -e native_line"
+UNITS = "tools/pio test -e native_sanitized -e native_boebot -e native_line"
 
 OUTCOMES = ("caught by ", "survived", "moved", "no end of ")
 # How pytest, PlatformIO and faulthandler (after a crash, or 180 s) name the test that failed.

@@ -105,6 +105,7 @@ def run(*options: str) -> copied_process.Done:
     return copied_process.module("tools.tests.bench", options, ROOT)
 
 
+@pytest.mark.soak
 def test_every_figure_has_a_name_of_its_own_and_only_chooses() -> None:
     names = run("--list").stdout.splitlines()
     assert len(set(names)) == len(names) > 25
@@ -121,6 +122,7 @@ def test_a_pattern_without_a_figure_is_one_sentence() -> None:
     assert done.returncode == 2 and "no figure's name contains 'no such thing'" in done.stderr
 
 
+@pytest.mark.soak
 def test_json_page_and_progress(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"By hand.\n{MARK}old")
@@ -133,6 +135,7 @@ def test_json_page_and_progress(tmp_path: Path) -> None:
     assert "| Python encodes telemetry of 37 B: fields to frame |" in page.read_text()
 
 
+@pytest.mark.soak
 def test_ctrl_c_shows_what_was_measured_so_far() -> None:
     """Frames are the first matches, in seconds; a run of 10 simulated minutes is the next one."""
     command = [

@@ -1,5 +1,4 @@
-"""The fuzzers of the frame run for a while and find nothing. In `make soak` those of the link and the vehicles do, as
-they take long to compile; and in a decoder without one of its checks, the fuzzer finds that."""
+"""The fuzzers run for a while and find nothing; in a decoder without one of its checks, the fuzzer finds that."""
 
 from __future__ import annotations
 
@@ -11,6 +10,8 @@ import pytest
 from tools import fuzz
 from tools.tests.error_rates.library import frame_source
 
+pytestmark = pytest.mark.soak  # they take long to compile
+
 # The protection left out of frame.c, and the assertion that the fuzzer then breaks.
 MISSED = {
     "checksum": r"memcmp\(again \+ 1",
@@ -20,9 +21,7 @@ MISSED = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name.startswith("frame") else pytest.mark.soak) for name in fuzz.FUZZERS]
-)
+@pytest.mark.parametrize("name", fuzz.FUZZERS)
 def test_fuzzer_finds_nothing(name: str, tmp_path: Path) -> None:
     done = fuzz.run(fuzz.build(name, tmp_path), tmp_path, ["-seed=1", "-max_total_time=2"])
     assert done.returncode == 0, done.stderr[-4000:]
@@ -30,7 +29,6 @@ def test_fuzzer_finds_nothing(name: str, tmp_path: Path) -> None:
     assert runs and int(runs[1]) > len(fuzz.FUZZERS[name].seeds), "it has tried something"
 
 
-@pytest.mark.soak
 @pytest.mark.parametrize("protection", MISSED)
 def test_fuzzer_finds_a_missing_check(protection: str, tmp_path: Path) -> None:
     mutant = tmp_path / "frame.c"
@@ -40,7 +38,6 @@ def test_fuzzer_finds_a_missing_check(protection: str, tmp_path: Path) -> None:
     assert re.search(MISSED[protection], done.stderr), done.stderr[-2000:]
 
 
-@pytest.mark.soak
 def test_fuzzer_of_the_link_finds_a_missing_latch(tmp_path: Path) -> None:
     source, check = fuzz.FIRMWARE / "safety.c", "own.latch != LATCH_NONE || time_to_live"
     text = source.read_text(encoding="utf-8")

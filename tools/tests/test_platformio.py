@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from tools import avr_program
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -15,6 +17,7 @@ def pio(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([PROJECT / "tools" / "pio", *arguments], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.soak
 def test_it_builds_the_images() -> None:
     done = pio("run")
     assert done.returncode == 0, done.stdout + done.stderr

@@ -147,7 +147,13 @@ def test_code_without_an_end_is_refused(tmp_path: Path) -> None:
     assert "0x0004 (in __ctors_end+0x4): there is no code, but __ctors_end leads there" in message
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in IMAGES.glob("*.elf")))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(path.stem, marks=() if path.stem == "shieldbot" else pytest.mark.soak)
+        for path in sorted(IMAGES.glob("*.elf"))
+    ],
+)
 def test_the_images_are_followed_whole(name: str) -> None:
     path = IMAGES / f"{name}.elf"
     image, program, text = read_image(path), load_program(path), disassembly(path)

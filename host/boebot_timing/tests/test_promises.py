@@ -33,11 +33,8 @@ PLANTED = 200  # cycles
 FARTHER = 1  # cycle: what follows moves by 400 bytes, and a jump over more than 4 KB takes so much longer
 
 
-# The fullest and the barest; the others differ in single devices.
-JUDGED = [
-    pytest.param(name, marks=() if name in ("shieldbot-quad", "shieldbot-basic") else pytest.mark.soak)
-    for name in avr_program.IMAGES
-]
+# The fullest; in `make soak` the others, which differ in single devices.
+JUDGED = [pytest.param(name, marks=() if name == "shieldbot-quad" else pytest.mark.soak) for name in avr_program.IMAGES]
 
 
 @pytest.fixture(scope="module", params=JUDGED)

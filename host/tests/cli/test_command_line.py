@@ -290,7 +290,7 @@ def test_info_over_a_port(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.wall_clock
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.soak)])
 def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals, tmp_path: Path) -> None:
     with pty(Peer()) as served:
         command = [sys.executable, "-m", "boebot", "run", "wander", "--on", served.path, "--out", str(tmp_path / "out")]
