@@ -259,3 +259,18 @@ def everything(start: object) -> list[object]:
             waiting += list(thing)
         waiting += [cell.cell_contents for cell in getattr(thing, "__closure__", None) or ()]
     return list(seen.values())
+
+
+def test_each_module_of_the_library_has_its_test() -> None:
+    """A file of its path, or the files in its room's row of host/tests/README.md."""
+    tests, library = ROOT / "host" / "tests", ROOT / "host" / "boebot"
+    proved: dict[str, set[str]] = {}
+    table = (tests / "README.md").read_text(encoding="utf-8")
+    for room, files, modules in re.findall(r"^\| `(\S+)` \| (.+?) \| (.+?) \|$", table, re.MULTILINE):
+        for file in re.findall(r"`(.+?)`", files):
+            assert any((folder / file).is_file() for folder in (tests / room, tests, ROOT)), file
+        proved.setdefault(room, set()).update(re.findall(r"`(\w+\.py)`", modules) or [modules])
+    for module in library.rglob("[!_]*.py"):
+        path = module.relative_to(library)
+        known = proved.get(str(path.parent), set())
+        assert "rest" in known or path.name in known or (tests / path.with_name(f"test_{path.name}")).is_file(), path
