@@ -1,9 +1,8 @@
 """The timing diagram of the notes (Fig. 3.2), drawn to scale: what fills a time step, and how much of it is left.
 
 From above: the time step of the brain with all that follows one another in it, and what devices do beside it in
-hardware of their own; one control tick of the board within it; the tasks of each slot of that tick, enlarged so that
-they can be read. Spans come from the fullest tick that was measured; where none was, tasks are drawn as long as they
-can take by their bounds.
+hardware of their own; the tasks of each slot of one control tick of the board, enlarged so that they can be read. Spans
+come from the fullest tick that was measured; where none was, tasks are drawn as long as they can take by their bounds.
 """
 
 from __future__ import annotations
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 
 NAME = "timing"
 SCHEDULER = "scheduler"  # kind of a span before a slot's tasks
-_CYCLES_PER_MS = 16_000
 _COLOURS = {"task": "#0072b2", "interrupt": "#d55e00", "line": "#cc79a7", "process": "#009e73", "sense": "#e69f00"}
 _COLOURS["command"] = _COLOURS["task"]
 _ON = dict.fromkeys(_COLOURS, "white") | {"line": style.INK, "sense": style.INK}  # of text on these
@@ -74,16 +72,14 @@ def figure(report: Report, verdict: Verdict | None = None) -> Figure:
 
     spans = moments(report)
     events = verdict.events if verdict is not None else ()
-    lanes = (len(events) + 2.5, 3.2)
-    heights = [*([_LANE_IN * lanes[0] + 0.5] if events else []), _LANE_IN * lanes[1] + 0.5]
+    heights = [_LANE_IN * (len(events) + 2.5) + 0.5] if events else []
     heights.append(_SLOT_IN * report.schedule.slots_per_tick + 0.8)
     with rc_context(style.PLOTS):
         drawn = Figure(figsize=(style.WIDTH_IN, sum(heights) + _FRAME_IN), dpi=style.DPI, layout="constrained")
         FigureCanvasAgg(drawn)
-        axes = list(drawn.subplots(len(heights), 1, height_ratios=heights))
+        axes = drawn.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         if verdict is not None and events:
-            _step(axes[0], verdict)
-        _tick(axes[-2], spans, report)
+            step(axes[0], verdict)
         _slots(axes[-1], spans, report)
         _legend(drawn, {span.kind for span in spans} | {event.kind for event in events})
         drawn.suptitle(f"{Path(report.path).name}: {_how(report)}", color=style.INK, fontsize=12)
@@ -123,7 +119,7 @@ def _legend(drawn: Figure, kinds: set[str]) -> None:
 # ---- the step of the brain ------------------------------------------------------------------------------------------
 
 
-def _step(axes: Axes, verdict: Verdict) -> None:
+def step(axes: Axes, verdict: Verdict) -> None:
     """A lane for each event of the time step, in their order; what is left of it; devices below."""
     period = verdict.period_s * 1000
     ticks = range(1, round(verdict.period_s / TICK_S))
@@ -167,25 +163,7 @@ def _span(axes: Axes, begin: float, end: float, lane: float, text: str) -> None:
     axes.text((begin + end) / 2, lane, text, ha="center", va="center", color=style.INK, fontsize=8.5, bbox=paper)
 
 
-# ---- the tick and its slots -----------------------------------------------------------------------------------------
-
-
-def _tick(axes: Axes, spans: Sequence[Moment], report: Report) -> None:
-    """The whole tick with its slots: tasks, and interrupts below them."""
-    slot_ms = report.schedule.slot_cycles / _CYCLES_PER_MS
-    kinds = [kind for kind in ("task", "interrupt") if any(span.kind == kind for span in spans)]
-    for span in (span for span in spans if span.kind in kinds):
-        begin, length = span.begin / _CYCLES_PER_MS, (span.end - span.begin) / _CYCLES_PER_MS
-        axes.barh(kinds.index(span.kind), length, _HEIGHT, left=begin, color=_COLOURS[span.kind], linewidth=0)
-    for slot in range(report.schedule.slots_per_tick):
-        axes.axvline(slot * slot_ms, color=style.INK, linewidth=0.5, linestyle=(0, (1, 3)))
-        axes.text((slot + 0.5) * slot_ms, -0.75, f"slot {slot}", ha="center", va="center", fontsize=8, color=style.INK)
-    axes.set_yticks(range(len(kinds)), [f"{kind}s" for kind in kinds], fontsize=8.5)
-    axes.set_ylim(len(kinds) - 0.5, -1.1)
-    axes.set_xlim(0, max([report.tick_cycles, *(span.end for span in spans)]) / _CYCLES_PER_MS)
-    axes.set_xlabel("time since the tick began (ms)", fontsize=9)
-    axes.set_title(f"Control tick, {report.tick_cycles / _CYCLES_PER_MS:g} ms", loc="left", fontsize=10)
-    axes.grid(visible=False)
+# ---- the slots -------------------------------------------------------------------------------------------------------
 
 
 def _slots(axes: Axes, spans: Sequence[Moment], report: Report) -> None:

@@ -152,8 +152,6 @@ def judge(
     board: BoardTimes | None = None,
     brain_s: float = 0.0,
     baud: int | None = None,
-    telemetry_bytes: int = TELEMETRY_BYTES,
-    command_bytes: int = COMMAND_BYTES,
 ) -> Verdict:
     """Whether the robot's sensors, that period of its brain and its line go together.
 
@@ -163,7 +161,6 @@ def judge(
         board: what is known of its board's times; None: only the line counts.
         brain_s: what a step of the brain takes, s; 0: not known.
         baud: of the line, bit/s; None: as the robot's description says.
-        telemetry_bytes, command_bytes: frames on the line, delimiters counted.
 
     Raises:
         BoebotError: a period, rate or time that is none.
@@ -175,7 +172,7 @@ def judge(
         raise BoebotError(f"robot {robot.name!r} has no board, and so no line of {baud} bit/s")
     if not robot.has_board:
         return _of_vehicle(robot, period_s, brain_s)
-    return _of_board(robot, period_s, board or BoardTimes(), brain_s, baud, telemetry_bytes, command_bytes)
+    return _of_board(robot, period_s, board or BoardTimes(), brain_s, baud)
 
 
 def check(robot: RobotDescription, period_s: float) -> Finding | None:
@@ -184,9 +181,9 @@ def check(robot: RobotDescription, period_s: float) -> Finding | None:
     return None if verdict.is_realisable else Finding(verdict.sentence, "`boebot timing --robot` shows its times")
 
 
-def telemetry_ticks(baud: int, telemetry_bytes: int = TELEMETRY_BYTES) -> int:
+def telemetry_ticks(baud: int) -> int:
     """Ticks from telemetry to telemetry: such that it fills no more than half of the line (PROTOCOL.md, "Delivery")."""
-    needed = Fraction(2 * telemetry_bytes * BITS_PER_BYTE, baud)
+    needed = Fraction(2 * TELEMETRY_BYTES * BITS_PER_BYTE, baud)
     return next((ticks for ticks in _TELEMETRY_TICKS if ticks * Fraction(1, 100) >= needed), _TELEMETRY_TICKS[-1])
 
 
@@ -225,22 +222,20 @@ def _of_board(
     board: BoardTimes,
     brain_s: float,
     baud: int | None,
-    telemetry_bytes: int,
-    command_bytes: int,
 ) -> Verdict:
     uart = robot.device.get("uart")
     rate = baud if baud is not None else uart.baud if isinstance(uart, Uart) else 500_000
     if rate <= 0:
         raise BoebotError(f"a line of {rate} bit/s is none; expected more than 0")
     check_time_to_live(period_s)
-    line_s = telemetry_ticks(rate, telemetry_bytes) * TICK_S
+    line_s = telemetry_ticks(rate) * TICK_S
     forced_s = _next_multiple(whole_ticks(period_s, TICK_S) * TICK_S, line_s)
     byte_s = BITS_PER_BYTE / rate
     path = [
         Event("telemetry task", "sense", board.telemetry_s),
-        Event(f"telemetry, {telemetry_bytes} B", "line", telemetry_bytes * byte_s),
+        Event(f"telemetry, {TELEMETRY_BYTES} B", "line", TELEMETRY_BYTES * byte_s),
         Event("brain", "process", brain_s),
-        Event(f"set-point, {command_bytes} B", "line", command_bytes * byte_s),
+        Event(f"set-point, {COMMAND_BYTES} B", "line", COMMAND_BYTES * byte_s),
         Event("set-point taken", "command", board.set_point_s),
     ]
     beside = [_reading(row, robot) for row in board.sensors if row.conversion > 0 and _has(robot, row)]
@@ -248,10 +243,10 @@ def _of_board(
     slow = [event for event in beside if event.seconds > event.every + 1e-9]
     faults = [_slow_sensor(event, "period_ticks") for event in slow if _is_asked(robot, event.name)]
     if forced_s > period_s + 1e-9:
-        faults.append(_slow_line(events, period_s, rate, telemetry_bytes, command_bytes))
+        faults.append(_slow_line(events, period_s, rate))
     elif late := _overfull(events, period_s, None, line_s):
         faults += late
-        if faster := _faster_line(events, period_s, rate, telemetry_bytes, command_bytes):
+        if faster := _faster_line(events, period_s, rate):
             faults.append(f"{faster} would do, too")
     notes = _notes(beside, period_s, forced_s, rate)
     return Verdict(robot.name, period_s, forced_s, rate, events, tuple(faults), notes)
@@ -348,28 +343,26 @@ def _enough(seconds: float, grain_s: float) -> float:
     return (math.floor(seconds / grain_s + 1e-9) + 1) * grain_s
 
 
-def _slow_line(events: tuple[Event, ...], period_s: float, rate: int, telemetry_bytes: int, command_bytes: int) -> str:
+def _slow_line(events: tuple[Event, ...], period_s: float, rate: int) -> str:
     """A line that does not bring telemetry for each step, and what would mend that."""
-    line_s = telemetry_ticks(rate, telemetry_bytes) * TICK_S
+    line_s = telemetry_ticks(rate) * TICK_S
     total = sum(event.seconds for event in events if not event.beside)
     longer = max(_next_multiple(period_s, line_s), _enough(total, line_s))
     mend = [f"a period of {duration(longer)}"] if longer <= _LONGEST_PERIOD_S else []
-    if faster := _faster_line(events, period_s, rate, telemetry_bytes, command_bytes):
+    if faster := _faster_line(events, period_s, rate):
         mend.append(faster)
     return (
-        f"telemetry, {telemetry_bytes} B, comes every {duration(line_s)} over a line of {rate} bit/s, "
+        f"telemetry, {TELEMETRY_BYTES} B, comes every {duration(line_s)} over a line of {rate} bit/s, "
         f"which a step every {duration(period_s)} does not go with; expected {' or '.join(mend) or 'a faster line'}"
     )
 
 
-def _faster_line(
-    events: tuple[Event, ...], period_s: float, rate: int, telemetry_bytes: int, command_bytes: int
-) -> str | None:
+def _faster_line(events: tuple[Event, ...], period_s: float, rate: int) -> str | None:
     """The lowest usual rate at which there is telemetry for each step, and time enough."""
     rest = sum(event.seconds for event in events if not event.beside and event.kind != "line")
     for faster in BAUD_RATES:
-        line_s = telemetry_ticks(faster, telemetry_bytes) * TICK_S
-        bytes_s = (telemetry_bytes + command_bytes) * BITS_PER_BYTE / faster
+        line_s = telemetry_ticks(faster) * TICK_S
+        bytes_s = (TELEMETRY_BYTES + COMMAND_BYTES) * BITS_PER_BYTE / faster
         if faster > rate and _next_multiple(period_s, line_s) <= period_s + 1e-9 and rest + bytes_s < period_s:
             return f"a line of {faster} bit/s"
     return None

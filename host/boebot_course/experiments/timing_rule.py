@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import msgspec
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import NotRealisableError
 from boebot.running.runner import run
 from boebot_course.experiment import Outcome, about, exactly, experiment
-from boebot_timing.realisable import Verdict, judge
+from boebot_timing.diagram import step
+from boebot_timing.realisable import judge
 
 STEP_S = 0.01
 READING_S = 0.003  # of an IR sensor, chosen: two fit into the step with the brain, four do not, as in Fig. 3.2
 BRAIN_S = 0.001
 SENSORS = ("infrared_left", "infrared_right", "infrared_back_left", "infrared_back_right")
-_COLOURS = {"sense": "#e69f00", "process": "#009e73"}
 
 
 def robot_with(count: int) -> RobotDescription:
@@ -60,10 +59,9 @@ def timing_rule(seed: int) -> Outcome:
     events = [(count, event) for count, verdict in verdicts.items() for event in verdict.events]
 
     def draw(figure: Figure) -> None:
-        both = [verdicts[2], verdicts[4]]
-        for axes, verdict in zip(figure.subplots(2, 1, sharex=True), both, strict=True):
-            _diagram(axes, verdict)
-        figure.axes[-1].set_xlabel("time since the step began (ms)")
+        for axes, verdict in zip(figure.subplots(2, 1), (verdicts[2], verdicts[4]), strict=True):
+            step(axes, verdict)
+            axes.set_title("realisable" if verdict.is_realisable else "not realisable", loc="right", fontsize=10)
 
     data = {
         "sensors": [count for count, _ in events],
@@ -72,14 +70,3 @@ def timing_rule(seed: int) -> Outcome:
         "ends_s": [event.end for _, event in events],
     }
     return Outcome(measured, data, draw)
-
-
-def _diagram(axes: Axes, verdict: Verdict) -> None:
-    for place, event in enumerate(verdict.events):
-        axes.barh(place, event.seconds * 1000, 0.7, left=event.begin * 1000, color=_COLOURS[event.kind])
-    axes.axvline(verdict.period_s * 1000, color="#2e3440", label="the step's time")
-    axes.legend(loc="upper right", fontsize=9)
-    axes.set_yticks(range(len(verdict.events)), [event.name.replace("_", " ") for event in verdict.events])
-    axes.invert_yaxis()
-    axes.set_title("realisable" if verdict.is_realisable else "not realisable")
-    axes.grid(axis="y", visible=False)

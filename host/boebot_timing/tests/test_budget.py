@@ -300,15 +300,14 @@ def boxes(axes: Any) -> list[tuple[float, float]]:
 
 
 def test_diagram_is_to_scale(report: budget.Report) -> None:
-    """The widths of its boxes are the tasks' bounds: in ms of a tick, in cycles below, none of them left out."""
+    """The widths of its boxes are the tasks' bounds: in cycles, none of them left out."""
     verdict = realisable.judge(load_robot("shieldbot"), 0.01, brain_s=0.002)
-    step, tick, slots = diagram.figure(report, verdict).axes
+    step, slots = diagram.figure(report, verdict).axes
     byte_ms = 10 / 500
     telemetry, command_ms = realisable.TELEMETRY_BYTES * byte_ms, realisable.COMMAND_BYTES * byte_ms
     expected = [(0, telemetry), (telemetry, 2), (telemetry + 2, command_ms)]
     assert np.array(boxes(step)) == pytest.approx(np.array(expected))
     tasks = sorted([104] * 4 + [204])
-    assert sorted(round(width * 16_000) for _, width in boxes(tick)) == tasks
     assert sorted(round(width) for _, width in boxes(slots)) == sorted(tasks + [report.costs.round] * 4)
     assert [text.get_text() for text in step.texts if "Δt" in text.get_text()] == ["Δt = 10 ms"]
 
@@ -322,9 +321,8 @@ def test_diagram_of_a_measured_tick(report: budget.Report) -> None:
         Moment("first", "task", 40_050, 40_154),
     )
     measured = merged([replace(measurement(), scenarios=("noise",)), replace(measurement(), tick=tick)])
-    above, below = diagram.figure(replace(report, measured=measured)).axes
-    assert [round(begin * 16_000) for begin, _ in boxes(above)] == [50, 60, 1185, 40_050]
-    assert boxes(below) == [(50, 104), (50, 135), (60, 31), (185, 1000), (1185, 104)]
+    (slots,) = diagram.figure(replace(report, measured=measured)).axes
+    assert boxes(slots) == [(50, 104), (50, 135), (60, 31), (185, 1000), (1185, 104)]
 
 
 def test_pictures_are_whole(report: budget.Report, tmp_path: Path) -> None:
@@ -333,7 +331,7 @@ def test_pictures_are_whole(report: budget.Report, tmp_path: Path) -> None:
     assert found == diagram.files(report, realisable.judge(load_robot("shieldbot"), 0.05)), "the same again"
     root = ElementTree.fromstring(found["timing.svg"])
     texts = {element.text for element in root.iter("{http://www.w3.org/2000/svg}text")}
-    assert {"first", "second", "tasks", "slot 3", "what is left", "task", "scheduler", "bytes on the line"} <= texts
+    assert {"first", "second", "slot 3", "what is left", "task", "scheduler", "bytes on the line"} <= texts
     assert not any("poll" in (text or "") for text in texts), "the link is polled when no slot waits"
     (tmp_path / "timing.png").write_bytes(found["timing.png"])
     assert matplotlib.image.imread(tmp_path / "timing.png").shape[1] > 1000
