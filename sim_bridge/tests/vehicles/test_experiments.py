@@ -29,9 +29,7 @@ pytestmark = pytest.mark.unsanitized
 
 def odometer(**changes: Any) -> Any:
     usual = {"half_track": 0.2, "wheel_radius": 0.1, "factor_left": 1.0, "factor_right": 1.0}
-    parameters = ffi.new("odometer_parameters *", usual | changes)
-    assert lib.odometer_check(parameters) == 0
-    return parameters
+    return ffi.new("odometer_parameters *", usual | changes)
 
 
 # ---- E04: A and B as identities -------------------------------------------------------------------------------------

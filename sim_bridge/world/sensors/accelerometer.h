@@ -22,9 +22,6 @@ typedef struct {
   double speed;      /* m/s */
 } accelerometer_state;
 
-/* 0, or -1: a number is not finite, mass, stiffness or range not positive, damping or sigma negative. */
-int accelerometer_check(const accelerometer_parameters *parameters);
-
 /* One step of dt seconds under the body's acceleration along the sensor's axis, m/s^2. */
 void accelerometer_step(const accelerometer_parameters *self, accelerometer_state *state, double acceleration,
                         double dt);

@@ -5,8 +5,6 @@
 
 int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_parameters *p) {
   if (beam_init(&self->beam, &p->beam)) return -1;
-  if (!(p->range >= 0.0 && p->c1 >= 0.0 && p->c2 >= 0.0 && p->sigma >= 0.0)) return -1;
-  if (!isfinite(p->range + p->c1 + p->c2 + p->sigma)) return -1;
   self->range = p->range * (1.0 + 0x1p-52); /* a ray reads 0 only beyond D, scene_ray's reach itself is out */
   self->c1 = p->c1;
   self->c2 = p->c2;

@@ -24,7 +24,7 @@ typedef struct {
   int reflectance;
 } infrared_proximity;
 
-/* 0, or -1: a bad beam, or a number that is not finite or negative. */
+/* 0, or -1: a bad beam. */
 int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_parameters *parameters);
 
 /* S in [0, 1]. */

@@ -12,15 +12,8 @@ struct laser {
   scan_fan *fan; /* NULL with a single ray */
 };
 
-int laser_check(const laser_parameters *p) {
-  if (p->rays < 1 || p->rays > LASER_RAYS || !isfinite(p->first) || !isfinite(p->x + p->y + p->height)) return -1;
-  if (!(p->step > 0.0 || (p->rays == 1 && p->step == 0.0)) || !(fabs(p->heading) <= 1e4)) return -1;
-  if (!(p->range > 0.0 && p->sigma >= 0.0) || !isfinite(p->range + p->sigma)) return -1;
-  return p->step * (p->rays - 1) < 2.0 * NUMBERS_PI && fabs(p->first) <= 2.0 * NUMBERS_PI ? 0 : -1;
-}
-
 laser *laser_new(const laser_parameters *p) {
-  laser *self = laser_check(p) == 0 ? calloc(1, sizeof *self) : NULL;
+  laser *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   const double heading = p->rays > 1 ? p->heading : p->heading + p->first;
   const beam_parameters mount = {.x = p->x, .y = p->y, .heading = heading, .height = p->height, .rays = 1};
@@ -67,7 +60,6 @@ void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double 
 
 static size_t make(void *self, const void *parameters) {
   const laser_parameters *p = parameters;
-  if (laser_check(p)) return 0;
   *(laser_parameters *)self = *p;
   return (size_t)p->rays;
 }

@@ -24,10 +24,7 @@ typedef struct {
 
 typedef struct laser laser;
 
-/* 0, or -1: a number is not finite, negative or the fan wider than a turn. */
-int laser_check(const laser_parameters *parameters);
-
-/* A laser; it serves one thread at a time. NULL without memory or with bad parameters. */
+/* A laser; it serves one thread at a time. NULL without memory. */
 laser *laser_new(const laser_parameters *parameters);
 void laser_destroy(laser *self);
 

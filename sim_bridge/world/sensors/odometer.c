@@ -7,17 +7,6 @@
 
 #define ARSIM_STEP_S 0.01
 
-int odometer_check(const odometer_parameters *p) {
-  const double lengths = p->half_track + p->wheel_radius + p->factor_left + p->factor_right;
-  if (!isfinite(lengths + p->sigma_step + p->sigma_share + p->edges_per_turn + p->slips_per_s + p->slip_share))
-    return -1;
-  if (!(p->half_track > 0.0 && p->wheel_radius > 0.0 && p->factor_left > 0.0 && p->factor_right > 0.0)) return -1;
-  if (!(p->sigma_step >= 0.0 && p->sigma_share >= 0.0 && p->edges_per_turn >= 0.0 && p->slips_per_s >= 0.0)) return -1;
-  return p->slip_share >= 0.0 && p->slip_share <= 1.0 && p->rule >= ODOMETER_MIDPOINT && p->rule <= ODOMETER_NEW_HEADING
-             ? 0
-             : -1;
-}
-
 void odometer_calibrate(odometer_state *s, double x, double y, double heading, double wheel_left, double wheel_right) {
   *s = (odometer_state){
       .x = x, .y = y, .heading = number_wrap(heading), .wheel_left = wheel_left, .wheel_right = wheel_right};
@@ -70,7 +59,7 @@ void odometer_step(const odometer_parameters *p, odometer_state *s, double wheel
 
 static size_t make(void *self, const void *parameters) {
   *(odometer_parameters *)self = *(const odometer_parameters *)parameters;
-  return odometer_check(self) == 0 ? 3 : 0;
+  return 3;
 }
 
 static void start(const void *self, sensor_memory *memory, const sensing *s) {

@@ -31,9 +31,6 @@ typedef struct {
   double distance;                /* travelled by the estimate, m */
 } odometer_state;
 
-/* 0, or -1: a number is not finite, a length or factor not positive, a spread or rate negative, or an unknown rule. */
-int odometer_check(const odometer_parameters *parameters);
-
 /* The estimate becomes this pose, the wheels' angles its reference: once, before the start. */
 void odometer_calibrate(odometer_state *state, double x, double y, double heading, double wheel_left,
                         double wheel_right);

@@ -36,7 +36,8 @@ typedef struct sensor_kind {
   size_t size;    /* bytes of a made sensor */
   size_t numbers; /* that it keeps */
 
-  /* Makes it; returns how many readings it gives, or 0: its parameters are not as its header says. */
+  /* Makes it of parameters within the ranges of its file in sim_bridge/devices, which the caller has checked; returns
+   * how many readings it gives, or 0: they do not fit together. */
   size_t (*make)(void *self, const void *parameters);
 
   /* NULL where there is nothing to do. */

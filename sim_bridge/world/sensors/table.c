@@ -17,8 +17,7 @@ static size_t make(void *self, const void *parameters) {
   t->table = p->table;
   t->reach = p->reach;
   t->none = p->none;
-  if (beam_init(&t->beam, &p->beam) || p->table == NULL) return 0;
-  return p->reach > 0.0 && isfinite(p->reach) && isfinite(p->none);
+  return beam_init(&t->beam, &p->beam) == 0;
 }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {

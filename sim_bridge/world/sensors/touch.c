@@ -11,7 +11,7 @@ static double reach(const void *self) {
 static size_t make(void *self, const void *parameters) {
   const touch_parameters *p = parameters;
   *(touch_parameters *)self = *p;
-  return isfinite(p->root_x + p->root_y + p->tip_x + p->tip_y) && isfinite(reach(p));
+  return 1;
 }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
