@@ -41,13 +41,7 @@ class Chunks:
     """
 
     def __init__(
-        self,
-        session: BoardSession | VehicleSession,
-        news: Callable[[], Group],
-        result: Run,
-        number: int,
-        *,
-        title: str = "",
+        self, session: BoardSession | VehicleSession, news: Callable[[], Group], result: Run, number: int
     ) -> None:
         """
         Args:
@@ -55,11 +49,9 @@ class Chunks:
             news: gives the rows of its record that came since it was last called.
             result: what is known as the run begins.
             number: of the robot, from 1.
-            title: "": by the result.
         """
         self.content: dict[str, Any] | None = None
         self._session, self._news, self._result, self._number = session, news, result, number
-        self._title = title or f"{result.brain} on {result.robot.name} ({result.board})"
         self._reader = Reader(result)
         self._others: dict[str, Block] = {}  # of streams that are no columns, since the last chunk
         self._start: tuple[float, float, float] | None = None  # where the run began
@@ -71,6 +63,7 @@ class Chunks:
         news = self._news()
         if "clock" in news:
             self._reader.offset_s = Record.of({"clock": news["clock"]}).clock_offset
+            self._result = replace(self._result, clock_offset=self._reader.offset_s)
         self._reader.feed(news)
         for name in OTHERS & news.keys():
             self._others[name] = joined(self._others.get(name), news[name])
@@ -142,23 +135,9 @@ class Chunks:
 
     def _content(self, view: scene.View) -> dict[str, Any]:
         result = self._result
-        return page_data.robot_data(
-            result.robot,
-            view.columns,
-            number=self._number,
-            title=self._title,
-            brain=result.brain,
-            begin=self._reader.offset_s,
-            known=self._result.world is not None,
-            has_estimate=view.estimate is not None,
-            table={
-                "robot": result.robot.name,
-                "arena": result.world.name if result.world else None,
-                "seed": result.seed,
-            },
-            names=result.brain_names,
-            cognitive=self._cognitive(),
-        )
+        arena = result.world.name if result.world else None
+        table = {"robot": result.robot.name, "arena": arena, "seed": result.seed}
+        return page_data.robot_data(result, view, self._number, table=table, cognitive=self._cognitive())
 
 
 def load(before: Mapping[str, float], now: Mapping[str, float]) -> float | None:

@@ -111,8 +111,7 @@ class ServedView:
         """See `boebot.boards.Server`."""
         if self._source is None or self._chunks is None:
             self._source = ReadAlong(session)
-            title = f"{self._request.robot.name} ({self._kind}), served"
-            self._chunks = Chunks(session, self._source.news, self._result(session), 1, title=title)
+            self._chunks = Chunks(session, self._source.news, self._result(session), 1)
         self._source.hear(data)
         rows = self._chunks.make()
         if rows is None:

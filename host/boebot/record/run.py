@@ -113,11 +113,16 @@ class Run:
         """One line; the figures are in `table()`, everything else in the attributes."""
         return f"<{type(self).__name__}: {self.summary()}>"
 
+    @property
+    def title(self) -> str:
+        """Who, on what."""
+        return f"{self.brain} on {self.robot.name} ({self.board})"
+
     def summary(self) -> str:
         """The run in one line: who, where, how long, how far, how it ended."""
         where = self.table()["arena"]
         parts = [
-            f"{self.brain} on {self.robot.name} ({self.board})" + (f" in {where}" if where else ""),
+            self.title + (f" in {where}" if where else ""),
             f"{self.run_time:.1f} s",
             *self.way_in_words(),
             f"seed {self.seed}",

@@ -44,8 +44,9 @@ if TYPE_CHECKING:
     from boebot.arenas.floor_plan import FloorPlan, Moving
     from boebot.devices.device import Readout
     from boebot.record.blocks import Block
-    from boebot.record.brain_record import BrainNames, BrainRecord, Layer, Shown
+    from boebot.record.brain_record import BrainRecord, Layer, Shown
     from boebot.record.columns import Columns
+    from boebot.record.run import Run
     from boebot.record.truth import Bools, Floats, Pose
 
 FORMAT = 10
@@ -90,45 +91,39 @@ def plan_data(plan: FloorPlan) -> dict[str, Any]:
 
 
 def robot_data(
-    robot: robots.RobotDescription,
-    series: Columns,
-    *,
+    result: Run,
+    view: scene.View,
     number: int,
-    title: str,
-    brain: str,
-    begin: float,
-    known: bool,
-    has_estimate: bool,
-    table: dict[str, Any],
+    *,
+    table: Mapping[str, Any],
     way: Sequence[str] = (),
-    names: BrainNames | None = None,
     cognitive: Sequence[str] = (),
 ) -> dict[str, Any]:
     """What the page knows of a robot from the start.
 
     Args:
-        series: any of its ticks, even none: which readings and sweeps it has.
+        result: its run, of whose record nothing is read.
+        view: any of its ticks, even none: which readings and sweeps it has.
         number: of the robot in the run, from 1.
-        title, brain, table, way: as `RunResult` has them.
-        begin: the transport's clock at the run's time 0 (s).
-        known: its true pose is known. has_estimate: so is its odometry, as it lies in the arena.
-        names: what a brain of processes is made of. cognitive: those of its cognitive processes that are drawn.
+        table, way: as `Run` has them.
+        cognitive: those of its brain's cognitive processes that are drawn.
     """
+    series, names = view.columns, result.brain_names
     mind = names and {
         "behaviors": [{"name": name, "colour": style.behavior(index)} for index, name in enumerate(names.behaviors)],
         "cognitive": [{"name": name} for name in cognitive],
     }
     return {
-        "title": title,
-        "brain": brain,
-        "begin": begin,
-        "known": known,
+        "title": result.title,
+        "brain": result.brain,
+        "begin": result.clock_offset,
+        "known": view.known,
         "table": table,
         "way": list(way),
-        "robot": _robot(robot),
+        "robot": _robot(result.robot),
         "colour": style.colour(number),
         "cell": style.CELL,
-        "has_estimate": has_estimate,
+        "has_estimate": view.estimate is not None,
         "readings": [_reading(readout) for readout in series.readouts()],
         "signs": [{"device": device, "colour": colour} for device, colour, _ in series.signs()],
         "mind": mind,

@@ -141,7 +141,7 @@ def _draw_marks(axes: Axes, view: scene.View) -> None:
 
 def _title(result: Run, view: scene.View) -> str:
     where = f" in {view.plan.name}" if view.known else ""
-    return f"{result.brain} on {result.robot.name} ({result.board}){where}"
+    return result.title + where
 
 
 def _caption(result: Run) -> list[str]:

@@ -70,22 +70,9 @@ def content(results: Sequence[Run]) -> dict[str, Any]:
 
 def run_data(result: Run, view: scene.View, number: int = 1, room: int | None = None) -> dict[str, Any]:
     """What the page shows of one robot, with its whole run. `number`: of the robot, from 1; `room`: of its sweeps."""
-    brain = view.brain
-    cognitive = () if brain is None else scene.shown_cognitive(brain)
-    about = page_data.robot_data(
-        result.robot,
-        view.columns,
-        number=number,
-        title=f"{result.brain} on {result.robot.name} ({result.board})",
-        brain=result.brain,
-        begin=result.clock_offset,
-        known=view.known,
-        has_estimate=view.estimate is not None,
-        table=result.table(),
-        way=result.way_in_words(),
-        names=None if brain is None else result.brain_names,
-        cognitive=cognitive,
-    )
+    cognitive = () if view.brain is None else scene.shown_cognitive(view.brain)
+    table, way = result.table(), result.way_in_words()
+    about = page_data.robot_data(result, view, number, table=table, way=way, cognitive=cognitive)
     deeds = [(time_s, "intervention", in_words(data)) for time_s, data in result.record.rows(STREAM)]
     rows = page_data.rows_data(
         view,

@@ -47,27 +47,29 @@ function zoomTime(factor, about = now) {
 }
 
 // ---- drawing them ----
-// Where each lane is, in pixels of the canvas.
-function laneBoxes() {
+// Where time runs on both canvases, and where a moment is, in their pixels.
+function timeField() {
   const [from, to] = span(),
     left = GUTTER * ratio,
     right = $("tracks").width - RIGHT * ratio,
     width = right - left;
+  return { from, to, left, right, width, px: t => left + ((t - from) / (to - from)) * width };
+}
+function laneBoxes() {
+  const field = timeField();
   let top = AXIS * ratio;
   return lanes.map(lane => {
     const height = lane.height * ratio,
-      px = t => left + ((t - from) / (to - from)) * width;
-    const box = { lane, top, height, middle: top + height / 2, left, right, width, from, to, px };
+      box = { ...field, lane, top, height, middle: top + height / 2 };
     top += height;
     return box;
   });
 }
-const timeOfPixel = offsetX => {
-  // of the pointer
-  const [from, to] = span(),
-    width = $("cursor").clientWidth - GUTTER - RIGHT;
-  return from + ((offsetX - GUTTER) / width) * (to - from);
-};
+// Of the pointer.
+function timeOfPixel(offsetX) {
+  const { from, to, left, width } = timeField();
+  return from + ((offsetX * ratio - left) / width) * (to - from);
+}
 function drawTracks() {
   const canvas = $("tracks"),
     c = canvas.getContext("2d");
@@ -101,14 +103,15 @@ function drawTracks() {
   }
   tracksDirty = false;
 }
-function rule(c, from, to, y) {
-  c.strokeStyle = colours.grid;
-  c.lineWidth = ratio;
+function straight(c, colour, wide, x0, y0, x1, y1) {
+  c.strokeStyle = colour;
+  c.lineWidth = wide * ratio;
   c.beginPath();
-  c.moveTo(from, y);
-  c.lineTo(to, y);
+  c.moveTo(x0, y0);
+  c.lineTo(x1, y1);
   c.stroke();
 }
+const rule = (c, from, to, y) => straight(c, colours.grid, 1, from, y, to, y);
 const laneY = (box, [low, high], value) =>
   box.top + box.height * (high > low ? 0.92 - (0.84 * (value - low)) / (high - low) : 0.5);
 // Where values are many for a pixel, from the least to the greatest of some; with a gap where none is known.
@@ -171,24 +174,16 @@ const TIME_STEPS = [1, 2, 5]
   .flatMap(k => [-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5].map(e => k * 10 ** e))
   .sort((a, b) => a - b);
 function drawAxis(c) {
-  const [from, to] = span(),
-    left = GUTTER * ratio,
-    right = $("tracks").width - RIGHT * ratio,
-    width = right - left;
-  const step = TIME_STEPS.find(one => (one / (to - from)) * width >= 62 * ratio) || 1e6,
+  const { from, to, right, width, px } = timeField(),
+    step = TIME_STEPS.find(one => (one / (to - from)) * width >= 62 * ratio) || 1e6,
     digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   font(c, 11);
   c.textBaseline = "middle";
   c.textAlign = "center";
-  c.lineWidth = ratio;
   c.fillStyle = colours.faint;
-  c.strokeStyle = colours.grid;
   for (let k = Math.ceil(from / step - 1e-9); k * step <= to; k++) {
-    const x = left + ((k * step - from) / (to - from)) * width;
-    c.beginPath();
-    c.moveTo(x, AXIS * ratio - 4 * ratio);
-    c.lineTo(x, $("tracks").height);
-    c.stroke();
+    const x = px(k * step);
+    straight(c, colours.grid, 1, x, (AXIS - 4) * ratio, x, $("tracks").height);
     if (x < right - 12 * ratio) c.fillText((k * step).toFixed(digits), x, (AXIS * ratio) / 2);
   }
   c.textAlign = "left";
@@ -197,21 +192,13 @@ function drawAxis(c) {
 // ---- the cursor, above them ----
 let hoverTime = null;
 function drawCursor() {
-  const canvas = $("cursor"),
-    c = canvas.getContext("2d"),
-    [from, to] = span(),
-    left = GUTTER * ratio,
-    width = canvas.width - (GUTTER + RIGHT) * ratio;
-  c.clearRect(0, 0, canvas.width, canvas.height);
+  const { width, height } = $("cursor"),
+    c = $("cursor").getContext("2d"),
+    { left, right, px } = timeField();
+  c.clearRect(0, 0, width, height);
   const upright = (t, colour, wide) => {
-    const x = left + ((t - from) / (to - from)) * width;
-    if (x < left - 1 || x > left + width + 1) return;
-    c.strokeStyle = colour;
-    c.lineWidth = wide * ratio;
-    c.beginPath();
-    c.moveTo(x, 0);
-    c.lineTo(x, canvas.height);
-    c.stroke();
+    const x = px(t);
+    if (x >= left - 1 && x <= right + 1) straight(c, colour, wide, x, 0, x, height);
   };
   if (hoverTime !== null) upright(hoverTime, colours.faint, 1);
   upright(now, colours.ink, 1.6);
@@ -270,8 +257,14 @@ function makeLanes() {
         at: t => pingText(tickAt(t)),
       }),
     );
-  for (const group of new Set(run.signs.map(groupOf))) lanes.push(signsLane(group));
-  if (run.known) lanes.push(flagLane("true contact", [["contact", "contact"]]));
+  for (const group of new Set(run.signs.map(groupOf)))
+    lanes.push(
+      flagLane(
+        group,
+        run.signs.filter(sign => groupOf(sign) === group),
+      ),
+    );
+  if (run.known) lanes.push(flagLane("true contact", [{ device: "contact", colour: "contact" }]));
   if (run.load)
     lanes.push(
       numberLane("load of tick", ticks, i => Math.min(1, run.load.values[i]), {
@@ -308,19 +301,12 @@ function numberLane(name, times, value, { colour, range, scale, at }) {
 }
 // The signs of left and right are in one lane.
 const groupOf = ({ device }) => device.replace(/_(left|right)$/, "");
-function signsLane(group) {
-  const own = run.signs.filter(sign => groupOf(sign) === group);
-  return flagLane(
-    group,
-    own.map(({ device, colour }) => [device, colour]),
-  );
-}
 function flagLane(name, flags) {
   const tall = 0.6 / flags.length;
   return {
     name,
     height: 19,
-    blocks: flags.map(([device, colour], k) => ({
+    blocks: flags.map(({ device, colour }, k) => ({
       times: ticks,
       colour: i => (run.isOn(device, i) ? colourOf(colour) : null),
       at: (k + 0.5) / flags.length - tall / 2,
@@ -328,8 +314,8 @@ function flagLane(name, flags) {
     })),
     at: t =>
       flags
-        .filter(([device]) => run.isOn(device, tickAt(t)))
-        .map(([device]) => device.replace(name + "_", ""))
+        .filter(({ device }) => run.isOn(device, tickAt(t)))
+        .map(({ device }) => device.replace(name + "_", ""))
         .join(" and ") || "none",
   };
 }
