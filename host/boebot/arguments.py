@@ -22,14 +22,19 @@ def plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else shown(value)
 
 
+def real(value: Any) -> float:
+    """The number, also numpy's, as a float; NaN: it is none, or too large for one."""
+    try:
+        return float(value) if isinstance(value, Real) else math.nan
+    except OverflowError:  # a whole number of hundreds of digits
+        return math.nan
+
+
 def number(
     what: str, value: Any, error: type[BoebotError], *, least: float = -math.inf, most: float = math.inf
 ) -> float:
     """A finite number from `least` to `most`, else raises `error`; `what` names it."""
-    try:
-        taken = float(value) if isinstance(value, Real) else math.nan
-    except OverflowError:  # a whole number of hundreds of digits
-        taken = math.inf
+    taken = real(value)
     if math.isfinite(taken) and least <= taken <= most:
         return taken
     raise error(f"{what} is {shown(value)}; expected a finite number{_range(least, most)}")

@@ -324,11 +324,6 @@ def open_board(url: str, request: BoardRequest) -> BoardSession:
     return cast(BoardSession, open_world(url, [request]).sessions[0])
 
 
-def open_vehicle(url: str, request: BoardRequest) -> VehicleSession:
-    """The same of a robot without a board."""
-    return cast(VehicleSession, open_world(url, [request]).sessions[0])
-
-
 def check_board(url: str, robot: RobotDescription) -> None:
     """Refuses to run a robot without a board on one, and one with a board without.
 

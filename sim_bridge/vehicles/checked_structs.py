@@ -7,12 +7,11 @@ must be. Every message says where, which key, what it was and what was expected.
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from boebot.arguments import shown
+from boebot.arguments import real, shown
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
 
@@ -77,12 +76,7 @@ RANGES: Final[Mapping[str, Mapping[str, Range]]] = {
 
 def number(where: str, key: str, value: Any, allowed: Range = FINITE, whole: bool = False) -> float:
     """`value` as a float within `allowed`; raises RobotError if it is none."""
-    found = math.nan
-    if isinstance(value, numbers.Real):  # also numpy's
-        try:
-            found = float(value)
-        except (OverflowError, ValueError, TypeError):
-            found = math.nan
+    found = real(value)
     if not math.isfinite(found) or found not in allowed or (whole and not found.is_integer()):
         raise RobotError(f"{where}: {key} is {shown(value)}; expected {allowed.text(whole)}")
     return found

@@ -13,16 +13,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from boebot.errors import BrainError
 from boebot.navigation.frames import Point
-
-if TYPE_CHECKING:
-    from boebot.navigation.line_map import LineMap
 
 Floats = NDArray[np.float64]
 _TURNS = 50  # of Newton's method
@@ -136,17 +132,6 @@ def check_goal(field: PotentialField, goal: Point, tolerance: float) -> None:
             f"the field's goal is at ({goal[0]:g}, {goal[1]:g}), but {where}; expected {tolerance / 2:g} m at most: "
             "a wider goal, or lower and narrower hills beside it"
         )
-
-
-def of_walls(plan: LineMap, radius: float, alpha: float = 0.4) -> list[Potential]:
-    """A hill for each line of a map: β half its length and a fifth more, γ the robot's radius (m) and 0.2 m."""
-    found = []
-    for (ax, ay), (bx, by) in plan.segments.tolist():
-        length = math.hypot(bx - ax, by - ay)
-        if length > 0:
-            middle, heading = ((ax + bx) / 2, (ay + by) / 2), math.atan2(by - ay, bx - ax)
-            found.append(Potential(*middle, alpha, max(length / 2 * 1.2, radius + 0.2), radius + 0.2, heading))
-    return found
 
 
 def waypoints(path: Sequence[Point], alpha: float = -1.2, width: float = 0.6) -> list[Potential]:

@@ -12,7 +12,7 @@ from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
 from boebot.navigation import FollowField, Lattice, LineMap, LockDetector, Potential, PotentialField
-from boebot.navigation.potential_field import check_goal, of_walls, waypoints
+from boebot.navigation.potential_field import check_goal, waypoints
 from boebot_course.experiments.potential_fields import WEDGE
 
 GOAL = Potential(-1.3, 1.3, -1.0, 3.0, 3.0)
@@ -48,12 +48,7 @@ def test_goal_that_hills_push_away_is_refused() -> None:
         Potential(0, 0, 1, 0, 1)
 
 
-def test_walls_of_a_map_are_hills() -> None:
-    plan = LineMap.from_lines([[(0, 0), (2, 2)]])
-    (hill,) = of_walls(plan, 0.15)
-    assert (hill.x, hill.y, hill.alpha) == (1.0, 1.0, 0.4)
-    assert hill.heading == pytest.approx(math.pi / 4)
-    assert (hill.beta, hill.gamma) == pytest.approx((1.2 * math.sqrt(2), 0.35))
+def test_corners_of_a_path_are_valleys() -> None:
     assert [(one.x, one.y) for one in waypoints([(0, 0), (1, 0), (1, 1), (2, 1)])] == [(1, 0), (1, 1)]
 
 

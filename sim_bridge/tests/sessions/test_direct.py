@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import cast
 
 import msgspec
 import numpy as np
 import pytest
 
 import boebot
-from boebot.boards import BoardRequest, open_board, open_vehicle
+from boebot.boards import BoardRequest, VehicleSession, open_board, open_world
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.accelerometer import Accelerometer
 from boebot.devices.compass import HeadingCompass
@@ -85,7 +86,7 @@ def test_infrared_reads_the_notes_values_at_a_wall() -> None:
     """Straight at a flat wall from 0.30 m: 0.411 by (3.12) to (3.14)."""
     ahead = InfraredProximity(position_m=(0.2, 0.0), heading_rad=0.0)
     request = BoardRequest(robot=changed(infrared_left=ahead), arena="arsim", noise=False, pose=(1.3, 0.0, 0.0))
-    session = open_vehicle("direct", request)
+    session = cast(VehicleSession, open_world("direct", [request]).sessions[0])
     values = session.readings()
     assert values[session.layout["infrared_left"].start] == pytest.approx(0.411, abs=0.001)
 
