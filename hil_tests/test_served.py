@@ -68,7 +68,9 @@ def test_served_board_answers_no_sooner_than_it_was_asked(native_pty: str) -> No
 
 
 @pytest.mark.parametrize(
-    ("board", "where"), [("avr", ("--pty",)), ("native", ("--tcp", "0"))], ids=["avr-pty", "native-tcp"]
+    ("board", "where"),
+    [("avr", ("--pty",)), pytest.param("native", ("--tcp", "0"), marks=pytest.mark.soak)],
+    ids=["avr-pty", "native-tcp"],
 )
 def test_brain_drives_a_served_robot(board: str, where: tuple[str, ...], tmp_path: Path) -> None:
     with served(board, *where) as (url, _):

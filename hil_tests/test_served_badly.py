@@ -72,6 +72,7 @@ def drives(server: Server) -> None:
     assert json.loads(done.stdout)["reset_cause"] == "external"
 
 
+@pytest.mark.soak
 def test_after_a_megabyte_of_noise_the_next_clients_drive(tcp: Server) -> None:
     with tcp.client() as noisy:
         noisy.sendall(NOISE)

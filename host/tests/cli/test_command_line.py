@@ -801,6 +801,7 @@ def test_teleop_in_a_terminal(tmp_path: Path) -> None:
 
 
 @pytest.mark.wall_clock
+@pytest.mark.soak
 def test_teleop_prints_json_alone(tmp_path: Path) -> None:
     with pty(Peer()) as served, teleop_at(served, "--json", "--out", str(tmp_path)) as (keyboard, process):
         os.write(keyboard, b"q")
