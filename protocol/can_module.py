@@ -8,14 +8,12 @@ import schema
 
 def can_module(spec: schema.Schema) -> str:
     """host/boebot_can/layout.py"""
-    names = ("ROUND", "SESSION", "SEQUENCE", "TIME_TO_LIVE", "PART")
     doc = "Which bytes of a message stand in which CAN frame, from protocol/messages.toml by protocol/can_layout.py."
     lines = [
         *schema.python_head(doc),
         "",
         "from typing import NamedTuple",
         "",
-        *(f"{name} = {getattr(can_layout, name)}" for name in names),
         f"NODE_SHIFT = {can_layout.NODE_SHIFT}",
         f"TIME_TO_LIVE_MS = {can_layout.TIME_TO_LIVE_MS}  # one count of a set-point's time to live",
         f"ISO_TP_TO_BOARD = 0x{can_layout.ISO_TP_IDS['to_board']:03X}",

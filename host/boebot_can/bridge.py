@@ -91,7 +91,7 @@ class Bridge:
         """Carries what has come, both ways."""
         data = self.transport.read(STEP_S)
         if data:
-            self._heard |= bool(frames := self._end.from_board(data))
+            self._heard |= bool(frames := self._end.frames(data))
             for frame in frames:
                 self._send(frame)
         for frame in self.bus.receive(0.0):

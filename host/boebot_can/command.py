@@ -13,6 +13,7 @@ import typer
 from boebot.boards import BoardRequest, is_live, open_board
 from boebot.cli import options, output
 from boebot.description.robots import load_robot
+from boebot.record.run_folder import write_whole
 from boebot_can import COMMAND, database
 from boebot_can.bridge import Bridge
 from boebot_can.bus import Bus, BusName, PythonCanBus
@@ -131,7 +132,7 @@ def dbc(
     if out is None:
         output.line(text.rstrip("\n"))
     else:
-        database.write(out, text)
+        write_whole(out, lambda part: part.write_text(text, "utf-8"))
         if json:
             output.print_json({"file": str(out), "node": node})
         else:

@@ -24,18 +24,6 @@ def of_node(node: int) -> str:
     return re.sub(r"\b(BO_|SG_|VAL_) (\d+)\b", lambda found: f"{found[1]} {int(found[2]) + shift}", text)
 
 
-def write(path: Path, text: str) -> None:
-    """Writes a database.
-
-    Raises:
-        BoebotError: it cannot be written there.
-    """
-    try:
-        path.write_text(text, "utf-8")
-    except OSError as error:
-        raise BoebotError(f"{path} cannot be written: {(error.strerror or str(error)).lower()}") from None
-
-
 def check(path: Path) -> int:
     """How many frames a database has that fits this version's messages.
 

@@ -77,9 +77,9 @@ def frames_of(result: Run, node: int = 1) -> Iterator[Sent]:
     begin_s = last_s = None
     for read_s, to_board, data in rows:
         if to_board:
-            pending = deque(Sent(read_s, frame) for frame in host.from_link(data))
+            pending = deque(Sent(read_s, frame) for frame in host.frames(data))
         else:
-            pending = deque(sending.stamped(board.from_board(data), read_s))
+            pending = deque(sending.stamped(board.frames(data), read_s))
         while pending or waiting:
             pending.extend(Sent(read_s, frame) for frame in waiting)
             waiting.clear()

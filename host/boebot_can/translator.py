@@ -54,8 +54,8 @@ class _End(ABC):
         self.stale += len(frames) - len(kept)
         return kept
 
-    def _frames(self, data: bytes) -> list[CanFrame]:
-        """The messages in some bytes as CAN frames."""
+    def frames(self, data: bytes) -> list[CanFrame]:
+        """CAN frames of what this end's side of the line has sent."""
         found: list[CanFrame] = []
         for piece in _UP_TO_DELIMITER.findall(data):  # one at a time: a hello tells the session of what follows
             for message_id, sequence, payload in self._decoder.feed(piece):
@@ -102,10 +102,6 @@ class BoardEnd(_End):
         super().__init__(node, send_long, to_board=True)
         self.newest_tick = 0
 
-    def from_board(self, data: bytes) -> list[CanFrame]:
-        """CAN frames of what the board has sent."""
-        return self._frames(data)
-
     def to_board(self, frame: CanFrame) -> bytes:
         """Bytes for the board, once `frame` completes a message of the present session; else none.
 
@@ -147,10 +143,6 @@ class HostEnd(_End):
         super().__init__(node, send_long, to_board=False)
         self.is_open = False
         self._lost = 0
-
-    def from_link(self, data: bytes) -> list[CanFrame]:
-        """CAN frames of what the link sends."""
-        return self._frames(data)
 
     def to_link(self, frame: CanFrame) -> bytes:
         """Bytes for the link, once `frame` completes a message of its session; else none.

@@ -77,7 +77,7 @@ class CanTransport:
         """Sends bytes of the link, as frames."""
         if self._closed:
             raise BoardError(f"{self.name} is closed")
-        frames = self._end.from_link(data)
+        frames = self._end.frames(data)
         self._send(self._end.fresh(frames) if self._bus.is_behind else frames)
 
     def now(self) -> float:

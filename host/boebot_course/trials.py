@@ -6,7 +6,7 @@ Not an experiment itself. Robots and arenas made for one experiment are those of
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan
-from boebot.brain import Brain
+from boebot.brain import Brain, CognitiveProcess
 from boebot.description.robots import RobotDescription
 from boebot.record.brain_record import BrainRecord
 from boebot.record.truth import Pose, truth_at
 from boebot.result import RunResult
+from boebot.robot import Robot
 from boebot.running.runner import run
 from boebot_course.experiment import Floats
 
@@ -99,6 +100,19 @@ class Trial:
         active = record.motor == record.names.behaviors.index(process)
         last = np.searchsorted(record.time, self.time, side="right") - 1
         return np.asarray(active[np.clip(last, 0, len(record) - 1)])
+
+
+@dataclass(kw_only=True)
+class Log(CognitiveProcess):
+    """Keeps what `read` gives in each of its steps, in `rows`."""
+
+    read: Callable[[CognitiveProcess, Robot], Any]
+
+    def forget(self) -> None:
+        self.rows: list[Any] = []
+
+    def step(self, robot: Robot) -> None:
+        self.rows.append(self.read(self, robot))
 
 
 def trial_seeds(seed: int, count: int) -> range:

@@ -36,13 +36,13 @@ class CanLine:
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         data = self._board.read(wait_s, quiet_s)
-        found = b"".join(self.host_end.to_link(frame) for frame in self._over(self.board_end.from_board(data)))
+        found = b"".join(self.host_end.to_link(frame) for frame in self._over(self.board_end.frames(data)))
         found += b"".join(self.host_end.long_bytes(data) for data in self._to_host)
         self._to_host.clear()
         return found
 
     def write(self, data: bytes) -> None:
-        for frame in self._over(self.host_end.from_link(data)):
+        for frame in self._over(self.host_end.frames(data)):
             if arrived := self.board_end.to_board(frame):
                 self._board.write(arrived)
 

@@ -15,37 +15,18 @@ from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import Homing, Wander
-from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
+from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
 from boebot.cognition import Odometry, PathIntegration
 from boebot.description.robots import RobotDescription
 from boebot.devices.compass import TESLA_PER_COUNT
 from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Variant, experiment
-from boebot_course.trials import PER_SEED, decisions, true_pose
+from boebot_course.trials import PER_SEED, Log, decisions, true_pose
 from boebot_course.variants import varied
 
 PERIOD = 0.02  # s
 SIGNAL = 0.9  # motor signal out and home
 SECONDS = 285.0  # 200 m out take some 225 s, the way home 30 s at most
-
-
-@dataclass(kw_only=True)
-class HomeVectorLog(CognitiveProcess):
-    """Keeps what the brain's PathIntegration came to, step by step.
-
-    Attributes:
-        rows: (time in s, h in m).
-    """
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.rows: list[tuple[float, float, float]] = []
-
-    def enter(self, robot: Robot) -> None:
-        self.rows.clear()
-
-    def step(self, robot: Robot) -> None:
-        self.rows.append((robot.time, *self.other(PathIntegration).vector))
 
 
 @dataclass(frozen=True)
@@ -85,7 +66,8 @@ class Journey:
 
 def journey(robot: RobotDescription, way: float, seconds: float, seed: int) -> Journey:
     """One journey with a way out of that length (m), on that robot."""
-    path, log = PathIntegration(), HomeVectorLog()
+    path = PathIntegration()
+    log = Log(read=lambda _, robot: (robot.time, *path.vector))
     homing = Homing(signal=SIGNAL, utility=Utility(b=-1.0, w={"food": 4.0}))
     wander = Wander(forward=SIGNAL, utility=Utility(b=0.5))
     food = StateVariable("food", lambda robot: float(path.travelled >= way))

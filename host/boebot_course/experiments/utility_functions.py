@@ -19,7 +19,7 @@ from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, 
 from boebot.brain.utility import Utilities
 from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
-from boebot_course.trials import decisions
+from boebot_course.trials import Log, decisions
 
 
 def advanced(functions: list[Utility], variables: dict[str, Floats], step: float) -> Floats:
@@ -224,18 +224,6 @@ class Hold(MotorBehavior):
         robot.drive(self.signal, -self.signal)
 
 
-@dataclass(kw_only=True)
-class Note(CognitiveProcess):
-    """Notes the times at which it is active."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.times: list[float] = []
-
-    def step(self, robot: Robot) -> None:
-        self.times.append(robot.time)
-
-
 RISE, FALL = 1.0, 4.0  # s
 
 
@@ -251,8 +239,12 @@ def activation(seed: int) -> Outcome:
     Expected: The best motor behavior drives, cognitive ones run while u > 0: by (8.4) 0.142 s and 0.292 s late.
     """
     motor = [Hold(name=f"m{i}", signal=i / 10, utility=Utility(b=i / 10, w={"z": 0.3 - i / 5})) for i in range(3)]
-    delayed = Note(name="delayed", utility=Utility(b=-0.5, w={"z": 1.5}, tau=TAU))
-    notes = [delayed, Note(name="always"), Note(name="never", utility=Utility(b=-0.2))]
+
+    def when(_: CognitiveProcess, robot: Robot) -> float:
+        return robot.time
+
+    delayed = Log(name="delayed", read=when, utility=Utility(b=-0.5, w={"z": 1.5}, tau=TAU))
+    notes = [delayed, Log(name="always", read=when), Log(name="never", read=when, utility=Utility(b=-0.2))]
     z = StateVariable("z", lambda robot: float(RISE - 1e-9 <= robot.time < FALL - 1e-9))
     brain = Brain([*motor, *notes], [z], period=0.01)
     result = boebot.run(brain, robot="arsim", arena="empty", seconds=6, seed=seed)
@@ -260,9 +252,9 @@ def activation(seed: int) -> Outcome:
     times, utilities = record.time, record.utilities
     best = utilities[:, :3].argmax(axis=1)
     driving = np.array([round(left * 10) for _, _, left, _ in result.record.steps])
-    stepped = np.stack([np.isin(times, note.times) for note in notes], axis=1)
+    stepped = np.stack([np.isin(times, note.rows) for note in notes], axis=1)
     disagree = int((stepped != (utilities[:, 3:] > 0)).sum())
-    first, last = (delayed.times[0], delayed.times[-1]) if delayed.times else (math.nan, math.nan)
+    first, last = (delayed.rows[0], delayed.rows[-1]) if delayed.rows else (math.nan, math.nan)
     low, high = math.tanh(-0.5), math.tanh(1.0)
     on, off = 0.3 * math.log((high - low) / high), 0.3 * math.log((high - low) / -low)
     measured = [
