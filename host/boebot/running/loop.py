@@ -263,10 +263,17 @@ class _Robot:
             raise
 
     def keep_due(self) -> None:
-        """Hands what has happened over to be kept, where it is time."""
+        """Hands what has happened over to be kept, where it is time. Rows on their way are not lost by Ctrl-C.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C.
+        """
         if self.task.record.is_due() and self.driver is not None and not self._is_ending:
-            gather_rows(self.driver, self.task)
-            self.task.record.keep(self.time_s)
+            with interrupts.held():
+                gather_rows(self.driver, self.task)
+                self.task.record.keep(self.time_s)
+            if interrupts.first is not None:
+                raise KeyboardInterrupt
 
     def stop(self, error: BoebotError) -> None:
         """Begins to end it, if it has not ended."""

@@ -18,9 +18,12 @@ import pytest
 
 from boebot.boards import BoardRequest, BoardSession, board_kinds, find_server
 from boebot.description.robots import load_robot
+from boebot.record.blocks import Group
 from boebot.record.reading import CutError
+from boebot.record.record import Record
 from boebot.result import RunResult, read_run
-from boebot.running import interrupts
+from boebot.running import interrupts, loop
+from boebot.running.tasks import Request
 from command import heed_signals
 
 pytestmark = [
@@ -124,6 +127,21 @@ def test_a_first_one_is_noted_while_the_run_ends_anyway(monkeypatch: pytest.Monk
     with interrupts.held():
         interrupts.interrupt(signal.SIGHUP, None)
     assert interrupts.exit_code() == 129
+
+
+def test_rows_on_their_way_to_the_record_are_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    put, is_due = Record.put, Record.is_due
+
+    def interrupted(record: Record, group: Group) -> None:
+        if interrupts.first is None:
+            os.kill(os.getpid(), signal.SIGINT)
+        put(record, group)
+
+    monkeypatch.setattr(Record, "put", interrupted)
+    monkeypatch.setattr(Record, "is_due", lambda record: is_due(record) or record.count("command") == 20)
+    result = loop.execute(Request.single(seconds=60))
+    assert isinstance(result.error, KeyboardInterrupt)
+    assert result.steps == 20 and result.true_distance is not None
 
 
 class Watched:
