@@ -113,10 +113,10 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
     Raises:
         BoebotError: some are outside their criteria, or the files cannot be written.
     """
-    from boebot import view
+    from boebot.record.run_folder import make_folder
     from boebot_course import output_files, pages, running
 
-    view.make_folder(out)
+    make_folder(out)
     by_name: dict[str, Verdict] = {}
     files: list[Path] = []
     with (

@@ -99,8 +99,8 @@ def timing(
     json: options.Json = False,
 ) -> None:
     """See `_HELP`."""
-    from boebot import view
     from boebot.description.robots import load_robot
+    from boebot.record.run_folder import make_folder
     from boebot.running.tasks import DEFAULT_PERIOD
     from boebot_timing import board, budget, loads, realisable
 
@@ -115,7 +115,7 @@ def timing(
         description = load_robot(robot)
         asked = loads.load_named(load)
         if out is not None:
-            view.make_folder(out)
+            make_folder(out)
         image = _image(elf, description)
         found = None
         if image is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import html
-import webbrowser
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -15,7 +14,7 @@ from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
 from boebot.result import Result
 from boebot.running.tasks import Request
-from boebot.view.display import has_display, kernel_shell
+from boebot.view.display import browse, published
 
 
 @contextlib.contextmanager
@@ -36,15 +35,10 @@ def opened(say: Callable[[str], None], *, port: int = 0, speed: float | None = 1
 def show(url: str, say: Callable[[str], None]) -> None:
     """Tells the address, and opens the page where there is a display. A notebook shows a link, for its kernel may run
     elsewhere."""
-    notebook = kernel_shell()
-    if notebook is not None:
-        link = f'<a href="{html.escape(url)}" target="_blank" rel="noopener">watch it drive</a>'
-        notebook.display_pub.publish({"text/html": link, "text/plain": f"watch it: {url}"})
-        return
-    say(url)
-    if has_display():
-        with contextlib.suppress(webbrowser.Error):
-            webbrowser.open(url)
+    link = f'<a href="{html.escape(url)}" target="_blank" rel="noopener">watch it drive</a>'
+    if not published(link, f"watch it: {url}"):
+        say(url)
+        browse(url)
 
 
 def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Any], *, waits: bool) -> Any:

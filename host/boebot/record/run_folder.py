@@ -50,9 +50,7 @@ class RunFolder:
         self._lock = -1
         try:
             self.path = path.absolute()  # a brain may change to another folder
-            path.mkdir(parents=True, exist_ok=True)
-            if not os.access(path, os.W_OK):
-                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            make_folder(path)
             self._lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             there = {entry.name for entry in path.iterdir()}
@@ -107,6 +105,20 @@ class RunFolder:
         return file
 
 
+def make_folder(folder: Path) -> None:
+    """Makes the folder of a run's files; called before the run too, so that no run is lost for want of one.
+
+    Raises:
+        BoebotError: it cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise unwritable(folder, error) from None
+
+
 def locked(path: Path | None) -> AbstractContextManager[RunFolder | None]:
     """That folder, while a run writes to it; None: none. Raises as `RunFolder`."""
     return nullcontext() if path is None else RunFolder(path)
@@ -117,8 +129,9 @@ def unfinished(path: Path) -> Path:
     return path.with_name(f".part-{path.name}")
 
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
-    """A file of a run, whole or not at all: `write` writes it to the path that it is given. Returns `path`.
+def write_whole(path: Path, write: Callable[[Path], object], what: str = "the run's files") -> Path:
+    """A file, whole or not at all: `write` writes it to the path that it is given. Returns `path`. `what`: it is one
+    of, as errors call it.
 
     Raises:
         BoebotError: the folder cannot be written to.
@@ -129,16 +142,16 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
         write(part)
         part.replace(path)
     except OSError as error:
-        raise unwritable(path.parent, error) from None
+        raise unwritable(path.parent, error, what) from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
     return path
 
 
-def unwritable(folder: Path, error: OSError) -> BoebotError:
-    """Why a run's files cannot be written."""
-    return BoebotError(f"the run's files cannot be written to {folder}: {error.strerror or error}")
+def unwritable(folder: Path, error: OSError, what: str = "the run's files") -> BoebotError:
+    """Why a run's files, or others, cannot be written."""
+    return BoebotError(f"{what} cannot be written to {folder}: {error.strerror or error}")
 
 
 def _is_of_robot(path: Path) -> bool:

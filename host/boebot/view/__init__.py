@@ -18,14 +18,12 @@ each.
 
 from __future__ import annotations
 
-import errno
-import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
-from boebot.record.run_folder import unwritable, write_whole
+from boebot.record.run_folder import make_folder, write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,20 +39,6 @@ class IncompleteError(BoebotError):
     def __init__(self, sentence: str, files: list[Path]) -> None:
         super().__init__(sentence)
         self.files = files
-
-
-def make_folder(folder: Path) -> None:
-    """Makes the folder of a run's files; called before the run too, so that no run is lost for want of one.
-
-    Raises:
-        BoebotError: it cannot be made or written to.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    except OSError as error:
-        raise unwritable(folder, error) from None
 
 
 def save(result: Run, folder: Path, *, csv: bool = False) -> list[Path]:
@@ -155,7 +139,7 @@ def _draw(folder: Path, files: dict[str, Write]) -> tuple[list[Path], list[str]]
 def _write_picture(result: Run, path: Path) -> None:
     from boebot.view import picture
 
-    picture.write(result, path)
+    picture.draw(result).save(path)
 
 
 def _write_page(results: Sequence[Run], path: Path) -> None:
@@ -167,4 +151,4 @@ def _write_page(results: Sequence[Run], path: Path) -> None:
 def _write_common_picture(robots: Sequence[Run], error: BaseException | None, path: Path) -> None:
     from boebot.view import picture
 
-    picture.write_together(robots, error, path)
+    picture.draw_together(robots, error).save(path)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
+import webbrowser
 from typing import Any
 
 
-def kernel_shell() -> Any:
-    """IPython's shell, where it is that of a kernel of Jupyter: a notebook shows what it publishes. Else None, as in a
-    terminal."""
+def published(html: str, plain: str) -> bool:
+    """Shown below the cell of a notebook, as HTML and in words; False: this is none, but a script or a terminal."""
     ipython = sys.modules.get("IPython")
-    shell = None if ipython is None else ipython.get_ipython()
-    return None if getattr(shell, "kernel", None) is None else shell
+    shell: Any = None if ipython is None else ipython.get_ipython()
+    if getattr(shell, "kernel", None) is None:
+        return False
+    shell.display_pub.publish({"text/html": html, "text/plain": plain})
+    return True
 
 
-def has_display() -> bool:
-    """A browser can show something; on Linux and the like the environment says so."""
-    return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")))
+def browse(address: str) -> None:
+    """Opens it in the browser, where one can show something; on Linux and the like the environment says so."""
+    variables = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    if sys.platform in ("win32", "darwin") or any(map(os.environ.get, variables)):
+        with contextlib.suppress(webbrowser.Error):
+            webbrowser.open(address)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import warnings
 import zlib
 from pathlib import Path
@@ -12,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from boebot.errors import BoebotError
+from boebot.record.run_folder import write_whole
 from boebot.view import style
 
 if TYPE_CHECKING:
@@ -44,18 +44,13 @@ def save(figure: Figure, path: Path, title: str) -> Path:
     FigureCanvasAgg(figure)
     kind = path.suffix.lower().removeprefix(".")
     metadata = {"Title": title, "Date": None} if kind == "svg" else {"Title": title}  # no date: the same bytes
-    part = path.with_name(f".part-{path.name}")
-    try:
-        with (
-            warnings.catch_warnings(),
-            mpl.rc_context({"svg.hashsalt": f"{zlib.crc32(title.encode()):08x}", "svg.fonttype": "none"}),
-        ):
-            warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box
-            figure.savefig(part, format=kind, facecolor=style.PAPER, metadata=metadata)
-        part.replace(path)
-    except OSError as error:
-        raise BoebotError(f"the picture cannot be written to {path}: {error.strerror or error}") from None
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
-    return path
+
+    def write(part: Path) -> None:
+        figure.savefig(part, format=kind, facecolor=style.PAPER, metadata=metadata)
+
+    with (
+        warnings.catch_warnings(),
+        mpl.rc_context({"svg.hashsalt": f"{zlib.crc32(title.encode()):08x}", "svg.fonttype": "none"}),
+    ):
+        warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box
+        return write_whole(path, write, "the picture")

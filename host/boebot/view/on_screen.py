@@ -5,14 +5,13 @@ from __future__ import annotations
 import base64
 import html
 import tempfile
-import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
 from boebot.view import picture, replay
-from boebot.view.display import has_display, kernel_shell
+from boebot.view.display import browse, published
 
 if TYPE_CHECKING:
     from boebot.record.run import Run
@@ -49,16 +48,12 @@ def play(results: Sequence[Run]) -> Path | None:
         BoebotError: as `drawn`.
     """
     _check(results)
-    recorded = [result for result in results if result.ticks]
-    notebook = kernel_shell()
-    if notebook is not None:
-        shown = {"text/html": html_frame(replay.page_text(recorded)), "text/plain": "<replay of the run>"}
-        notebook.display_pub.publish(shown)
+    page = replay.page_text([result for result in results if result.ticks])
+    if published(html_frame(page), "<replay of the run>"):
         return None
     path = Path(tempfile.mkdtemp(prefix="boebot-")) / "replay.html"
-    replay.write(recorded, path)
-    if has_display():
-        webbrowser.open(path.as_uri())
+    path.write_text(page, encoding="utf-8")
+    browse(path.as_uri())
     return path
 
 

@@ -62,11 +62,6 @@ PIXELS_PER_INCH = 96  # of a page
 Shown = tuple[int, "Run", scene.View]
 
 
-def write(result: Run, path: Path) -> Path:
-    """Draws the run into a PNG file."""
-    return draw(result).save(path)
-
-
 def draw(result: Run) -> Sheet:
     """Draws the run."""
     view = scene.view(result)
@@ -240,11 +235,6 @@ def _utility_entries(record: BrainRecord, end: float) -> list[Artist]:
 
 
 # ---- several robots --------------------------------------------------------------------------------------------------
-
-
-def write_together(robots: Sequence[Run], error: BaseException | None, path: Path) -> Path:
-    """Draws all robots of a run into a PNG file."""
-    return draw_together(robots, error).save(path)
 
 
 def draw_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:

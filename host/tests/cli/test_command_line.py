@@ -429,7 +429,7 @@ def fails(*_: object) -> None:
     raise RuntimeError("no ink\nat all")
 
 
-@pytest.mark.parametrize("writer", ["boebot.view.picture.write", "boebot.view.replay.write"])
+@pytest.mark.parametrize("writer", ["boebot.view.picture.draw", "boebot.view.replay.write"])
 def test_picture_that_fails_costs_no_other_file(
     peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, writer: str
 ) -> None:
