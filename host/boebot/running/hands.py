@@ -12,6 +12,7 @@ from typing import Protocol
 
 import msgspec
 
+from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError
 from boebot.record.interventions import (
     STREAM,
@@ -28,6 +29,7 @@ from boebot.record.interventions import (
 )
 from boebot.record.record import Record
 from boebot.record.run import Run
+from boebot.robot import Robot
 from boebot.running.brain_parameters import set_parameters
 from boebot.running.driver import Driver
 from boebot.running.tasks import Task
@@ -96,22 +98,34 @@ class Hands:
             self.driver.robot.drive(self.held.left, self.held.right)
 
     def _carry_out(self, one: Deed) -> None:
-        robot = self.driver.robot
         match one:
-            case Hand():
-                self.held = one
-            case Release():
-                self.held = None
-            case Stop():
-                robot.emergency_stop()
-            case Arm():
-                robot.arm()
             case Place(x, y, heading):
                 self.driver.session.place(x, y, heading)
             case Shape(index, x, y, heading):
                 self.driver.session.place_shape(index, x, y, heading)
-            case Parameter(name, value):
-                set_parameters(self.task.brain, {name: value})
+            case _:
+                self.held = carry_out(one, self.driver.robot, self.task.brain, self.held)
+
+
+def carry_out(one: Deed, robot: Robot, brain: LoadedBrain, held: Hand | None) -> Hand | None:
+    """Does to robot and brain what needs no world. Returns by which signals the robot is driven by hand then; `held`:
+    by which it was.
+
+    Raises:
+        BrainError: the brain has no such parameter, or refuses the value.
+    """
+    match one:
+        case Hand():
+            return one
+        case Release():
+            return None
+        case Stop():
+            robot.emergency_stop()
+        case Arm():
+            robot.arm()
+        case Parameter(name, value):
+            set_parameters(brain, {name: value})
+    return held
 
 
 class Repeated:

@@ -14,10 +14,11 @@ from boebot.devices.readings import Readings
 from boebot.errors import BoebotError, BrainError
 from boebot.record.columns import BoardColumns
 from boebot.record.compare import EXPECTED
-from boebot.record.interventions import Arm, Deed, Hand, Parameter, Release, Stop, interventions
+from boebot.record.interventions import Hand, interventions
 from boebot.record.run import Run
 from boebot.robot import Command, Observation, Robot
-from boebot.running.brain_parameters import in_force, parameters, set_parameters
+from boebot.running.brain_parameters import in_force, parameters
+from boebot.running.hands import carry_out
 
 
 def replayed(result: Run, brain: object) -> list[Command]:
@@ -46,7 +47,8 @@ def replayed(result: Run, brain: object) -> list[Command]:
                 break
             robot.observation = observation
             while deeds and deeds[0][0] <= observation.time:
-                held = _done_again(deeds.pop(0)[1], robot, loaded, held)
+                with contextlib.suppress(BrainError):  # a parameter of another brain
+                    held = carry_out(deeds.pop(0)[1], robot, loaded, held)
             try:
                 loaded.step(robot)
             except Exception as error:
@@ -56,23 +58,6 @@ def replayed(result: Run, brain: object) -> list[Command]:
                 robot.drive(held.left, held.right)
             commands.append(robot.command)
     return commands
-
-
-def _done_again(deed: Deed, robot: Robot, brain: brains.LoadedBrain, held: Hand | None) -> Hand | None:
-    """Does to robot and brain what a person did. Returns by which signals the robot is driven by hand then."""
-    match deed:
-        case Hand():
-            return deed
-        case Release():
-            return None
-        case Stop():
-            robot.emergency_stop()
-        case Arm():
-            robot.arm()
-        case Parameter(name, value):
-            with contextlib.suppress(BrainError):  # of another brain
-                set_parameters(brain, {name: value})
-    return held
 
 
 def _observations(result: Run) -> Iterator[Observation]:

@@ -74,24 +74,7 @@ def run(
             there or that vanishes. The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; motors stopped and record written.
     """
-    request = Request.single(
-        brain,
-        robot,
-        pose=pose,
-        period=period,
-        without=without,
-        imperfections=imperfections,
-        arena=arena,
-        on=on,
-        seconds=seconds,
-        seed=seed,
-        realtime=realtime,
-        step_timeout=step_timeout,
-        force_timing=force_timing,
-        record=record,
-        pins=pins,
-        parameters=parameters,
-    )
+    request = Request.single(**_asked(locals()))
     return cast(RunResult, _kept(request, progress, out, view=view))
 
 
@@ -127,19 +110,14 @@ def run_together(
             place). The record up to there is written to `out` all the same.
         KeyboardInterrupt: Ctrl-C; all motors stopped and the record written.
     """
-    request = Request(
-        members=members,
-        arena=arena,
-        on=on,
-        seconds=seconds,
-        seed=seed,
-        realtime=realtime,
-        step_timeout=step_timeout,
-        force_timing=force_timing,
-        pins=pins,
-    )
+    request = Request(**_asked(locals()))
     result = _kept(request, progress, out, view=view, together=True)
     return cast(TogetherResult, result)
+
+
+def _asked(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Those that a `Request` has, by the same names."""
+    return {name: value for name, value in arguments.items() if name not in ("progress", "out", "view")}
 
 
 def _kept(
