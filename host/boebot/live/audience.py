@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
-from typing import Any, Protocol
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, Moving
 from boebot.errors import BoebotError
@@ -21,31 +21,29 @@ PAST = 1_200  # chunks that are kept for pages that come later
 BYE_S = 0.5  # for the last messages
 
 
-class Stage(Protocol):
-    """What pages look at, told of them in the server's thread."""
-
-    def went(self, page: int) -> None:
-        """A page is gone; its number."""
-
-    def asked(self, page: int, what: messages.Asked) -> None:
-        """A page wants something.
-
-        Raises:
-            BoebotError: that cannot be done; the page is told.
-        """
-
-
 class Audience:
-    """All pages, from one run to the next (a `page_server.Listener`).
+    """All pages, from one run to the next.
 
     Attributes:
         url: the address of the page.
         changed: notified when a page comes, goes or asks for something.
     """
 
-    def __init__(self, stage: Stage, *, host: str = LOOPBACK, port: int = 0) -> None:
-        """Raises BoebotError where the port is taken."""
-        self._stage = stage
+    def __init__(
+        self,
+        asked: Callable[[int, messages.Asked], None],
+        went: Callable[[int], None] = lambda page: None,
+        *,
+        host: str = LOOPBACK,
+        port: int = 0,
+    ) -> None:
+        """`asked`: a page, by its number, wants something; a BoebotError says why that cannot be done, and the page is
+        told. `went`: a page is gone. Both are called in the server's thread.
+
+        Raises:
+            BoebotError: the port is taken.
+        """
+        self._asked, self._went = asked, went
         self._lock = threading.Lock()  # of all that follows: two threads use it
         self.changed = threading.Condition(self._lock)
         self._pages: dict[int, Page] = {}
@@ -54,7 +52,7 @@ class Audience:
         self._past: deque[Message] = deque()
         self._state: Message = {}  # the newest
         self._layers: list[dict[str, Message]] = []  # of each robot the newest sketches
-        self._server = PageServer(replay.live_page, self, host=host, port=port)
+        self._server = PageServer(replay.live_page, self._heard, self._is_gone, host=host, port=port)
         self.url = self._server.url
 
     @property
@@ -64,8 +62,7 @@ class Audience:
 
     # ---- in the server's thread ------------------------------------------------------------------------------------
 
-    def heard(self, page: Page, data: str) -> str | None:
-        """See `page_server.Listener`."""
+    def _heard(self, page: Page, data: str) -> str | None:
         try:
             what = messages.decode(data)
         except BoebotError as error:
@@ -83,19 +80,18 @@ class Audience:
         if page.number not in self._pages:
             return "expected hello first"
         try:
-            self._stage.asked(page.number, what)
+            self._asked(page.number, what)
         except BoebotError as error:
             self._send(page, {"type": "refused", "sentence": str(error)})
         with self.changed:
             self.changed.notify_all()
         return None
 
-    def went(self, page: Page) -> None:
-        """See `page_server.Listener`."""
+    def _is_gone(self, page: Page) -> None:
         with self.changed:
             self._pages.pop(page.number, None)
             self.changed.notify_all()
-        self._stage.went(page.number)
+        self._went(page.number)
 
     # ---- in the thread of what is looked at ------------------------------------------------------------------------
 

@@ -44,7 +44,7 @@ class RestartedError(BoebotError):
 
 
 class LiveView:
-    """Shows runs to pages (an `Onlooker` of boebot.running.hands, and a `Stage` of boebot.live.audience).
+    """Shows runs to pages (an `Onlooker` of boebot.running.hands).
 
     Attributes:
         url: the address of the page.
@@ -76,19 +76,18 @@ class LiveView:
         self._told: Message = {}  # the newest state while time stood still
         self._printed = ""
         self._printing = threading.Lock()
-        self._audience = Audience(self, host=host, port=port)
+        self._audience = Audience(self._asked, self._went, host=host, port=port)
         self.url = self._audience.url
 
     # ---- pages: in the server's thread -----------------------------------------------------------------------------
 
-    def went(self, page: int) -> None:
-        """See `Stage`."""
+    def _went(self, page: int) -> None:
         with self._changing:
             if self._controls is not None:
                 self._controls.went(page)
 
-    def asked(self, page: int, what: messages.Asked) -> None:
-        """See `Stage`. Once the run has ended, only another one can be asked for."""
+    def _asked(self, page: int, what: messages.Asked) -> None:
+        """Once the run has ended, only another one can be asked for."""
         switched_off(getattr(what, "without", ()))
         with self._changing:
             if self._controls is not None and (not self._has_ended or isinstance(what, messages.Restart)):

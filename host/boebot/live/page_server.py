@@ -16,7 +16,6 @@ import secrets
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
 from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio.server import ServerConnection, serve
@@ -52,16 +51,6 @@ class Page:
         self.number, self.outbox = number, outbox
 
 
-class Listener(Protocol):
-    """Who is told of pages; called in the server's thread, and must return at once."""
-
-    def heard(self, page: Page, data: str) -> str | None:
-        """It has sent a message. Returns why it is to be let go, in a sentence, or None."""
-
-    def went(self, page: Page) -> None:
-        """It is gone."""
-
-
 class PageServer:
     """Serves until it is closed.
 
@@ -69,13 +58,27 @@ class PageServer:
         url: of the page, with its token.
     """
 
-    def __init__(self, page: Callable[[str], str], listener: Listener, *, host: str = LOOPBACK, port: int = 0) -> None:
-        """`page`: gives the HTML, by where its stream is, as in ws://127.0.0.1:8080. `port`: 0: any free one.
+    def __init__(
+        self,
+        page: Callable[[str], str],
+        heard: Callable[[Page, str], str | None],
+        went: Callable[[Page], None],
+        *,
+        host: str = LOOPBACK,
+        port: int = 0,
+    ) -> None:
+        """
+        Args:
+            page: gives the HTML, by where its stream is, as in ws://127.0.0.1:8080.
+            heard: a page has sent a message; returns why it is to be let go, in a sentence, or None. It and `went` are
+                called in the server's thread, and must return at once.
+            went: a page is gone.
+            port: 0: any free one.
 
         Raises:
             BoebotError: the port is taken, or there is no such address.
         """
-        self._page, self._listener = page, listener
+        self._page, self._heard, self._went = page, heard, went
         self._token = secrets.token_urlsafe(16)
         self._host, self._port = host, port
         self._count = self._open = 0
@@ -182,7 +185,7 @@ class PageServer:
         finally:
             sender.cancel()
             self._open -= 1
-            self._listener.went(page)
+            self._went(page)
 
     async def _send(self, connection: ServerConnection, page: Page) -> None:
         try:
@@ -202,7 +205,7 @@ class PageServer:
             since = now
             why = f"more than {MESSAGES_PER_S} messages in a second" if allowed < 0 else "expected a text"
             if allowed >= 0 and isinstance(data, str):
-                why_not = self._listener.heard(page, data)
+                why_not = self._heard(page, data)
                 if why_not is None:
                     continue
                 why = why_not

@@ -74,7 +74,7 @@ class ReadAlong:
 
 
 class ServedView:
-    """Shows one served robot to pages (a `Stage` of boebot.live.audience).
+    """Shows one served robot to pages.
 
     Attributes:
         url: the address of the page.
@@ -91,15 +91,12 @@ class ServedView:
         self._source: ReadAlong | None = None
         self._chunks: Chunks | None = None
         self._printed = ""
-        self._audience = Audience(self, host=host, port=port)
+        self._audience = Audience(self._asked, host=host, port=port)
         self._audience.forget(1)
         self.url = self._audience.url
 
-    def went(self, page: int) -> None:
-        """See `Stage`."""
-
-    def asked(self, page: int, what: messages.Asked) -> None:
-        """See `Stage`: nothing can be done but looking."""
+    def _asked(self, page: int, what: messages.Asked) -> None:
+        """Nothing can be done but looking."""
         if not isinstance(what, messages.Visible):
             raise BoebotError("a served robot is driven by the program that has its port; this page only shows it")
 
