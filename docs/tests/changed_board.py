@@ -11,7 +11,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from boebot.link import messages
-from boebot_timing.emulated.loads import FIGURES, Bench
+from boebot_timing.emulated.loads import Bench
+from boebot_timing.emulated.scenarios import EDGES_PER_S
 from boebot_timing.tests.jitter import lost, servo_pulses
 from boebot_timing.tests.jitter_run import drive
 from sim_bridge.boards.board import Level
@@ -28,9 +29,9 @@ def seen(elf: Path) -> dict[str, object]:
     with Bench(elf) as bench:
         text = find_symbol(elf, "ride_text").address
         rides: list[bytes] = []
-        ridden = drive(bench, FIGURES, SECONDS, 1, lambda _: rides.append(bench.access.read_memory(text, 16)))
+        ridden = drive(bench, "figures", SECONDS, 1, lambda _: rides.append(bench.access.read_memory(text, 16)))
         pulses = servo_pulses(ridden)
-        steady = FIGURES.edges_per_s * MM_PER_EDGE * math.sqrt(1 - (1 - 1 / TICKS_PER_S) ** (SECONDS * TICKS_PER_S))
+        steady = EDGES_PER_S["figures"] * MM_PER_EDGE * math.sqrt(1 - (1 - 1 / TICKS_PER_S) ** (SECONDS * TICKS_PER_S))
         clicks = [edge.cycle for edge in bench.edges[BUZZER] if ridden.begun < edge.cycle < ridden.ended]
         switched = []
         for on in (1, 0):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -28,18 +27,6 @@ ECHO_DELAY_CYCLES = 750 * CYCLES_PER_US  # from the trigger's end to the echo (P
 ECHO_SHORTEST, ECHO_LONGEST = 2_000, 290_000  # cycles: 0.125 to 18.1 ms (ibid.: 0.115 to 18.5 ms)
 
 
-@dataclass(frozen=True)
-class Load:
-    """What a board has to bear: edges per second of each encoder line, and how much comes in by the serial line."""
-
-    name: str
-    edges_per_s: int
-    is_overload: bool  # frames back to back both ways, else a set-point and telemetry each tick; and noise on one line
-
-
-FIGURES = Load("figures", edges_per_s=1500, is_overload=False)
-OVERLOAD = Load("overload", edges_per_s=4000, is_overload=True)
-LOADS = (FIGURES, OVERLOAD)
 NOISE_PERIOD = 159  # cycles from edge to edge: 100,000 a second, in step with nothing
 
 

@@ -47,7 +47,7 @@ def distributions(run: Run) -> list[Distribution]:
     return [
         *servo_pulses(run),
         echo_lengths(run),
-        *(_only_counted(one) if run.load.is_overload else one for one in (*reactions(run), *observations(run))),
+        *(_only_counted(one) if run.load == "overload" else one for one in (*reactions(run), *observations(run))),
     ]
 
 

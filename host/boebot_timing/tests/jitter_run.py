@@ -13,7 +13,8 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import pin_number
 from boebot.link import messages
 from boebot_timing.emulated.line import Line
-from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Contact, Load, Ping, PulseTrain, wheels, with_noise
+from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Contact, Ping, PulseTrain, wheels, with_noise
+from boebot_timing.emulated.scenarios import EDGES_PER_S
 from boebot_timing.emulated.traffic import EachTick, FullLine
 from sim_bridge.boards.board import Level
 
@@ -32,7 +33,10 @@ CONTACT_CLOSED = 1_120_000  # cycles
 class Run:
     """What acted on a board and what was seen of it under one load."""
 
-    load: Load
+    load: (
+        str  # "figures" or "overload": a set-point and telemetry each tick, or frames back to back and noise on a line
+    )
+    edges_per_s: int  # of each encoder line
     bench: Bench
     line: Line
     pins: dict[str, int]
@@ -44,8 +48,9 @@ class Run:
     ping: Ping
 
 
-def drive(bench: Bench, load: Load, seconds: float, seed: int, share: Progress) -> Run:
+def drive(bench: Bench, load: str, seconds: float, seed: int, share: Progress, edges_per_s: int | None = None) -> Run:
     """Runs a board under a load for that long, and then until all that was under way has come."""
+    edges_per_s = edges_per_s or EDGES_PER_S[load]
     line = Line(bench)
     robot = load_robot(line.open().robot.split(b"\0", 1)[0].decode())
     pins = pins_of(robot)
@@ -54,11 +59,12 @@ def drive(bench: Bench, load: Load, seconds: float, seed: int, share: Progress) 
     prepare(line)
     first = bench.now + TICK_CYCLES + seed * PHASE_STEP % TICK_CYCLES
     lines = [tuple(pin for name, pin in pins.items() if name.startswith(f"encoder {side}")) for side in MIRROR]
-    traffic: EachTick | FullLine = FullLine(line, first) if load.is_overload else EachTick(line, first)
-    turning = wheels([one for one in lines if one], load.edges_per_s, first)
-    noisy = load.is_overload and bool(turning)
+    traffic: EachTick | FullLine = FullLine(line, first) if load == "overload" else EachTick(line, first)
+    turning = wheels([one for one in lines if one], edges_per_s, first)
+    noisy = load == "overload" and bool(turning)
     run = Run(
         load=load,
+        edges_per_s=edges_per_s,
         bench=bench,
         line=line,
         pins=pins,
