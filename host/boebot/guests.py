@@ -24,6 +24,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from boebot.errors import BoebotError
+
 PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS = (
     f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records", "checks")
 )
@@ -59,9 +61,18 @@ class Guest(NamedTuple):
     """`module:name`."""
 
     def load(self) -> Any:
-        """What it names, imported."""
+        """What it names, imported.
+
+        Raises:
+            BoebotError: it is broken, or what it needs is not installed.
+        """
         module, _, attribute = self.place.partition(":")
-        return getattr(import_module(module), attribute)
+        try:
+            return getattr(import_module(module), attribute)
+        except Exception as error:  # whatever a package does as it is imported
+            raise BoebotError(
+                f"{self.name!r} of an installed package cannot be loaded: {self.place}: {type(error).__name__}: {error}"
+            ) from error
 
 
 def guests(group: str) -> Mapping[str, Guest]:

@@ -11,8 +11,9 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from boebot.cli.options import SETTINGS
+from boebot.errors import BoebotError
 from boebot.guests import COMMANDS as GUESTS
-from boebot.guests import Command, guests
+from boebot.guests import Command, Guest, guests
 
 COMMANDS = {
     "run": Command("Let a brain drive a robot, and say what happened.", "boebot.cli.run:run"),
@@ -54,12 +55,12 @@ class Commands(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """A command that has only its line."""
-        return TyperCommand(cmd_name, help=described(cmd_name).line) if cmd_name in self.commands else None
+        return TyperCommand(cmd_name, help=_line(cmd_name)) if cmd_name in self.commands else None
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """All of them, with their lines."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, described(name).line) for name in self.commands])
+            formatter.write_dl([(name, _line(name)) for name in self.commands])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Of these arguments the command, as it is."""
@@ -73,17 +74,30 @@ def all_commands() -> list[str]:
 
 
 def described(name: str) -> Command:
-    """The command of that name."""
+    """The command of that name.
+
+    Raises:
+        BoebotError: it is a guest's, and broken.
+    """
     if name in COMMANDS:
         return COMMANDS[name]
     found: Command = guests(GUESTS)[name].load()
     return found
 
 
+def _line(name: str) -> str:
+    """Of the list of all; a broken guest leaves the others usable."""
+    try:
+        return described(name).line
+    except BoebotError as error:
+        return str(error)
+
+
 def command(name: str) -> Any:
     """A sub-command with its options, imported."""
-    module, _, attribute = described(name).work.partition(":")
-    work = getattr(import_module(module), attribute)
+    place = described(name).work
+    module, _, attribute = place.partition(":")
+    work = getattr(import_module(module), attribute) if name in COMMANDS else Guest(name, place).load()
     if not isinstance(work, typer.Typer):
         function, work = work, typer.Typer(add_completion=False, **SETTINGS)
         work.command()(function)

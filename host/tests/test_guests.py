@@ -1,0 +1,32 @@
+"""A guest that is broken is named in one sentence, and leaves the rest usable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from boebot import guests
+from command import boebot
+
+
+@pytest.fixture
+def _broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A package whose command cannot be imported."""
+    (tmp_path / "sick-1.0.dist-info").mkdir()
+    text = "[boebot.commands]\nsick = a_module_that_is_not_there:COMMAND\n"
+    (tmp_path / "sick-1.0.dist-info" / "entry_points.txt").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    guests._all.cache_clear()
+    yield
+    guests._all.cache_clear()
+
+
+@pytest.mark.usefixtures("_broken")
+def test_a_broken_guest_is_one_sentence_and_other_commands_work(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = boebot(capsys, "sick")
+    assert (code, out) == (1, "") and len(err.splitlines()) == 1
+    assert "'sick' of an installed package cannot be loaded: a_module_that_is_not_there:COMMAND" in err
+    code, out, err = boebot(capsys, "--help")
+    assert (code, err) == (0, "") and "cannot be loaded" in out and "run" in out
