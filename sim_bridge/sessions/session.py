@@ -50,7 +50,35 @@ class InWorld:
 
     def truth(self) -> Truth | None:
         """What happened so far; None without recording."""
-        return truth_of(self.robot)
+        robot, sim = self.robot, self.sim
+        columns = robot.truth() if robot.description.has_board else robot.truth_to_now()
+        if not len(columns["time"]):
+            return None
+        begin, end = float(columns["time"][0]), float(columns["time"][-1])
+        return Truth(
+            time=columns["time"],
+            x=columns["x"],
+            y=columns["y"],
+            heading=columns["heading"],
+            contact=columns["contact"] > 0,
+            left_speed=columns["left"],
+            right_speed=columns["right"],
+            plan=floor_plan(sim.arena, begin, end, sim.lateness(), sim.shifts()),
+        )
+
+    def drain(self, *, ended: bool = False) -> Group:
+        """See `boebot.boards.Session`. What belongs to the world goes with its first robot."""
+        robot = self.robot
+        world = self.sim.drain(ended=ended) if robot.number == min(self.sim.members) else {}
+        return {**robot.drain(to_now=ended and not robot.description.has_board), **world}
+
+    def counters(self) -> Mapping[str, float]:
+        """`time_s`, and what only a simulator knows: `true_contacts`, `true_distance_m`."""
+        return {
+            "true_contacts": float(self.robot.true_contacts),
+            "true_distance_m": float(self.robot.body().distance),
+            "time_s": self.sim.cycle / CLOCK_HZ,
+        }
 
     def close(self) -> None:
         """Frees board and world. May be called twice."""
@@ -132,22 +160,19 @@ class SimSession(InWorld):
     def drain(self, *, ended: bool = False) -> Group:
         """See `boebot.boards.BoardSession`."""
         edges = {} if self._pins is None else self._pins.drain()
-        return {**drain(self.robot, ended=ended), **edges}
+        return {**super().drain(ended=ended), **edges}
 
     def looks(self) -> dict[str, Floats]:
         """Where the range sensors looked from and what they saw: columns `LOOK`."""
         return self.robot.looks()
 
     def counters(self) -> Mapping[str, float]:
-        """Counters of the board, and `time_s`, `load` (share of cycles executed), and what only a simulator knows:
-        `true_contacts`, `true_distance_m`, `true_supply_v`."""
+        """Counters of the board, those of every simulated robot, `load` (share of cycles executed), `true_supply_v`."""
         board = self.board.counters()
         cycle = self.sim.cycle
         return {
             **board,
-            "true_contacts": float(self.robot.true_contacts),
-            "true_distance_m": float(self.robot.body().distance),
-            "time_s": cycle / CLOCK_HZ,
+            **super().counters(),
             "load": board["executed_cycles"] / cycle if cycle else 0.0,
             "true_supply_v": self.robot.supply_voltage,
         }
@@ -197,47 +222,6 @@ class DirectSession(InWorld):
     def ended(self) -> str:
         """Why it can go no further, or ""."""
         return self.robot.ended
-
-    def drain(self, *, ended: bool = False) -> Group:
-        """See `boebot.boards.BoardSession`."""
-        return drain(self.robot, ended=ended)
-
-    def counters(self) -> Mapping[str, float]:
-        """`true_contacts`, `true_distance_m` and `time_s`."""
-        return {
-            "true_contacts": float(self.robot.true_contacts),
-            "true_distance_m": float(self.robot.body().distance),
-            "time_s": self.sim.cycle / CLOCK_HZ,
-        }
-
-
-def drain(robot: SimRobot, *, ended: bool) -> Group:
-    """See `boebot.boards.BoardSession`. What belongs to the world goes with its first robot."""
-    world = robot.sim.drain(ended=ended) if robot.number == min(robot.sim.members) else {}
-    return {**robot.drain(to_now=ended and not robot.description.has_board), **world}
-
-
-def truth_of(robot: SimRobot) -> Truth | None:
-    """What happened to a robot so far; None without recording."""
-    columns = robot.truth() if robot.description.has_board else robot.truth_to_now()
-    if not len(columns["time"]):
-        return None
-    return Truth(
-        time=columns["time"],
-        x=columns["x"],
-        y=columns["y"],
-        heading=columns["heading"],
-        contact=columns["contact"] > 0,
-        left_speed=columns["left"],
-        right_speed=columns["right"],
-        plan=floor_plan(
-            robot.sim.arena,
-            float(columns["time"][0]),
-            float(columns["time"][-1]),
-            robot.sim.lateness(),
-            robot.sim.shifts(),
-        ),
-    )
 
 
 def _baud(robot: robots.RobotDescription) -> int:

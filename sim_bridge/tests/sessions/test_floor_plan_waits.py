@@ -21,7 +21,7 @@ from boebot.record.truth import lateness
 from boebot_course.recorder import Recorder
 from boebot_course.vehicle_view import View
 from sim_bridge._core import ffi, lib
-from sim_bridge.sessions.session import DirectSession, truth_of
+from sim_bridge.sessions.session import DirectSession, InWorld
 from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
@@ -107,7 +107,7 @@ def test_a_robot_without_a_board_is_pinched_and_leaves() -> None:
     assert 0.5 < late.waited[-1] < PINCHED_S
     pinched.signals(1.0, 1.0)
     seen += run(sim, FREE_S)
-    shape = check(truth_of(pinched), arena, seen)
+    shape = check(InWorld(pinched, shared=True).truth(), arena, seen)
     assert abs(deepest(shape, pinched.truth(), robot.body.radius_m)) < 2e-6, "it was touched, never entered"
     (late,) = sim.lateness()
     assert len(late.time) < 100, "rows only where something changes"
@@ -123,14 +123,14 @@ def test_a_robot_with_a_board_is_pinched_and_taken_away(disc: bool) -> None:
     seen = list(run(sim, PINCHED_S))
     robot.pins.place(0.0, 1.0, 0.0)
     seen += run(sim, FREE_S)
-    check(truth_of(robot.robot), arena, seen)
+    check(InWorld(robot.robot, shared=True).truth(), arena, seen)
 
 
 def test_without_a_record_it_is_told_by_the_path() -> None:
     sim = Sim(press(), record=False)
     sim.add(None, load_robot("arsim"))
     sim.run(1000 * MS)
-    assert sim.lateness() == [] and truth_of(sim.robot(0)) is None
+    assert sim.lateness() == [] and InWorld(sim.robot(0), shared=True).truth() is None
 
 
 def test_a_session_tells_it() -> None:
