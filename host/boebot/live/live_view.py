@@ -28,6 +28,7 @@ from boebot.live.page_server import LOOPBACK
 from boebot.record.blocks import Group
 from boebot.record.interventions import Deed
 from boebot.record.run import Run
+from boebot.running import interrupts
 from boebot.running.brain_parameters import bounds, meaning, sliders
 from boebot.running.hands import Hands
 from boebot.running.loop import gather_rows
@@ -290,8 +291,15 @@ class Heard:
 
 
 def _news(robot: Hands) -> Group:
-    """Rows of its record that came since this was last asked."""
-    gather_rows(robot.driver, robot.task)
+    """Rows of its record that came since this was last asked; none is lost by Ctrl-C.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C.
+    """
+    with interrupts.held():
+        gather_rows(robot.driver, robot.task)
+    if interrupts.first is not None:
+        raise KeyboardInterrupt
     return robot.task.record.news()
 
 
