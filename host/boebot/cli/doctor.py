@@ -18,7 +18,7 @@ import boebot
 from boebot import resources
 from boebot.boards import BoardRequest, board_kinds, is_live
 from boebot.cli import options, output, quantity
-from boebot.cli.board_link import board_link
+from boebot.cli.board_link import board_link, show_identity, watch_link
 from boebot.description.board_parameters import configure
 from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
@@ -90,13 +90,9 @@ def doctor(
                 raise BoebotError(f"expected the URL of a board: {_which(ports)}")
             (url,) = ports
         if identity:
-            from boebot.cli import identity as shown
-
-            shown.show(url, description, json)
+            show_identity(url, description, json)
         else:
-            from boebot.cli import link_watch
-
-            link_watch.watch(url, description, math.inf if seconds is None else seconds, json)
+            watch_link(url, description, math.inf if seconds is None else seconds, json)
         return
     checks = list(_checks(url, description))
     wrong = [check for check in checks if check.hint]
@@ -239,12 +235,8 @@ def _listen(link: Link, seconds: float) -> list[tuple[messages.Telemetry, Latest
 
 def _show(checks: list[Check]) -> None:
     """A row for each, and the hints below."""
-    table = output.empty_table()
-    for title in ("", "", "reads", "should read"):
-        table.add_column(title, overflow="fold")
-    for check in checks:
-        table.add_row("look" if check.hint else "well", check.part, check.reads, check.expected)
-    output.console().print(table)
+    rows = (["look" if check.hint else "well", check.part, check.reads, check.expected] for check in checks)
+    output.print_columns(("", "", "reads", "should read"), rows)
     for check in checks:
         if check.hint:
             output.line(f"{check.part}: {check.hint}")

@@ -63,14 +63,13 @@ def _rows(kind: str) -> list[Row]:
 def _print(rows: Sequence[Row]) -> None:
     if "neutral" in rows[0]:
         rows = [_in_short(row) for row in rows]
-    table = output.empty_table()
     titles = [title for title in rows[0] if title != "source"]  # of an experiment; it is long
-    for title in titles:
-        table.add_column("" if title == "slow" else title, no_wrap=title == "name")
-    for row in rows:
-        cells = (row[title] for title in titles)
-        table.add_row(*(("slow" if cell else "") if isinstance(cell, bool) else str(cell) for cell in cells))
-    output.console().print(table)
+    cells = ([_cell(row[title]) for title in titles] for row in rows)
+    output.print_columns(["" if title == "slow" else title for title in titles], cells, whole=1)
+
+
+def _cell(value: Any) -> str:
+    return ("slow" if value else "") if isinstance(value, bool) else str(value)
 
 
 def _robots() -> list[Row]:

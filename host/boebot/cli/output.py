@@ -13,7 +13,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -98,6 +98,20 @@ def table(values: Mapping[str, Any]) -> Table:
     return rows
 
 
+def print_columns(
+    titles: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: Sequence[int] = (), whole: int = 0
+) -> None:
+    """A table with a header, if there are rows; which columns hold numbers, how many of the first are not wrapped."""
+    printed = empty_table()
+    for index, title in enumerate(titles):
+        justify: Any = "right" if index in numbers else "left"
+        printed.add_column(title, justify=justify, overflow="fold", no_wrap=index < whole)
+    for row in rows:
+        printed.add_row(*row)
+    if printed.rows:
+        console().print(printed)
+
+
 def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table with a header; the second column holds numbers, the last one sentences. Where the terminal is too narrow
     for those beside the rest, each stands below its row."""
@@ -105,12 +119,7 @@ def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     widths = [max(len(row[index]) for row in (header, *rows)) for index in range(len(header) - 1)]
     beside = screen.width - sum(widths) - _GAP * len(widths) >= _SENTENCE_LEAST
     if beside:
-        printed = empty_table()
-        for index, title in enumerate(header):
-            printed.add_column(title, justify="right" if index == 1 else "left", no_wrap=index < len(widths))
-        for row in rows:
-            printed.add_row(*row)
-        screen.print(printed)
+        print_columns(header, rows, numbers=(1,), whole=len(widths))
         return
 
     def placed(cells: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ how the robot's devices are wired."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -79,7 +79,7 @@ def show_arena(
             "picture": picture,
         }
     )
-    _table(SHAPES, ([_cell(value) for value in row.values()] for row in shapes), numbers=range(2, 7))
+    output.print_columns(SHAPES, ([_cell(value) for value in row.values()] for row in shapes), numbers=range(2, 7))
 
 
 @app.command("robot")
@@ -136,7 +136,7 @@ def show_robot(
         devices_on = [name for name, device in described.device.items() if device.on]
         output.line(f"devices: {', '.join(devices_on)}")
         return
-    _table(WIRES, _wire_rows(wires))
+    output.print_columns(WIRES, _wire_rows(wires))
 
 
 def _wire_rows(wires: Sequence[Connection]) -> Iterator[list[str]]:
@@ -147,17 +147,6 @@ def _wire_rows(wires: Sequence[Connection]) -> Iterator[list[str]]:
         name = wire.device if wire.on else f"{wire.device} (off)"
         where = (name, wire.connector) if first else ("", "")
         yield [where[0], wire.pin, wire.colour, wire.part, wire.to, where[1]]
-
-
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> None:
-    """Prints it, if there are rows."""
-    table = output.empty_table()
-    for index, title in enumerate(header):
-        table.add_column(title, justify="right" if index in numbers else "left")
-    for row in rows:
-        table.add_row(*row)
-    if table.rows:
-        output.console().print(table)
 
 
 def _size(plan: FloorPlan) -> list[float] | None:

@@ -232,8 +232,8 @@ def _check_supply(robot: RobotDescription, file: str) -> None:
 def _check_devices(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
     """Refuses keys that do not fit each other, and names that a brain could not write."""
     for name, device in robot.device.items():
-        at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
         if not name.isidentifier() or name[0] == "_" or name in TAKEN:
+            at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
             expected = "a name that robot.NAME can have in a brain"
             raise RobotError(f"{at}: a device cannot have this name; expected {expected}")
         if device.on and (fault := device.fault()):
@@ -245,13 +245,15 @@ def _check_imperfections(robot: RobotDescription, table: dict[str, Any], file: s
     """Refuses names and magnitudes that are none, and what other keys of the file say."""
     known = imperfections()
     for name, value in robot.imperfections.items():
-        at = f"{toml_files.where(table, file, f'imperfections.{name}')}: imperfections.{name}"
         if name not in known:
-            raise RobotError(f"{at}: {unknown(name)}")
-        if (row := known[name]).key:
-            raise RobotError(f"{at} is said elsewhere in a robot's file; expected {row.key} of {' or '.join(row.of)}")
-        if fault := row.fault(value):
-            raise RobotError(f"{at}{fault}")
+            fault = f": {unknown(name)}"
+        elif (row := known[name]).key:
+            fault = f" is said elsewhere in a robot's file; expected {row.key} of {' or '.join(row.of)}"
+        else:
+            fault = row.fault(value)
+        if fault:
+            place = f"imperfections.{name}"
+            raise RobotError(f"{toml_files.where(table, file, place)}: {place}{fault}")
 
 
 def _check_pins(robot: RobotDescription, file: str) -> None:

@@ -20,7 +20,7 @@ import pytest
 
 from boebot import cli
 from boebot.boards import BoardRequest, board_kinds, open_world
-from boebot.cli import board_link, ending, link_watch, teleop
+from boebot.cli import board_link, ending, teleop
 from boebot.link import finding, messages
 from boebot.link.link import Link
 from boebot.result import RunResult, read_run
@@ -588,12 +588,11 @@ def test_clock_of_a_session_that_has_just_begun_is_not_known(board: InProcess) -
     watched.open()
     while watched.transport.now() < 1.0:
         watched.poll(0.01)
-    before = link_watch.Rates(watched)
-    assert link_watch.look(watched, before)["clock_bound_s"] < 500e-6
+    assert board_link.look(watched, 1.0, 0, [])["clock_bound_s"] < 500e-6
     board.peer.reset()
     while watched.counts.sessions == 1:
         watched.poll(0.001)
-    seen = link_watch.look(watched, before)
+    seen = board_link.look(watched, 1.0, 0, [])
     assert watched.clock.estimate.probes > 0
     assert (seen["clock_bound_s"], seen["clock_offset_s"], seen["clock_drift"]) == (None, None, None)
 
