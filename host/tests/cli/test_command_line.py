@@ -11,6 +11,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -501,16 +502,16 @@ def ticks_in(folder: Path) -> int:
 
 @pytest.mark.wall_clock
 def test_vanished_port_is_one_sentence_and_a_whole_record(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    served = Pty(Peer())
+    served, file = Pty(Peer()), tmp_path / "out" / "record.mcap"
 
-    def unplug(robot: Robot) -> None:
-        robot.drive(0.5, 0.5)
+    def unplug_once_it_drives() -> None:
+        while not (file.exists() and file.stat().st_size > 15_000):  # its description is shorter
+            time.sleep(0.05)
+        served.unplug()
 
     brain = tmp_path / "brain.py"
     brain.write_text("def step(robot):\n    robot.drive(0.5, 0.5)\n")
-    import threading
-
-    threading.Timer(0.6, served.unplug).start()
+    threading.Thread(target=unplug_once_it_drives, daemon=True).start()
     code, _, err = boebot(capsys, "run", str(brain), "--on", served.path, "--out", str(tmp_path / "out"))
     assert code == 1
     assert err == f"boebot: {served.path} has gone: unplugged, or closed by the other side\n"
