@@ -99,6 +99,8 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
     way = result.way_in_words()
     if (error_m := result.odometry_error) is not None:
         way.append(f"odometry off by {error_m:.2f} m at the end")
+    if (charge := result.battery_charge) is not None:
+        way.append(f"battery {charge:.0%} full at the end")
     return [
         ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{_changed(table)}"),
         ("time", f"{result.run_time:g} s{faster}"),

@@ -9,10 +9,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.boards import Truth, WatchdogReset
 from boebot.description.robots import RobotDescription
+from boebot.devices.battery import Energy
 from boebot.devices.readings import Layout
 from boebot.devices.whisker import Whisker
 from boebot.errors import brief
@@ -286,6 +289,19 @@ class Run:
         return None if pose is None or placed is None else math.dist(placed.at(-1)[:2], pose.at(-1)[:2])
 
     @property
+    def battery_charge(self) -> float | None:
+        """What is left in the battery at the end, 0 (empty) to 1 (full), by the last voltage that the robot measured:
+        between those of the empty and the full pack at rest, as its file has them. None: it measures none."""
+        pack = self.robot.device.get("battery")
+        rest = pack if isinstance(pack, Energy) else self.robot.supply
+        measured = self.overview.columns.number("battery", "voltage")
+        measured = measured[~np.isnan(measured)]
+        if rest is None or not len(measured):
+            return None
+        share = (float(measured[-1]) - rest.empty_v) / (rest.full_v - rest.empty_v)
+        return min(max(share, 0.0), 1.0)
+
+    @property
     def real_time_factor(self) -> float | None:
         """How many times faster than the wall clock the run was; None: not known, as of a record that is cut."""
         return self.run_time / self.wall_time if self.wall_time else None
@@ -319,6 +335,7 @@ class Run:
             "whisker_touches": self.whisker_touches,
             "odometry_source": self.odometry_source,
             "odometry_error_m": _rounded(self.odometry_error, 3),
+            "battery_charge": _rounded(self.battery_charge, 3),
             "period_s": round(self.period, 6),
             "steps": self.steps,
             "late_steps": self.late_steps,

@@ -15,6 +15,7 @@ import pytest
 import boebot
 from boebot.behaviors import Avoid, Wander
 from boebot.brain import Brain, Utility
+from boebot.cli.ending import five_rows
 from boebot.cognition import near
 from boebot.live.live_view import LiveView
 from boebot.record import record
@@ -87,3 +88,21 @@ def test_of_an_unrecorded_run_each_figure_is_right_or_none(robot: str) -> None:
         value = getattr(unrecorded, name)
         if isinstance(value, int | float) and name not in ("is_recorded", "has_truth", "real_time_factor"):
             assert value == getattr(recorded, name), (name, kind)
+
+
+@pytest.mark.parametrize(("robot", "fell"), [("roller-charging", 0.008), ("shieldbot-charging", None), ("arsim", None)])
+def test_charge_at_the_end_is_that_of_the_last_voltage(robot: str, fell: float | None, tmp_path: Path) -> None:
+    run = boebot.run(lambda robot: robot.stop(), robot, arena="empty", seconds=4, out=tmp_path)
+    charge = run.battery_charge
+    if robot == "arsim":
+        assert charge is None, "it has no battery"
+        return
+    assert charge is not None
+    if fell is None:  # its capacitors are 0.6 full as the run begins; the board draws less than 0.2 A
+        assert run.robot.supply is not None
+        assert 0.6 - 0.2 * 4 / run.robot.supply.capacity_as < charge < 0.6
+    else:
+        assert charge == pytest.approx(1 - fell, abs=1e-3), "it falls by 0.002 in a second"
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["battery_charge"] == read_run(tmp_path).table()["battery_charge"] == round(charge, 3)
+    assert f"battery {charge:.0%} full at the end" in dict(five_rows(run))["way"]
