@@ -15,10 +15,11 @@
     utility = { b = 0.5 }
 
     [process.dodge]
-    kind = "avoid"
+    kind = "avoid"                   # or the class's whole name, boebot.behaviors.avoid.Avoid
     utility = { b = -1.0, w = { near = 3.0 } }
 
-Kinds are the classes of boebot.behaviors and boebot.cognition, in lower case with underscores.
+Kinds are the classes of boebot.behaviors and boebot.cognition, in lower case with underscores. `described` is the way
+back: what a brain was made of, as the record of a run has it.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import inspect
+import json
 import re
 import typing
 from collections.abc import Callable, Iterator
@@ -36,6 +38,7 @@ from typing import Any
 
 import msgspec
 
+from boebot import arguments
 from boebot.brain.brain import Brain
 from boebot.brain.process import Process, snake_case
 from boebot.brain.utility import Utility
@@ -88,11 +91,17 @@ def load(path: Path) -> Brain:
     Raises:
         BrainError: one sentence with the file, the line, the key and what was expected.
     """
-    table, file = toml_files.read(path, BrainError), path.name
+    return composed(toml_files.read(path, BrainError), path.name)
+
+
+def composed(table: dict[str, Any], file: str) -> Brain:
+    """The brain that a file's table describes; `file`: its name, for errors. Raises as `load`."""
     processes = table.get("process")
-    for name, process in processes.items() if isinstance(processes, dict) else ():
-        if isinstance(process, dict):
-            process.setdefault("kind", name)
+    if isinstance(processes, dict):
+        for name, process in processes.items():
+            if isinstance(process, dict):
+                kind = process.setdefault("kind", name)
+                process["kind"] = next((key for key, one in process_kinds().items() if class_name(one) == kind), kind)
     described: Any = toml_files.convert(table, _file_type(), file, BrainError)
     places = _Places(table, file)
     variables: dict[str, StateVariable] = {}
@@ -108,6 +117,54 @@ def load(path: Path) -> Brain:
             _check_names(name, process, variables)
     with places.at(""):
         return Brain(made.values(), variables.values(), period=described.period_s, margin=described.margin)
+
+
+def described(brain: Brain) -> dict[str, Any]:
+    """What a brain is made of (`MadeOf` of boebot.record.brain_record), as it is now, as JSON has it; without functions
+    that a class has unless it is given others."""
+    variables = {one.name: _source(one, brain) for one in brain.variables}
+    odd = [] if type(brain) is Brain else [f"the brain is a {class_name(type(brain))}"]
+    odd += [f"state variable {name!r} is read by a function" for name, one in variables.items() if one is None]
+    processes: dict[str, Any] = {}
+    for process in brain.given:
+        table = processes[process.name] = {"kind": class_name(type(process))}
+        if type(process) not in process_kinds().values():
+            odd.append(f"process {process.name!r} is a {table['kind']}")
+        for field in dataclasses.fields(process):
+            value = getattr(process, field.name)
+            is_usual = callable(value) and value is field.default
+            if field.init and field.name not in _NO_PARAMETERS and not is_usual:
+                try:
+                    table[field.name] = _plain(value, brain)
+                except (TypeError, ValueError):
+                    odd.append(f"{process.name}.{field.name} is {arguments.shown(value)}")
+        numbers = {field.name: getattr(process.utility, field.name) for field in dataclasses.fields(Utility)}
+        table["utility"] = numbers | {"w": dict(process.utility.w)}
+    table = {"period_s": brain.PERIOD, "margin": brain.margin, "variable": variables, "process": processes}
+    return table | {"undescribed": odd}
+
+
+def class_name(kind: type) -> str:
+    """With its module's."""
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _source(variable: StateVariable, brain: Brain) -> dict[str, str] | None:
+    """The table of a state variable; None: a function of somebody's own reads it."""
+    sources = [({"kind": kind}, make) for kind, make in variable_kinds().items()]
+    for process in brain.given:
+        if type(process) in process_kinds().values():
+            for kind, make in _offered(process).items():
+                sources.append(({"of": process.name} | ({"kind": kind} if kind else {}), make))
+    return next((table for table, make in sources if dataclasses.replace(make(), name=variable.name) == variable), None)
+
+
+def _plain(value: Any, brain: Brain) -> Any:
+    """A parameter as JSON has it: what reads a state variable is its name. Raises TypeError or ValueError where it is
+    neither, as a number that is not finite."""
+    named = [one.name for one in brain.variables if callable(value) and value in (one.read, _Reading(one.name, {}))]
+    value = named[0] if named else value.tolist() if hasattr(value, "tolist") else value  # numpy's
+    return json.loads(json.dumps(msgspec.to_builtins(value), allow_nan=False))
 
 
 class _Places:

@@ -4,11 +4,10 @@ sketches (`robot.show`, `robot.sketch`)."""
 
 from __future__ import annotations
 
-import json
 import math
 import struct
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -16,7 +15,6 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot import arguments
 from boebot.showing import VALUES, Sketch
 
 if TYPE_CHECKING:  # the record of a run without such a brain does without
@@ -31,40 +29,14 @@ SKETCH_BYTES = 3_000_000  # of all sketches that are drawn
 
 
 class MadeOf(TypedDict):
-    """What a brain of processes is made of, by names, with the whole names of classes; for people: nothing is made of
-    it again."""
+    """What a brain is made of, as the table of a file, with the whole names of classes. Beside it `undescribed`, in
+    words, what no file can say: where there is nothing of this kind, the table composes the same brain."""
 
     period_s: float
     margin: float
-    variable: dict[str, str]
-    """what reads each"""
+    variable: dict[str, dict[str, str] | None]
     process: dict[str, dict[str, Any]]
-    """parameters of each, but functions that its class has unless it is given others"""
-
-
-def made_of(brain: Brain) -> MadeOf:
-    """As the brain is now."""
-    processes = {}
-    for process in brain.given:
-        kind = type(process)
-        table = processes[process.name] = {"kind": f"{kind.__module__}.{kind.__qualname__}"}
-        for field in fields(process):
-            value = getattr(process, field.name)
-            if field.init and field.name != "name" and not (callable(value) and value is field.default):
-                table[field.name] = _plain(value)
-    variables = {one.name: _plain(one.read) for one in brain.variables}
-    return MadeOf(period_s=brain.PERIOD, margin=brain.margin, variable=variables, process=processes)
-
-
-def _plain(value: Any) -> Any:
-    """As JSON has it: of functions the names, of what else JSON lacks a short text."""
-    if hasattr(value, "__qualname__"):
-        return f"{value.__module__}.{value.__qualname__}"
-    try:
-        plain = value.tolist() if hasattr(value, "tolist") else value  # numpy's
-        return json.loads(json.dumps(msgspec.to_builtins(plain), allow_nan=False))
-    except (TypeError, ValueError):
-        return arguments.shown(value)
+    undescribed: list[str]
 
 
 @dataclass(frozen=True)

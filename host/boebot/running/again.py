@@ -13,6 +13,8 @@ from typing import Any, cast
 
 from boebot.arenas import load_arena
 from boebot.boards import is_live
+from boebot.brain import Brain
+from boebot.brain.composition import composed
 from boebot.errors import BoebotError, as_utf8
 from boebot.record.compare import EXPECTED, RowDifference, record_difference
 from boebot.record.reading import CutError, attachments_of
@@ -70,7 +72,8 @@ class Recorded:
         """Of robots by their numbers, from 1, whose brain is not the file on this computer: what is run in its place,
         the record's files by name. Raises as `brain_files`."""
         members, count = enumerate(self.asked["members"], 1), len(self.results)
-        found = {number: brain_files(self.attached, Path(one["brain"]), number, count) for number, one in members}
+        brought = {n: Path(one["brain"]) for n, one in members if one["brain"] is not None}
+        found = {number: brain_files(self.attached, path, number, count) for number, path in brought.items()}
         return {number: files for number, files in found.items() if files}
 
     @property
@@ -100,7 +103,8 @@ def recorded(path: Path) -> Recorded:
 
     Raises:
         CutError: it is damaged inside.
-        BoebotError: it cannot be read or repeated: a real or paced run, or a brain from no file.
+        BoebotError: it cannot be read or repeated: a real or paced run, or a brain that is neither from a file nor all
+            described.
     """
     attached = attachments_of(path)
     results = read_run(path).robots
@@ -118,10 +122,7 @@ def recorded(path: Path) -> Recorded:
         raise BoebotError(f"{path} was run in real time, which no run repeats bit by bit; expected one that was not")
     for result, said in zip(results, asked["members"], strict=True):
         if said["brain"] is None:
-            raise BoebotError(
-                f"brain {result.brain!r} came from no file, and so its run cannot be repeated; expected a run of a "
-                "bundled brain or of a brain's file"
-            )
+            _composed(result)
     return Recorded(results, asked, attached)
 
 
@@ -158,7 +159,7 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         seconds = min(seconds, run.seconds + BEYOND_S)
     members = [
         Member(
-            brain=brains[said["brain"]],
+            brain=_composed(result) if said["brain"] is None else brains[said["brain"]],
             robot=result.robot,
             pose=None if said["pose"] is None else tuple(said["pose"]),
             seed=said["seed"],
@@ -179,6 +180,22 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         force_timing=asked["force_timing"],
         pins=asked.get("pins", False),
     )
+
+
+def _composed(result: RunResult) -> Brain:
+    """The brain of a run, made of the kit's parts as its record has it.
+
+    Raises:
+        BoebotError: that does not say all of it.
+    """
+    none: dict[str, Any] = {"undescribed": ["it is no Brain of processes"]}
+    made_of = none | cast(dict[str, Any], result.made_of or {})
+    if odd := made_of.pop("undescribed"):
+        raise BoebotError(
+            f"brain {result.brain!r} came from no file, and its record does not hold all of it: {'; '.join(odd)}; "
+            "expected a run of a bundled brain, of a file, or of a Brain of the kit's parts"
+        )
+    return composed(made_of, "the record")
 
 
 def _arena(run: Recorded, folder: Path) -> str | Path | None:

@@ -18,7 +18,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError, NotRealisableError
 from boebot.guests import CHECKS, guests
 from boebot.imperfections import checked
-from boebot.record.brain_record import MadeOf, made_of
+from boebot.record.brain_record import MadeOf
 from boebot.record.record import Record
 from boebot.running.driver import check_time_to_live
 
@@ -226,13 +226,14 @@ def _task(member: Member, request: Request, number: int) -> Task:
     if finding is not None and not request.force_timing:
         raise NotRealisableError(f"{finding.why} ({finding.see}; --force-timing runs it all the same)")
     now: Mapping[str, Any] = {}
-    made: MadeOf | None = None
+    made_of: Any = None
     if given or loaded.brain is not None:
+        from boebot.brain.composition import described
         from boebot.running.brain_parameters import in_force, parameters
 
         with in_force(loaded, given):
             now = parameters(loaded)
-            made = None if loaded.brain is None else made_of(loaded.brain)
+            made_of = None if loaded.brain is None else described(loaded.brain)
     board = BoardRequest(
         robot=description,
         arena=None if request.arena is None else str(request.arena),
@@ -250,7 +251,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         board=board,
         period_s=period_s,
         parameters={name: now[name] for name in given},
-        made_of=made,
+        made_of=made_of,
         seed=int(request.seed) + number - 1 if member.seed is None else int(member.seed),
         unrealisable=None if finding is None else finding.why,
     )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
+import pickle
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,11 @@ import pytest
 import boebot
 from boebot.behaviors import Avoid, Evade, FollowWall, Kinesis, Wander, Withdraw
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
+from boebot.brain.composition import composed, described
 from boebot.brains import load_brain
 from boebot.cli.run import _assigned
 from boebot.cognition import BatteryLevel, Contact, LightSense, Odometry, contact, near
 from boebot.errors import BoebotError
-from boebot.record.brain_record import made_of
 from boebot.record.interventions import Deed, Parameter
 from boebot.record.run_folder import RunFolder
 from boebot.result import RunResult, TogetherResult, read_run
@@ -39,20 +40,6 @@ def mind(turn_probability: float = 0.00777) -> Brain:
         ],
         [near()],
     )
-
-
-MIND = """
-process.wander = { turn_probability = 0.00777, utility = { b = 0.5 } }
-process.avoid.utility = { b = -1.0, w = { near = 3.0 } }
-variable.near = {}
-"""
-
-
-def file_of_mind(folder: Path) -> Path:
-    """`mind()` as a file."""
-    path = folder / "mind.toml"
-    path.write_text(MIND)
-    return path
 
 
 def kept(folder: Path, request: Request, onlooker: Any = None) -> RunResult:
@@ -210,18 +197,20 @@ def everything() -> Brain:
     )
 
 
-def test_a_description_has_classes_parameters_and_what_reads_the_variables() -> None:
-    whole: Any = made_of(everything())
-    assert json.loads(json.dumps(whole)) == whole and (whole["period_s"], whole["margin"]) == (0.1, 0.02)
-    process = whole["process"]
-    assert process["wander"]["kind"] == "boebot.behaviors.wander.Wander"
-    assert (process["wander"]["turn_probability"], process["wander"]["turn"]) == (0.00777, 0.75)
-    assert process["along"]["utility"] == {
-        "b": -1.0, "w": {"near": 3.0, "touch": -1.0}, "tau": 0.2, "c": 1.0, "tau_gamma": 0.5,
+def test_a_description_composes_the_same_brain() -> None:
+    brain = everything()
+    whole = described(brain)
+    assert whole["undescribed"] == []
+    assert whole["process"]["wander"]["kind"] == "boebot.behaviors.wander.Wander"
+    assert whole["process"]["wander"]["turn_probability"] == 0.00777
+    assert whole["process"]["kinesis"]["stimulus"] == "light"
+    assert whole["variable"] == {
+        "near": {"kind": "near"}, "touch": {"kind": "contact"}, "low": {"of": "pack"},
+        "charging": {"of": "pack", "kind": "charging"}, "light": {"of": "light_sense"},
     }  # fmt: skip
-    assert process["odometry"]["factors"] == [1.0, 1.01] and process["pack"]["full"] == 7.75
-    assert list(whole["variable"]) == ["near", "touch", "low", "charging", "light"]
-    assert all("0x" not in read for read in whole["variable"].values()), "equal brains have equal descriptions"
+    again_made = composed(deepcopy({key: value for key, value in whole.items() if key != "undescribed"}), "record")
+    assert described(again_made) == whole and (again_made.PERIOD, again_made.margin) == (0.1, 0.02)
+    assert pickle.loads(pickle.dumps(again_made)).variables[0] == near()
 
 
 class Slid:
@@ -248,26 +237,23 @@ def test_a_utility_that_is_changed_in_a_run_counts_and_is_repeated(tmp_path: Pat
     """By --again and by replay. Avoid's utility is raised above wander's, whatever is near."""
     deeds = [(2.0, Parameter("avoid.utility.b", 2.0)), (3.0, Parameter("avoid.utility.tau", 0.05))]
     values = {"wander.turn_probability": 0.01}
-    brain, out = file_of_mind(tmp_path), tmp_path / "run"
-    run = kept(out, Request.single(brain, "arsim", seconds=4, parameters=values), Slid(deeds))
+    run = kept(tmp_path, Request.single(mind(), "arsim", seconds=4, parameters=values), Slid(deeds))
     record = run.brain_record
     assert record is not None
     before, after = record.utility_of("avoid")[record.time < 2.0], record.utility_of("avoid")[record.time > 3.5]
     assert before.max() < 0 and after == pytest.approx(np.tanh(2.0), abs=0.01) and record.shares(4.0)["avoid"] > 0.4
     assert run.touched == 2 and run.made_of is not None
     assert run.made_of["process"]["avoid"]["utility"]["b"] == -1.0, "as the run began"
-    repetition = again(recorded(out))
+    repetition = again(recorded(tmp_path))
     assert repetition.is_equal and repetition.steps == 80
     assert [tuple(one) for one in replayed(run, mind())] == [step[1:] for step in run.record.steps]
 
 
-def test_a_brain_that_came_from_no_file_is_described_and_not_repeated(tmp_path: Path) -> None:
-    run = kept(tmp_path, Request.single(mind(), "arsim", seconds=1, parameters=VALUES))
+def test_a_brain_that_came_from_no_file_is_repeated(tmp_path: Path) -> None:
+    run = kept(tmp_path, Request.single(mind(), "arsim", seconds=4, parameters=VALUES))
     assert run.made_of is not None and run.parameters == VALUES
     assert run.made_of["process"]["wander"]["turn_probability"] == 0.00777
-    assert run.made_of["process"]["avoid"]["utility"]["b"] == -0.5, "as it was set"
-    with pytest.raises(BoebotError, match="brain 'brain' came from no file, and so its run cannot be repeated; exp"):
-        recorded(tmp_path)
+    assert again(recorded(tmp_path)).is_equal
 
 
 def test_robots_with_parameters_of_their_own_are_repeated(tmp_path: Path) -> None:
@@ -278,26 +264,23 @@ def test_robots_with_parameters_of_their_own_are_repeated(tmp_path: Path) -> Non
     assert again(recorded(tmp_path)).is_equal
 
 
-def half(robot: boebot.Robot) -> float:
-    return 0.5
-
-
 @dataclass(kw_only=True)
 class Mine(Wander):
     """Somebody's own."""
 
 
 @pytest.mark.parametrize(
-    ("brain", "place", "said"),
+    ("brain", "sentence"),
     [
-        (lambda: Brain([Wander()], [StateVariable("odd", half)]), ("variable", "odd"), f"{__name__}.half"),
-        (lambda: Brain([Withdraw(fatigue=math.inf)]), ("process", "withdraw", "fatigue"), "inf"),
-        (lambda: Brain([Mine()]), ("process", "mine", "kind"), f"{__name__}.Mine"),
-        (lambda: Brain([Kinesis(stimulus=half)]), ("process", "kinesis", "stimulus"), f"{__name__}.half"),
+        (lambda: Brain([Wander()], [StateVariable("odd", lambda robot: 0.5)]), "state variable 'odd' is read by"),
+        (lambda: Brain([Withdraw(fatigue=math.inf)]), "withdraw.fatigue is inf"),
+        (lambda: Brain([Mine()]), "process 'mine' is a .*Mine"),
+        (lambda: Brain([Kinesis(stimulus=lambda robot: 0.5)]), "kinesis.stimulus is <function"),
+        (lambda: lambda robot: robot.drive(0.1, 0.1), "it is no Brain of processes"),
     ],
 )  # fmt: skip
-def test_what_json_cannot_have_is_a_text(brain: Any, place: Sequence[str], said: str) -> None:
-    found: Any = made_of(brain())
-    for name in place:
-        found = found[name]
-    assert found == said
+def test_what_a_record_cannot_describe_is_named(brain: Any, sentence: str, tmp_path: Path) -> None:
+    run = kept(tmp_path, Request.single(brain(), seconds=0.1))
+    assert run.steps == 2
+    with pytest.raises(BoebotError, match=rf"came from no file, and its record does not hold all of it: .*{sentence}"):
+        recorded(tmp_path)
