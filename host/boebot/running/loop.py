@@ -239,10 +239,21 @@ class _Robot:
         return RunResult(**about(driver, task), **ending)
 
     def go_on(self) -> str:
-        """Goes on until its brain is to step, it waits for time to pass (one of several), or is done."""
+        """Goes on until its brain is to step, it waits for time to pass (one of several), or is done. Where nobody
+        waits for the wall clock, what the board has sent is not torn by Ctrl-C.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C.
+        """
         if self.thread is not None:
             return self.thread.resume()
-        return next(self._stretches, DONE) or _STEP
+        if is_live(self.task.on) or self.task.board.realtime:
+            return next(self._stretches, DONE) or _STEP
+        with interrupts.held():
+            found = next(self._stretches, DONE) or _STEP
+        if interrupts.first is not None:
+            raise KeyboardInterrupt
+        return found
 
     def step(self, watch: StepWatch) -> None:
         """A step of its brain.
