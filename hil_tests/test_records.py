@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import subprocess
 import sys
@@ -105,25 +104,6 @@ def test_what_is_no_record_is_one_sentence(tmp_path: Path, name: str, content: b
         (tmp_path / name).write_bytes(content)
     done = boebot("report", str(tmp_path / name))
     assert done.returncode == 2 and sentence in done.stderr and len(done.stderr.splitlines()) == 1
-
-
-def test_record_goes_on_while_a_step_lasts(tmp_path: Path) -> None:
-    kept: list[tuple[float, int]] = []  # last value that was shown (s), steps
-
-    def step(robot: library.Robot) -> None:
-        robot.show("time_s", robot.time)
-        until = time.monotonic() + 8 * (robot.time > 0.975)
-        while not kept and time.monotonic() < until:
-            time.sleep(0.05)
-            with contextlib.suppress(library.BoebotError):  # it has hardly begun
-                cut = read(tmp_path)
-                kept.extend([(float(cut.shown.time[-1]), cut.steps)] if cut.record.ticks else [])
-
-    whole = library.run(step, robot="arsim", seconds=2, out=tmp_path)
-    ((shown_s, steps),) = kept
-    assert shown_s == pytest.approx(0.95) and steps == 20
-    assert whole.record.count("command") == whole.steps == 40
-    assert whole.shown.time[-1] == pytest.approx(1.95)
 
 
 @pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a small disk")

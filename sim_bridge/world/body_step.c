@@ -50,7 +50,7 @@ static void hold_across(body *self, const scene *around, const double limits[2],
 static void drive(body *self, const scene *around, const double torque[2], double dt) {
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
-  double limits[2];
+  double limits[2] = {0.0, 0.0};
   if (!s->slipping && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
     /* (2.31), (2.32), (3.16), (3.17) */
     const double force = self->force_gain * (torque[0] + torque[1]) - self->drag * s->speed;
