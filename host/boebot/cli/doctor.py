@@ -3,6 +3,7 @@ there, or what both ends of the link count. Nothing moves."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import sys
@@ -92,7 +93,8 @@ def doctor(
         if identity:
             show_identity(url, description, json)
         else:
-            watch_link(url, description, math.inf if seconds is None else seconds, json)
+            with contextlib.suppress(KeyboardInterrupt):
+                watch_link(url, description, math.inf if seconds is None else seconds, json)
         return
     checks = list(_checks(url, description))
     wrong = [check for check in checks if check.hint]

@@ -88,7 +88,7 @@ def print_run(result: Result, wanted: Detail, *, is_said: bool = False) -> None:
             output.console().print(table)
         for number, robot in enumerate(robots, 1):
             if wrong := not_zero(robot):
-                output.line(f"{f'robot {number}: ' if several else ''}expected none: {', '.join(wrong)}")
+                output.line(f"{f'robot {number}: ' if several else ''}{', '.join(wrong)}; expected 0 of each")
 
 
 def five_rows(result: RunResult) -> list[tuple[str, str]]:

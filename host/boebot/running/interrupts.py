@@ -21,7 +21,7 @@ SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]  # what asks a program to end; not every system has all of them
 AGAIN_S = 0.5  # signals that follow the first one sooner are the same press of a key
-_SENTENCE = b"boebot: interrupted again, so the program has ended at once; the record is cut there\n"
+_SENTENCE = b"boebot: interrupted again, so the program has ended at once; what is recorded by then is kept\n"
 _LOOK_S = 0.5  # between two looks at whether the parent of a brain's process is there
 
 first: int | None = None  # number of the signal that has asked to end; None: there was none

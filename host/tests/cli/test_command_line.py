@@ -69,7 +69,7 @@ def test_run_names_what_should_be_zero_and_is_not(peer: Peer, capsys: pytest.Cap
     shown = dataclasses.replace(result, late_steps=3, lost_frames=1200, resets=1)
     assert ending.not_zero(shown) == ["late steps 3", "lost frames 1,200", "resets 1"]
     ending.print_run(shown, ending.Detail.FEW)
-    assert "expected none: late steps 3, lost frames 1,200, resets 1" in capsys.readouterr().out
+    assert "late steps 3, lost frames 1,200, resets 1; expected 0 of each" in capsys.readouterr().out
 
 
 def test_run_prints_json_and_writes_files(peer: Peer, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

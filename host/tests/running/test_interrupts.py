@@ -61,7 +61,7 @@ def step(robot):
         except KeyboardInterrupt:
             pass
 """
-AGAIN = "boebot: interrupted again, so the program has ended at once; the record is cut there\n"
+AGAIN = "boebot: interrupted again, so the program has ended at once; what is recorded by then is kept\n"
 GAP_S = interrupts.AGAIN_S + 0.2
 
 

@@ -87,8 +87,8 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         session.close = look_and_close  # type: ignore[method-assign]
         return world
 
-    for kind in ("picture", "replay"):  # tested elsewhere, and they take long
-        monkeypatch.setattr(f"boebot.view.{kind}.write", lambda result, path: path.touch())
+    for name in ("_write_picture", "_write_page"):  # tested elsewhere, and they take long
+        monkeypatch.setattr(f"boebot.view.{name}", lambda result, path: path.touch())
     monkeypatch.setattr(loop, "open_world", opened)
     return stopped
 
