@@ -74,8 +74,16 @@ ROOMS = {
     ),
     "sim_bridge": Room(26, "sim_bridge/(?!fuzz)", "sim_bridge/tests/**/test_*.py"),
     "arenas": Room(8, "host/boebot/arenas/", "sim_bridge/tests/**/test_*.py"),
-    "link": Room(6, "host/boebot/link/|host/boebot/boards", "host/tests/test_*.py hil_tests/test_*.py"),
-    "boebot": Room(28, "host/boebot/", "host/tests/test_*.py host/tests/*/test_*.py"),
+    "link": Room(
+        6,
+        "host/boebot/link/|host/boebot/boards",
+        "host/tests/link/test_*.py host/tests/test_boards.py hil_tests/test_*.py",
+    ),
+    "boebot": Room(
+        28,
+        "host/boebot(_course|_can)?/",
+        "host/tests/**/test_*.py host/boebot_course/tests/**/test_*.py host/boebot_can/tests/**/test_*.py",
+    ),
     "protocol": Room(4, "protocol/", "protocol/tests/test_*.py"),
 }
 
