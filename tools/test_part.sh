@@ -17,10 +17,9 @@ run() {
     # All units for one pin map, and for two others what only they have. Quadrature encoders: hil_tests, and `make soak`.
     units) tools/pio test -e native_sanitized -e native_boebot -e native_line ;;
     sanitized) tools/test_sanitized.sh ;;
-    # Each of the four reads all files of tests that it is given, so it is given those that have such tests; one that has
-    # none left takes some of another's.
+    # Each of the four reads all files of tests that it is given, so it is given those that have such tests.
     wall_clock)
-      build/venv/bin/python -m pytest -n 4 --dist worksteal -m "wall_clock and not soak" \
+      build/venv/bin/python -m pytest -n 4 --dist loadfile -m "wall_clock and not soak" \
         $(grep -rl --include='test_*.py' 'mark.wall_clock' docs hil_tests host protocol sim_bridge tools) "$@"
       ;;
   esac

@@ -35,7 +35,9 @@ class Shell:
         self._folder = folder
         self._setting = setting
         path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-        self._environment = os.environ | {"PATH": path, "TERM": "xterm", "MPLBACKEND": "Agg"}
+        # Without a terminal's size: pytest's workers have one there, and it would win over that of `on_screen`.
+        others = {name: value for name, value in os.environ.items() if name not in ("LINES", "COLUMNS")}
+        self._environment = others | {"PATH": path, "TERM": "xterm", "MPLBACKEND": "Agg"}
 
     def start(self, line: str, stdin: int = subprocess.DEVNULL, out: int = subprocess.PIPE) -> subprocess.Popen[bytes]:
         command = ["bash", "-c", f"{self._setting}\n{line}"]
@@ -111,6 +113,15 @@ def wait_for_port(port: int) -> None:
     raise AssertionError("the bridge does not listen")
 
 
+def wait_for(shown: bytearray, text: bytes) -> None:
+    """Until a program has drawn that."""
+    for _ in range(400):
+        if text in shown:
+            return
+        threading.Event().wait(0.05)
+    raise AssertionError(f"there is no {text!r} on the screen: {shown!r}")
+
+
 def test_ten_commands(tmp_path: Path) -> None:
     with socket.create_server(("localhost", 0)) as free:
         port = free.getsockname()[1]
@@ -126,6 +137,7 @@ def test_ten_commands(tmp_path: Path) -> None:
         shell.run(database)
         wait_for_port(port)
         with shell.in_background(logger), shell.on_screen(viewer) as raw, shell.on_screen(monitor) as named:
+            wait_for(named, b"Received")
             shell.run(drive)
         assert b"621" in raw and b"321" in raw, "heartbeat and telemetry"
         assert b"telemetry_5(" in named and b"ping_echo" in named and b"setpoint_signal(" in named
