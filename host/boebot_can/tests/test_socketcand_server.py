@@ -179,11 +179,11 @@ def test_flood_delays_itself_and_nobody_else(bus: SocketcandBus) -> None:
         began, taken = time.monotonic(), 0
         while time.monotonic() < began + 0.1:
             taken += len(bus.receive(0.0))
-        assert 0 < taken < 1000, "no more than 5,000 a second for long"
+        assert 0 < taken < 500 + 5000 * (time.monotonic() - began), "no more than 5,000 a second for long"
         quiet.sendall(b"< send 7 0 >")
         while CanFrame(7, b"") not in (now := bus.receive(0.0)):
-            assert time.monotonic() < began + 0.3, "before the flood has passed"
             taken += len(now)
+            assert taken < 2000, "before the flood has passed"
         while taken + len(now) - 1 < 2000 and time.monotonic() < began + 2.0:
             now += bus.receive(0.001)
         assert taken + len(now) - 1 == 2000, "none is lost"
