@@ -8,10 +8,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 enum { ANALOG_BANDGAP, ANALOG_BATTERY, ANALOG_INFRARED, ANALOG_INPUTS };
 
 /* Its pin becomes an input to be measured, or is pulled up. */
@@ -27,9 +23,5 @@ uint8_t analog_age(uint8_t input);
 
 /* The bandgap's last result; 0 when it was read before. */
 uint16_t analog_take_bandgap(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -6,17 +6,9 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void analog_infrared_start(void);
 
 /* Fills in its fields of devices_telemetry; false: it is off. */
 bool analog_infrared_report_devices_telemetry(msg_devices_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

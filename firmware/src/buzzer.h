@@ -7,10 +7,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define BUZZER_FREQUENCY_MIN 40u   /* Hz */
 #define BUZZER_FREQUENCY_MAX 8000u /* two interrupts a period */
 
@@ -31,9 +27,5 @@ void buzzer_silence(void);
 
 /* Fills in its fields of devices_telemetry; false: it is off. */
 bool buzzer_report_devices_telemetry(msg_devices_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -7,10 +7,6 @@
 
 #include "hal/hal.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define CLOCK_SLOTS_PER_TICK 4u
 #define CLOCK_SLOTS_PER_FRAME 8u /* of a servo frame, 20 ms */
 #define CLOCK_TICK_RATE 100u     /* Hz */
@@ -58,9 +54,5 @@ uint16_t clock_begin_slot(void);
 
 /* When all tasks of a tick have run: the next one's turn. */
 void clock_next_tick(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -17,10 +17,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define ENCODER_TIME_UNIT 256u /* cycles in 16 us */
 
 void encoder_start(void);
@@ -48,9 +44,5 @@ int32_t encoder_count(uint8_t side);
 
 /* Fills in its fields of telemetry: the readings at the start of this tick. */
 void encoder_report_telemetry(msg_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -7,10 +7,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 typedef struct {
   uint32_t time;  /* clock_time() */
   uint16_t value; /* what it is for each kind: messages.toml */
@@ -33,9 +29,5 @@ void events_forget_touches(void);
 
 /* Events that found no room in the queue and waited, or were merged, since the start, modulo 65536. */
 uint16_t events_deferred(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

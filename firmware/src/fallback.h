@@ -6,18 +6,10 @@
 #ifndef FALLBACK_H
 #define FALLBACK_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Begins to wait for the host. */
 void fallback_start(void);
 
 /* The host has spoken: the motors follow it again, and get no pulses before its next set-point. */
 void fallback_host_spoke(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -4,10 +4,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Brings up board, devices and link, says hello, and starts the slots. */
 void firmware_start(void);
 
@@ -17,9 +13,5 @@ void firmware_poll(void);
 
 /* Not 0: there is something for firmware_poll() to do. */
 uint8_t firmware_due(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

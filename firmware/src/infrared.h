@@ -12,10 +12,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void infrared_start(void);
 
 /* INFRARED_... bits of the last reading. */
@@ -32,9 +28,5 @@ void infrared_begin(uint8_t side);
 
 /* Fills in its fields of telemetry. */
 void infrared_report_telemetry(msg_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -12,10 +12,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define LIGHT_LONGEST 14000u /* us */
 
 void light_start(void);
@@ -31,9 +27,5 @@ void light_mask(uint8_t pins);
 
 /* Fills in its fields of devices_telemetry; false: it is off. */
 bool light_report_devices_telemetry(msg_devices_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

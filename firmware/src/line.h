@@ -9,17 +9,9 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void line_start(void);
 
 /* Fills in its fields of line_telemetry; false: it is off. */
 bool line_report_line_telemetry(msg_line_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

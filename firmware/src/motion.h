@@ -10,10 +10,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define MOTION_PULSE_MIN 20800u /* 1300 us in cycles */
 #define MOTION_PULSE_MAX 27200u /* 1700 us */
 
@@ -30,9 +26,5 @@ void motion_eighths(int8_t left, int8_t right); /* of a full signal, -8..8 */
 
 /* No pulses. */
 void motion_off(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -9,10 +9,6 @@
 
 #include "generated/parameters.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* At start: defaults, and no host has come. */
 void parameters_start(void);
 
@@ -43,9 +39,5 @@ const uint16_t *parameters_values(void);
 
 /* Puts PARAMETER_COUNT such values in force, if each is within its range; otherwise none, and returns false. */
 bool parameters_restore(const uint16_t *kept);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -10,10 +10,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void pin_changes_start(void);
 
 /* Not 0: a part of the ring waits, or the interrupt has masked the pins. */
@@ -25,9 +21,5 @@ void pin_changes_poll(void) __attribute__((noinline));
 /* The same at the beginning of every slot's work: stamps of 16 bits roll over after 4 ms. In a tick's first slot masked pins are
  * listened to again from here on. */
 void pin_changes_begin_slot(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

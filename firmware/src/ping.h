@@ -16,17 +16,9 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void ping_start(void);
 
 /* Fills in its fields of telemetry. */
 void ping_report_telemetry(msg_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

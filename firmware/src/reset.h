@@ -9,10 +9,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* At start, before all others. */
 void reset_start(void);
 
@@ -25,9 +21,5 @@ void reset_note_running(uint8_t task);
 
 /* Draws a nonce: 21 bits, not 0, another one at each call, also after a reset. After storage_start(). */
 uint32_t reset_nonce(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

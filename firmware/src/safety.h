@@ -16,10 +16,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define SAFETY_TIME_TO_LIVE_MAX 2000u /* ms */
 
 void safety_start(void);
@@ -63,9 +59,5 @@ void safety_end_fallback(void);
 
 /* STATUS_MOTORS_ENABLED, STATUS_DEAD_MAN, STATUS_FALLBACK, STATUS_LATCHED. */
 uint16_t safety_status(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

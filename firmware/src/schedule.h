@@ -6,10 +6,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* The first tick to come is `first_tick`: 0 but for tests of what happens where counts roll over. */
 void schedule_start(uint32_t first_tick);
 
@@ -20,9 +16,5 @@ void schedule_poll(void) __attribute__((noinline));
 /* Ticks whose work did not end in time since reset, modulo 256; and whether the previous one did not. */
 uint8_t schedule_overruns(void);
 bool schedule_overran(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

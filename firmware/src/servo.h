@@ -12,10 +12,6 @@
 #include "generated/messages.h"
 #include "pins.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Beside LEFT and RIGHT. */
 enum { SERVO_TURRET = SIDES, SERVOS };
 
@@ -39,9 +35,5 @@ void servo_begin(uint8_t servo, uint16_t start);
 
 /* Fills in its fields of telemetry. */
 void servo_report_telemetry(msg_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -16,10 +16,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Reads the boot counter. At start, before interrupts. */
 void storage_start(void);
 
@@ -43,9 +39,5 @@ uint8_t storage_result(void);
 
 /* Starts of this board that ran for 10 s, this one included. */
 uint32_t storage_boot_counter(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -8,10 +8,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void supply_start(void);
 
 /* mV; 0: not yet measured. */
@@ -24,9 +20,5 @@ bool supply_report_devices_telemetry(msg_devices_telemetry *message);
 
 /* Two measurements in a row were below the parameter supply_minimum, and none since was 100 mV above it. */
 bool supply_low(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

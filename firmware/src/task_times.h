@@ -6,10 +6,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* The longest times start anew. */
 void task_times_start(void);
 
@@ -22,9 +18,5 @@ void task_has_ended(void);
 /* The longest that a task took since task_times_start(); 0: it has not run, or this image has no such task. Main
  * loop only. */
 uint16_t task_times_longest(uint8_t task);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -5,10 +5,6 @@
 
 #include "generated/values.h" /* TASK_..., their numbers: the same in all images, also in those that do not have all tasks */
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define TASK(name, period, phase, budget) void name##_task(void) __attribute__((noinline));
 #include "tasks.def"
 
@@ -17,9 +13,5 @@ enum {
 #define CONSTANT(name, value) CONSTANT_##name = (value),
 #include "tasks.def"
 };
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

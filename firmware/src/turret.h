@@ -11,10 +11,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void turret_start(void);
 
 /* Turns to an angle in 1/10000 rad, -16000..16000. */
@@ -25,9 +21,5 @@ void turret_release(void);
 
 /* Fills in its fields of devices_telemetry; false: it is off. */
 bool turret_report_devices_telemetry(msg_devices_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -7,10 +7,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define TWO_WIRE_WRITE_MAX 4u
 #define TWO_WIRE_READ_MAX 6u
 
@@ -35,9 +31,5 @@ const volatile uint8_t *two_wire_bytes(void);
 
 /* Switches the bus off and lets both lines go; a transfer under way has failed. */
 void two_wire_stop(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

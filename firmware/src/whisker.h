@@ -11,10 +11,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 typedef struct {
   bool pressed;
   uint8_t streak; /* samples in a row that say otherwise */
@@ -30,9 +26,5 @@ uint8_t whisker_read(void);
 
 /* Fills in its fields of telemetry. */
 void whisker_report_telemetry(msg_telemetry *message);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

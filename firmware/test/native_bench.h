@@ -14,10 +14,12 @@
 #include "generated/messages.h"
 #include "hal/native/machine.h"
 #include "host_frame.h"
+extern "C" {
 #include "link/frame.h"
 #include "link/session_seed.h"
-#include "pins.h"
 #include "schedule.h"
+}
+#include "pins.h"
 
 extern "C" const native_api *firmware_board_api(void);
 

@@ -30,10 +30,6 @@
 #include "hal/native/hal_native.h"
 #endif
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* ---- start and reset ---- */
 
 /* Starts time and slots: the first slot begins at HAL_SLOT_CYCLES. Interrupts are on from here. */
@@ -171,9 +167,5 @@ void hal_two_wire_end(void);          /* a stop */
 
 uint8_t hal_two_wire_status(void); /* HAL_TWO_WIRE_... */
 uint8_t hal_two_wire_byte(void);   /* the byte received */
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

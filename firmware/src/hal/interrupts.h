@@ -7,10 +7,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void schedule_on_slot(void);            /* a slot begins */
 void servo_on_edge(void);               /* the edge of hal_edge_arm() is near */
 void ping_on_edge(uint16_t time);       /* the captured edge of the Ping pin */
@@ -19,9 +15,5 @@ void pin_changes_on_change(uint16_t time, uint8_t port_bits); /* a watched pin o
 void port_d_on_change(uint16_t time);                         /* a watched pin of port D has changed */
 void two_wire_on_step(void);                                  /* the two-wire bus has done a step */
 void reset_on_watchdog(void);                                 /* the watchdog was not kicked: a reset follows */
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

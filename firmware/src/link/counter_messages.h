@@ -2,14 +2,6 @@
 #ifndef LINK_COUNTER_MESSAGES_H
 #define LINK_COUNTER_MESSAGES_H
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 void counter_messages_start(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

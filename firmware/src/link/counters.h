@@ -6,10 +6,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Counted where it happens, modulo 65536; good, bad, unknown and resynchronised are the decoder's (receive.h). */
 extern msg_counters counters;
 
@@ -23,9 +19,5 @@ void counters_end_tick(void);
 
 /* Whether it was counted since the last call. */
 bool counters_bytes_lost(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -4,15 +4,7 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Finds how often the line can carry it; after send_start(). */
 void devices_start_line(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -5,18 +5,10 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* A new session: numbers begin at 1. */
 void event_delivery_start(void);
 
 /* The host has the event of that number. */
 void event_delivery_acknowledge(uint16_t number);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

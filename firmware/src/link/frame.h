@@ -18,10 +18,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 #define FRAME_SEED 0x155555ul         /* of the handshake's messages */
 #define FRAME_SEED_MAX 0x1FFFFFul     /* seeds have 21 bits */
 #define FRAME_NO_SESSION 0xFFFFFFFFul /* seed of a decoder that accepts only the handshake's messages */
@@ -86,9 +82,5 @@ static inline bool frame_decode(frame_decoder *decoder, uint8_t byte) {
 static inline uint8_t frame_id(const frame_decoder *decoder) { return decoder->bytes[1]; }
 static inline uint8_t frame_sequence(const frame_decoder *decoder) { return decoder->bytes[2]; }
 static inline const uint8_t *frame_payload(const frame_decoder *decoder) { return &decoder->bytes[3]; }
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -5,10 +5,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Computes the image's hash. */
 void identity_start(void);
 
@@ -18,9 +14,5 @@ bool identity_send(void) __attribute__((noinline));
 
 /* The message of that index in order of ids; id 0 beyond the last. */
 bool identity_describe(uint8_t index);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

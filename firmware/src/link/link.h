@@ -4,10 +4,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Forgets everything and queues the hello; the line carries `baud` * 100 bit/s. */
 void link_start(uint16_t baud);
 
@@ -15,9 +11,5 @@ void link_start(uint16_t baud);
  * room for the answer and, after it, for the next telemetry, which is never left out for the sake of answers; the messages
  * behind it wait, too. A stop and set-points do not wait themselves. */
 void link_poll(void) __attribute__((noinline));
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

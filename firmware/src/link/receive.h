@@ -8,10 +8,6 @@
 #include "generated/messages.h"
 #include "link/frame.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Forgets everything; no session is open. */
 void receive_start(void);
 
@@ -31,9 +27,5 @@ uint8_t receive_due(void);
 
 /* Frames accepted, refused and of unknown messages, and times that a good one followed bad ones, into the counters. */
 void receive_count(msg_counters *into);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -5,19 +5,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* A new session: the next request is number 1. */
 void requests_start(void);
 
 /* A request came: carries it out, or only answers it again, or refuses it and returns false: neither the next nor the
  * last. The caller has seen to room for the answer. */
 bool requests_take(uint8_t id, const uint8_t *payload);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

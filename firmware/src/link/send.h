@@ -8,10 +8,6 @@
 #include "hal/hal.h"
 #include "link/frame.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* The next frame is the first; the line carries `baud` * 100 bit/s. */
 void send_start(uint16_t baud);
 
@@ -29,9 +25,5 @@ uint8_t send_ticks(uint16_t bytes);
 
 /* and in half milliseconds, rounded down. */
 uint16_t send_half_ms(uint8_t bytes);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

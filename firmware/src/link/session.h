@@ -8,10 +8,6 @@
 
 #include "generated/messages.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* At start: no session is open; says hello. */
 void session_start(void);
 
@@ -26,9 +22,5 @@ void session_identify(void);
 
 /* A frame of the session was accepted. */
 void session_heard(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

@@ -5,10 +5,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* A session of that seed is open from now on, or none (FRAME_NO_SESSION). Draws the nonce that the next opening must name. */
 void session_use_seed(uint32_t seed);
 
@@ -18,9 +14,5 @@ bool session_is_open(void);
 
 /* The board's half of the next session's seed. */
 uint32_t session_board_nonce(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

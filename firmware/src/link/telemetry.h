@@ -4,10 +4,6 @@
 
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Finds how often the line can carry it; after send_start(). */
 void telemetry_start_line(void);
 
@@ -18,9 +14,5 @@ void telemetry_start(void);
  * that it fills half of the line at most. */
 uint8_t telemetry_period(void);
 uint8_t telemetry_line_period(void);
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif

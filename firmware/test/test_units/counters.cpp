@@ -5,12 +5,14 @@
 #include <initializer_list>
 
 #include "generated/parameters.h"
+extern "C" {
 #include "link/counters.h"
 #include "link/send.h"
 #include "link/telemetry.h"
-#include "native_bench.h"
 #include "task_times.h"
 #include "tasks.h"
+}
+#include "native_bench.h"
 
 namespace {
 

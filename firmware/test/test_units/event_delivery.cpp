@@ -3,7 +3,9 @@
 
 #include <initializer_list>
 
+extern "C" {
 #include "events.h"
+}
 #include "generated/parameters.h"
 #include "native_bench.h"
 

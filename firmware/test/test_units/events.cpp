@@ -1,5 +1,7 @@
 /* The queue of what has happened: its order, what merges when it is full, and what is forgotten. */
+extern "C" {
 #include "events.h"
+}
 
 #include <doctest.h>
 

@@ -5,12 +5,14 @@
 #include <ostream>
 
 #include "../native_bench.h"
+extern "C" {
 #include "fallback.h"
-#include "generated/parameters.h"
 #include "parameters.h"
 #include "safety.h"
 #include "servo.h"
 #include "supply.h"
+}
+#include "generated/parameters.h"
 
 namespace {
 

@@ -10,7 +10,9 @@
 #include "generated/vectors.h"
 #include "host_frame.h"
 #include "link/crc21.h"
+extern "C" {
 #include "link/frame.h"
+}
 
 namespace {
 

@@ -1,7 +1,9 @@
 /* What comes over a line that is too full: reception stops when its ring is full, and goes on with the next whole frame. */
 #include <doctest.h>
 
+extern "C" {
 #include "hal/hal.h"
+}
 #include "native_bench.h"
 
 namespace {

@@ -1,5 +1,7 @@
 /* Motor signal or speed to servo pulse. */
+extern "C" {
 #include "motion.h"
+}
 
 #include <doctest.h>
 

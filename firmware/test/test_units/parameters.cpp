@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "memory_bench.h"
+extern "C" {
 #include "parameters.h"
+}
 #include "pins.h"
 
 namespace {

@@ -1,11 +1,13 @@
 /* Changes of the pins of port C: storms, a full ring, pulses too short to be seen, and pins that are listened to again. What
  * comes of changes shows in the encoders' counts. */
+extern "C" {
 #include "pin_changes.h"
+#include "hal/interrupts.h"
+}
 
 #include <doctest.h>
 
 #include "generated/parameters.h"
-#include "hal/interrupts.h"
 #include "native_bench.h"
 
 namespace {

@@ -3,11 +3,13 @@
 
 #include <set>
 
+extern "C" {
 #include "hal/interrupts.h"
-#include "memory_bench.h"
 #include "reset.h"
 #include "task_times.h"
 #include "tasks.h"
+}
+#include "memory_bench.h"
 
 namespace {
 

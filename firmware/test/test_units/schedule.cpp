@@ -3,7 +3,9 @@
 
 #include <random>
 
+extern "C" {
 #include "clock.h"
+}
 #include "generated/parameters.h"
 #include "native_bench.h"
 

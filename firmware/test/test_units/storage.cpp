@@ -4,9 +4,11 @@
 #include <map>
 
 #include "memory_bench.h"
+extern "C" {
 #include "parameters.h"
 #include "storage.h"
 #include "supply.h"
+}
 
 namespace {
 

@@ -2,8 +2,10 @@
 #include <doctest.h>
 
 #include "memory_bench.h"
+extern "C" {
 #include "parameters.h"
 #include "supply.h"
+}
 
 namespace {
 

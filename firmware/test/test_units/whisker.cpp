@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "native_bench.h"
+extern "C" {
 #include "whisker.h"
+}
 
 TEST_CASE("one sample is not a touch, two are") {
   whisker_state state{false, 0};

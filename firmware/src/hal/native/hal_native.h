@@ -9,10 +9,6 @@
 
 #include "bounds.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* Interrupts come between calls, never inside one. */
 #define HAL_ATOMIC
 
@@ -52,9 +48,5 @@ void hal_capture_stop(void);
 #define HAL_TABLE static const
 static inline uint16_t hal_table_word(const uint16_t *word) { return *word; }
 static inline void hal_table_copy(void *to, const void *from, uint8_t size) { memcpy(to, from, size); }
-
-#ifdef __cplusplus
-}
-#endif
 
 #endif
