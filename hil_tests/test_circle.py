@@ -17,7 +17,7 @@ def test_wander_keeps_moving_for_a_minute(board_url: str, seed: int) -> None:
     result = boebot.run("wander", on=board_url, seconds=60, seed=seed)
     assert result.truth is not None
     assert windows_moved(result.truth).min() >= 0.05
-    assert result.lost_frames == 0 and result.dead_man_stops == 0 and result.overruns == 0
+    assert result.lost_frames == 0 and result.overview.dead_man_stops == 0 and result.overview.overruns == 0
 
 
 @pytest.mark.soak
@@ -42,9 +42,9 @@ def test_brain_that_does_nothing_fails_both_measures(board_url: str) -> None:
 
 def test_same_seed_same_bytes(board_url: str) -> None:
     runs = [boebot.run("wander", on=board_url, seconds=10, seed=seed) for seed in (3, 3, 4)]
-    assert runs[0].bytes_from_board == runs[1].bytes_from_board
-    assert runs[0].bytes_to_board == runs[1].bytes_to_board
-    assert runs[0].bytes_from_board != runs[2].bytes_from_board
+    assert runs[0].record.rows("to_host") == runs[1].record.rows("to_host")
+    assert runs[0].record.rows("to_board") == runs[1].record.rows("to_board")
+    assert runs[0].record.rows("to_host") != runs[2].record.rows("to_host")
 
 
 def test_odometry_follows_the_truth(board_url: str) -> None:

@@ -112,7 +112,7 @@ class Chunks:
             columns=columns.part(np.unique(np.append(kept, len(columns) - 1))),
             start=self._start,
             shown=shown_in(showing, names_in(showing)),
-            layers=read_layers(_rows(news, SKETCH)),
+            layers=read_layers(Record.of({name: news[name] for name in (SKETCH,) if name in news})),
             brain=None if names is None or STEPS not in news else read_brain(Record.of(mind), names),
             true_contacts=_where(true, events, "contact", columns),
             touches=_where(seen, events, "touch", columns),

@@ -111,6 +111,12 @@ def merged(groups: Sequence[Group]) -> Group:
     return {name: joined(*chain(groups, name)) for name in names}
 
 
+def few(count: int, most: int | None) -> NDArray[np.intp]:
+    """Indices of about `most` of that many rows, evenly, the first and the last among them; None: of all."""
+    stride = 1 if most is None else max(1, -(-count // max(1, most)))
+    return np.unique(np.append(np.arange(0, count, stride), np.arange(count)[-1:]))
+
+
 def schema() -> bytes:
     """Of a block on disk: a FileDescriptorSet, as MCAP wants it for Protobuf."""
     from google.protobuf.descriptor_pb2 import FileDescriptorSet

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import math
 import struct
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -15,11 +16,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.showing import VALUES, Sketch
+from boebot.record.blocks import few
+from boebot.showing import SKETCH, VALUES, Sketch
 
 if TYPE_CHECKING:  # the record of a run without such a brain does without
     from boebot.brain.brain import Brain, Switch
-    from boebot.record.blocks import Row
+    from boebot.record.blocks import Block, Row
     from boebot.record.record import Record
     from boebot.record.truth import Floats
     from boebot.robot import Robot
@@ -128,6 +130,16 @@ class BrainRecord:
         utilities: Floats = self.utilities[:, self.names.processes.index(process)]
         return utilities
 
+    def thinned(self, most: int) -> BrainRecord:
+        """About `most` of its steps, and before each of them the last switch of either kind; counts and shares stay."""
+        steps = few(len(self), most)
+        last: dict[tuple[int, bool], Switch] = {}
+        for switch in self.switches:
+            last[int(np.searchsorted(self.time[steps], switch.time)), switch.on in self.names.behaviors] = switch
+        names = ("time", "motor", "values", "utilities", "gammas")
+        thin: dict[str, Any] = {name: getattr(self, name)[steps] for name in names}
+        return replace(self, switches=tuple(sorted(last.values(), key=lambda switch: switch.time)), **thin)
+
     def shares(self, end: float = 0.0) -> dict[str, float]:
         """The share of time, 0 to 1, of each motor behavior: what is active at a step is so until the next one, the
         last one until `end` (s)."""
@@ -153,32 +165,14 @@ def append_brain(record: Record, brain: Brain | None, robot: Robot) -> None:
         record.append(SWITCHES, switch.time, msgspec.json.encode(switch[1:]))
 
 
-def read_brain(record: Record, names: BrainNames, most: int | None = None) -> BrainRecord:
-    """All of it. `most`: how many steps at most; the first and the last are among them."""
-    stride = 1 if most is None else max(1, math.ceil(record.count(STEPS) / most))
-    last = record.count(STEPS) - 1
-    times, rows, lasted = [np.empty(0)], [np.empty(0, dtype=names.row)], np.zeros(len(names.behaviors))
-    seen, before = 0, None
-    for time, some in _parts(record, names):
-        number = seen + np.arange(len(some))
-        kept = (number % stride == 0) | (number == last)
-        times.append(time[kept])
-        rows.append(some[kept])
-        seen += len(some)
-        ends, motor = np.append(time[1:], time[-1]), _motor(some, names)
-        lasted += np.bincount(motor, weights=ends - time, minlength=len(lasted))
-        if before is not None:
-            lasted[before[1]] += time[0] - before[0]
-        before = time[-1], motor[-1]
-    time = np.concatenate(times)
-    switches, count = _switches(record, names, time if stride > 1 else None)
-    return _made(names, time, np.concatenate(rows), switches, count, lasted)
+def read_brain(record: Record, names: BrainNames) -> BrainRecord:
+    """All of it."""
+    return _brain_of(names, record.block(STEPS), tuple(each_switch(record)))
 
 
 def each_part(record: Record, names: BrainNames) -> Iterator[BrainRecord]:
     """The steps part by part, each small, without the switches."""
-    for time, rows in _parts(record, names):
-        yield _made(names, time, rows, (), 0, np.zeros(len(names.behaviors)))
+    return (_brain_of(names, block, ()) for block in record.blocks(STEPS))
 
 
 def each_switch(record: Record) -> Iterator[Switch]:
@@ -189,43 +183,15 @@ def each_switch(record: Record) -> Iterator[Switch]:
         yield Switch(time_s, *msgspec.json.decode(data))
 
 
-def _parts(record: Record, names: BrainNames) -> Iterator[tuple[Floats, NDArray[np.void]]]:
-    for block in record.blocks(STEPS):
-        yield block.times, block.table(names.row)
-
-
-def _made(
-    names: BrainNames,
-    time: Floats,
-    rows: NDArray[np.void],
-    switches: tuple[Switch, ...],
-    behavior_switches: int,
-    lasted: Floats,
-) -> BrainRecord:
-    motor = _motor(rows, names)
-    columns = (rows["values"], rows["utilities"], rows["gammas"])
-    return BrainRecord(names, time, motor, *columns, switches, behavior_switches, lasted)
-
-
-def _motor(rows: NDArray[np.void], names: BrainNames) -> NDArray[np.intp]:
-    """Index in `names.behaviors` of the active one."""
+def _brain_of(names: BrainNames, block: Block, switches: tuple[Switch, ...]) -> BrainRecord:
+    rows, time = block.table(names.row), block.times
     behavior = [names.behaviors.index(name) if name in names.behaviors else -1 for name in names.processes]
-    return np.array(behavior, dtype=np.intp)[rows["process"].astype(np.intp)]
-
-
-def _switches(record: Record, names: BrainNames, times: Floats | None) -> tuple[tuple[Switch, ...], int]:
-    """The switches, and how many there were of motor behaviors. `times`: of the steps, where not all are kept."""
-    kept: dict[tuple[int, bool], Switch] = {}
-    all_of_them: list[Switch] = []
-    count = 0
-    for switch in each_switch(record):
-        count += switch.off in names.behaviors
-        if times is None:
-            all_of_them.append(switch)
-        else:
-            kept[int(np.searchsorted(times, switch.time)), switch.on in names.behaviors] = switch
-    switches = all_of_them if times is None else sorted(kept.values(), key=lambda switch: switch.time)
-    return tuple(switches), count
+    motor = np.array(behavior, dtype=np.intp)[rows["process"].astype(np.intp)]
+    lasted = np.zeros(len(names.behaviors))
+    np.add.at(lasted, motor, np.diff(time, append=time[-1:]))
+    changed = sum(switch.off in names.behaviors for switch in switches)
+    columns = (rows["values"], rows["utilities"], rows["gammas"])
+    return BrainRecord(names, time, motor, *columns, switches, changed, lasted)
 
 
 # ---- what it showed --------------------------------------------------------------------------------------------------
@@ -255,13 +221,8 @@ class Shown:
         )
 
 
-def shown_names(record: Record) -> dict[str, bool]:
-    """Of all that was shown, and whether it was ever a text."""
-    return names_in(record.each_row(VALUES))
-
-
 def names_in(rows: Iterable[Row]) -> dict[str, bool]:
-    """The same of those rows."""
+    """Of all that is shown in those rows of the stream, and whether it was ever a text."""
     names: dict[str, bool] = {}
     for _, data in rows:
         for name, value in msgspec.json.decode(data).items():
@@ -270,15 +231,13 @@ def names_in(rows: Iterable[Row]) -> dict[str, bool]:
 
 
 def read_shown(record: Record, most: int | None = None) -> Shown:
-    """All of it. `most`: how many rows at most, the first and the last among them."""
-    count = record.count(VALUES)
-    stride = 1 if most is None else max(1, math.ceil(count / most))
-    rows = enumerate(record.each_row(VALUES))
-    return shown_in((row for index, row in rows if index % stride == 0 or index == count - 1), shown_names(record))
+    """All of it. `most`: about how many rows at most, the first and the last among them."""
+    rows = record.rows(VALUES)
+    return shown_in([rows[index] for index in few(len(rows), most)], names_in(rows))
 
 
 def shown_in(rows: Iterable[Row], names: Mapping[str, bool]) -> Shown:
-    """Of those rows. `names`: of all that is shown, and whether it is a text (`shown_names`)."""
+    """Of those rows. `names`: of all that is shown, and whether it is a text (`names_in`)."""
     decoded = [(time_s, msgspec.json.decode(data)) for time_s, data in rows]
     return Shown(
         np.array([time_s for time_s, _ in decoded]),
@@ -310,50 +269,24 @@ class Layer:
     sketches: list[Sketch]
 
 
-class _Kept:
-    """The rows of one layer: all of them, or every second, fourth, eighth... and the last one."""
-
-    def __init__(self) -> None:
-        self.rows: list[tuple[float, Sketch]] = []
-        self.size = 0
-        self._stride = 1
-        self._count = 0
-        self._last: tuple[float, Sketch] | None = None
-
-    def add(self, time_s: float, sketch: Sketch) -> None:
-        """One more."""
-        self._last = time_s, sketch
-        if self._count % self._stride == 0:
-            self.rows.append(self._last)
-            self.size += _size(sketch)
-        self._count += 1
-
-    def thin(self) -> None:
-        """Half of them, with the first."""
-        self.rows = self.rows[::2]
-        self._stride *= 2
-        self.size = sum(_size(sketch) for _, sketch in self.rows)
-
-    def layer(self, name: str) -> Layer:
-        """What is left."""
-        rows = self.rows if self._last is None or self.rows[-1] is self._last else [*self.rows, self._last]
-        return Layer(name, np.array([time_s for time_s, _ in rows]), [sketch for _, sketch in rows])
+def read_layers(record: Record, most: int | None = SKETCH_BYTES) -> list[Layer]:
+    """The sketches, layer by layer in the order of their first ones. `most`: about how many bytes of them; a layer that
+    has more than its share changes less often."""
+    sizes: dict[str, list[int]] = {}
+    for _, data in record.each_row(SKETCH):
+        sizes.setdefault(_sketch(data).layer, []).append(len(data))
+    wanted = {
+        name: few(len(own), None if most is None else most * len(own) // (sum(own) * len(sizes))).tolist()
+        for name, own in sizes.items()
+    }
+    seen, kept = Counter[str](), dict[str, list[tuple[float, Sketch]]]()
+    for time_s, data in record.each_row(SKETCH):
+        sketch = _sketch(data)
+        if seen[sketch.layer] == wanted[sketch.layer][len(kept.setdefault(sketch.layer, []))]:
+            kept[sketch.layer].append((time_s, sketch))
+        seen[sketch.layer] += 1
+    return [Layer(name, np.array([row[0] for row in rows]), [row[1] for row in rows]) for name, rows in kept.items()]
 
 
-def _size(sketch: Sketch) -> int:
-    return 100 + 8 * sketch.size + (0 if sketch.grid is None else len(sketch.grid.cells))
-
-
-def read_layers(rows: Iterable[Row], most: int | None = SKETCH_BYTES) -> list[Layer]:
-    """The sketches in those rows, layer by layer in the order of their first ones. `most`: about how many bytes of
-    them; a layer that has more changes less often."""
-    layers: dict[str, _Kept] = {}
-    for time_s, data in rows:
-        sketch = msgspec.json.decode(data, type=Sketch)
-        layers.setdefault(sketch.layer, _Kept()).add(time_s, sketch)
-        while most is not None and sum(kept.size for kept in layers.values()) > most:
-            greatest = max(layers.values(), key=lambda kept: len(kept.rows) > 1 and kept.size)
-            if len(greatest.rows) < 2:
-                break
-            greatest.thin()
-    return [kept.layer(name) for name, kept in layers.items()]
+def _sketch(data: bytes) -> Sketch:
+    return msgspec.json.decode(data, type=Sketch)

@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +32,11 @@ from boebot.record.truth import Bools, Floats, Pose, Track, track_of
 from boebot.showing import VALUES
 
 if TYPE_CHECKING:
+    from boebot.arenas import Arena
     from boebot.description.robots import RobotDescription
     from boebot.devices.readings import Layout
     from boebot.link.delivery import BoardEvent
-    from boebot.record.run import Run
+    from boebot.record.record import Record
 
 TICKS = 20_000  # of a piece
 TRUTH_BEFORE_S = 0.5  # of the truth, before a piece's first tick
@@ -50,6 +51,17 @@ _TELEMETRY = np.dtype(
     ]
     + [("host", "<f8"), ("bound", "<f8")]  # the stamp
 )
+
+
+class Recorded(Protocol):
+    """A run, as far as columns are made of it; see `boebot.record.run.Run`."""
+
+    robot: RobotDescription
+    layout: Layout | None
+    tick: float
+    record: Record
+    clock_offset: float
+    world: Arena | None
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -118,6 +130,14 @@ class Columns(ABC):
     @abstractmethod
     def signals(self) -> tuple[Floats, Floats]:
         """Motor signals in force, left and right."""
+
+    @property
+    def placed_odometry(self) -> Pose | None:
+        """The odometry as it lies in the arena, from the true pose at the start; None: there is no truth, or no
+        odometry."""
+        if self.true_pose is None or self.odometry is None:
+            return None
+        return self.odometry.placed(*self.true_pose.at(0))
 
     @property
     def overruns(self) -> int:
@@ -384,7 +404,7 @@ class Reader:
         offset_s: the transport's clock at the run's time 0 (s).
     """
 
-    def __init__(self, result: Run) -> None:
+    def __init__(self, result: Recorded) -> None:
         """`result`: what is known of the robot; of its record nothing is read."""
         self.offset_s = result.clock_offset
         self._robot, self._tick_s, self._layout = result.robot, result.tick, result.layout
@@ -480,7 +500,7 @@ def _filled(blocks: Group) -> dict[str, Block]:
     return {name: block for name, block in blocks.items() if len(block)}
 
 
-def columns(result: Run) -> Iterator[Columns]:
+def columns(result: Recorded) -> Iterator[Columns]:
     """A recorded run piece by piece, `TICKS` ticks each and a rest; of one without ticks nothing."""
     reader = Reader(result)
     for group in result.record.groups():
@@ -491,7 +511,7 @@ def columns(result: Run) -> Iterator[Columns]:
         yield reader.read()
 
 
-def whole(result: Run) -> Columns:
+def whole(result: Recorded) -> Columns:
     """The same in one piece."""
     reader = Reader(result)
     for group in result.record.groups():
@@ -499,7 +519,7 @@ def whole(result: Run) -> Columns:
     return reader.read()
 
 
-def events(result: Run) -> Iterator[tuple[float, BoardEvent]]:
+def events(result: Recorded) -> Iterator[tuple[float, BoardEvent]]:
     """The board's events with their times of the run (s): by the board's clock, as telemetry near them has both."""
     times, board = np.zeros(1), np.zeros(1)
     for group in result.record.groups():

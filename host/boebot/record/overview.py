@@ -7,19 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boebot.devices.device import SlowDevice
 from boebot.link.messages import EventKind, Status
-from boebot.record.brain_record import BrainRecord, Layer, Shown, read_brain, read_layers, read_shown
-from boebot.record.columns import Columns, chained, columns, whole
+from boebot.record.brain_record import BrainNames, BrainRecord, Layer, Shown, read_brain, read_layers, read_shown
+from boebot.record.columns import Columns, Recorded, chained, columns, whole
 from boebot.record.truth import APART_S, Bools, Floats, Pose, Track
-from boebot.showing import SKETCH
-
-if TYPE_CHECKING:
-    from boebot.record.run import Run
 
 POINTS = 20_000  # ticks at most that are drawn
 PLACES = 5_000  # touches at most whose places are drawn
@@ -55,13 +50,6 @@ class Overview:
     shown: Shown
     layers: list[Layer]
     brain: BrainRecord | None
-
-    @property
-    def placed_odometry(self) -> Pose | None:
-        """The odometry as it lies in the arena, from the true pose at the start; None: there is no truth, or no
-        odometry."""
-        true, odometry = self.columns.true_pose, self.columns.odometry
-        return None if true is None or odometry is None else odometry.placed(*true.at(0))
 
 
 class _Places:
@@ -165,9 +153,9 @@ def _rises(flags: Bools, first: int) -> Bools:
     return up
 
 
-def overview(result: Run) -> Overview:
-    """Of a run."""
-    record, offset_s, whiskers = result.record, result.clock_offset, result.whiskers
+def overview(result: Recorded, whiskers: list[str], names: BrainNames | None) -> Overview:
+    """Of a run of a robot with these whiskers. `names`: of the parts of its brain, if it is recorded."""
+    record, offset_s = result.record, result.clock_offset
     slow = [name for name, device in result.robot.device.items() if isinstance(device, SlowDevice)]
     ticks = record.ticks
     stride = max(1, math.ceil(ticks / POINTS))
@@ -191,7 +179,6 @@ def overview(result: Run) -> Overview:
         few.append(part.part(part.first + np.flatnonzero((number % stride == 0) | (number == ticks - 1))))
     drawn = chained(few) if few else whole(result)
     events = [(event.kind, event.value) for event in record.events]
-    names = result.brain_names if result.is_recorded else None
     return Overview(
         columns=drawn,
         true_distance=None if drawn.true_pose is None or not ticks else true_walk.length,
@@ -206,6 +193,6 @@ def overview(result: Run) -> Overview:
         fallback_takeovers=max(counts.fallback, events.count((EventKind.FALLBACK, 1))),
         slow_reading_age=counts.oldest,
         shown=read_shown(record, POINTS),
-        layers=read_layers(record.each_row(SKETCH)),
-        brain=None if names is None else read_brain(record, names, POINTS),
+        layers=read_layers(record),
+        brain=None if names is None else read_brain(record, names).thinned(POINTS),
     )

@@ -38,7 +38,6 @@ from boebot.record.interventions import touched
 from boebot.record.overview import Overview, overview
 from boebot.record.record import Record, Unrecorded
 from boebot.record.truth import Pose, plan_of, truth_of
-from boebot.showing import SKETCH
 
 
 @dataclass(kw_only=True, repr=False)
@@ -195,24 +194,14 @@ class Run:
     @cached_property
     def layers(self) -> list[Layer]:
         """What the brain sketched (`robot.sketch`), layer by layer."""
-        return read_layers(self.record.each_row(SKETCH), None)
-
-    @property
-    def bytes_from_board(self) -> bytes:
-        """Every byte that came from the board."""
-        return b"".join(data for _, data in self.record.rows("to_host"))
-
-    @property
-    def bytes_to_board(self) -> bytes:
-        """Every byte that went to the board."""
-        return b"".join(data for _, data in self.record.rows("to_board"))
+        return read_layers(self.record, None)
 
     # ---- figures -------------------------------------------------------------------------------------------
 
     @cached_property
     def overview(self) -> Overview:
         """What tables, pictures and pages show of it; takes no more memory for a long run than for a short one."""
-        return overview(self)
+        return overview(self, self.whiskers, self.brain_names if self.is_recorded else None)
 
     @property
     def true_distance(self) -> float | None:
@@ -255,37 +244,20 @@ class Run:
         return self.record.ticks if self.is_recorded else None
 
     @property
-    def overruns(self) -> int | None:
-        """Control ticks whose work did not end in time; None: not recorded."""
-        return self.overview.overruns if self.is_recorded else None
-
-    @property
-    def dead_man_stops(self) -> int | None:
-        """Times the motors stopped because no fresh set-point came; None: not recorded."""
-        return self.overview.dead_man_stops if self.is_recorded else None
-
-    @property
-    def fallback_takeovers(self) -> int | None:
-        """Times the board's own brain took over because the host was silent; None: not recorded."""
-        return self.overview.fallback_takeovers if self.is_recorded else None
-
-    @property
     def whiskers(self) -> list[str]:
         """Names of the robot's whiskers."""
         return [name for name, device in self.robot.device.items() if device.on and device.READING is Whisker]
 
-    @cached_property
+    @property
     def placed_odometry(self) -> Pose | None:
         """The odometry as it lies in the arena, from the true pose at the start; None: there is no truth, or no
         odometry."""
-        if self.true_pose is None or self.odometry is None:
-            return None
-        return self.odometry.placed(*self.true_pose.at(0))
+        return self.series.placed_odometry
 
     @property
     def odometry_error(self) -> float | None:
         """Distance of the estimate from the true place at the end (m); None: there is no truth, or no odometry."""
-        pose, placed = self.overview.columns.true_pose, self.overview.placed_odometry
+        pose, placed = self.overview.columns.true_pose, self.overview.columns.placed_odometry
         return None if pose is None or placed is None else math.dist(placed.at(-1)[:2], pose.at(-1)[:2])
 
     @property
@@ -306,17 +278,11 @@ class Run:
         """How many times faster than the wall clock the run was; None: not known, as of a record that is cut."""
         return self.run_time / self.wall_time if self.wall_time else None
 
-    @property
-    def slow_reading_age(self) -> float | None:
-        """The greatest age (s) that a slow device's reading (light, compass, battery, ...) had at a step of the brain,
-        once it had said something; None without such a device."""
-        return self.overview.slow_reading_age
-
     def table(self) -> dict[str, Any]:
         """The run's figures by name: numbers and texts, units in the names; None: not known, or nothing that this robot
         has. Runs that are equal have equal ones: what depends on this computer's speed is in `wall_clock`."""
-        on_board = self.layout is None
-        slow_age, identity, brain = self.slow_reading_age, self.identity, self.overview.brain
+        few, identity = self.overview, self.identity
+        brain, on_board = few.brain, self.layout is None and self.is_recorded
         unknown = dict.fromkeys(() if self.brain_names is None else self.brain_names.behaviors)
         shares: Mapping[str, float | None] = unknown if brain is None else brain.shares(self.run_time)
         return {
@@ -343,13 +309,13 @@ class Run:
             "behavior_switches": None if brain is None else brain.behavior_switches,
             **{f"{name}_share": _rounded(share, 4) for name, share in shares.items()},
             "ticks": self.ticks,
-            "slow_readings": None if slow_age is None else sum(map(self.record.count, MESSAGES)),
-            "slow_reading_age_s": _rounded(slow_age, 6),
+            "slow_readings": None if few.slow_reading_age is None else sum(map(self.record.count, MESSAGES)),
+            "slow_reading_age_s": _rounded(few.slow_reading_age, 6),
             "lost_frames": self.lost_frames,
             "bad_frames": self.bad_frames,
-            "overruns": self.overruns if on_board else None,
-            "dead_man_stops": self.dead_man_stops if on_board else None,
-            "fallback_takeovers": self.fallback_takeovers if on_board else None,
+            "overruns": few.overruns if on_board else None,
+            "dead_man_stops": few.dead_man_stops if on_board else None,
+            "fallback_takeovers": few.fallback_takeovers if on_board else None,
             "resets": self.resets,
             "sessions_lost": self.sessions_lost,
             "touched": self.touched,

@@ -45,7 +45,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from boebot.arenas.floor_plan import floor_plan, moving_solids
 from boebot.devices.laser import Laser
 from boebot.errors import brief
-from boebot.record.brain_record import each_switch, shown_names
+from boebot.record.brain_record import each_switch, names_in
 from boebot.record.columns import Columns, columns, events
 from boebot.record.truth import lateness, shifts
 from boebot.showing import SKETCH, VALUES, Sketch
@@ -157,7 +157,7 @@ def _scene(results: Sequence[Run], prefixes: Sequence[str], colours: Sequence[st
             yield 0.0, "/tf", FrameTransforms(transforms=[_transform(0.0, f"{prefix}robot", 0.0, 0.0, 0.0)])
         for topic, path in (
             ("path", odometry if true is None else true),
-            ("odometry_path", few.placed_odometry),
+            ("odometry_path", few.columns.placed_odometry),
         ):
             if path is not None:
                 yield 0.0, f"/{prefix}{topic}", _path(path)
@@ -294,7 +294,7 @@ def _kind(name: str, fields: Iterable[str]) -> Any:
 
 def _shown(result: Run, prefix: str) -> Iterator[Entry]:
     """Its numbers, a field for each; and a line where a text changes."""
-    names = shown_names(result.record)
+    names = names_in(result.record.each_row(VALUES))
     numbers = [name for name, is_text in names.items() if not is_text]
     fields = [f"{FIELD.sub('_', name)}_{place}" if FIELD.search(name) else name for place, name in enumerate(numbers)]
     kind = _kind("shown", fields) if numbers else None

@@ -11,11 +11,12 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boebot.record.brain_record import each_part, each_switch, shown_in, shown_names
+from boebot.record.brain_record import each_part, each_switch, names_in, shown_in
 from boebot.record.columns import Columns
 from boebot.record.columns import columns as pieces
 from boebot.record.record import KINDS
 from boebot.record.run_folder import FORMAT
+from boebot.showing import VALUES
 
 if TYPE_CHECKING:
     from boebot.record.brain_record import BrainNames, BrainRecord
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 def columns(result: Run) -> dict[str, list[str]]:
     """The columns of run.csv: heading (unit in its name) -> cells; a cell is empty where nothing is known."""
-    return _columns(result.series, shown_names(result.record))
+    return _columns(result.series, names_in(result.record.each_row(VALUES)))
 
 
 def _columns(part: Columns, names: Mapping[str, bool]) -> dict[str, list[str]]:
@@ -62,7 +63,7 @@ def write_run(result: Run, path: Path) -> None:
     """run.csv, part by part."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        names = shown_names(result.record)
+        names = names_in(result.record.each_row(VALUES))
         for part in pieces(result):
             table = _columns(part, names)
             if not part.first:

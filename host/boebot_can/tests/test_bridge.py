@@ -107,7 +107,7 @@ def test_brain_drives_over_a_bus_that_a_stock_tool_watches() -> None:
             seen = []
             while (message := watcher.recv(0.05)) is not None:
                 seen.append(message)
-        assert result.lost_frames == result.bad_frames == result.dead_man_stops == result.resets == 0
+        assert result.lost_frames == result.bad_frames == result.overview.dead_man_stops == result.resets == 0
         assert (result.odometry_distance or 0.0) > 0.05
         identifiers = {message.arbitration_id for message in seen}
         assert {0x120, 0x321, 0x32D, 0x621} <= identifiers, "set-points, telemetry, hello"

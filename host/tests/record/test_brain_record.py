@@ -183,7 +183,7 @@ def test_share_is_of_time_and_not_of_steps(most: int | None) -> None:
         record.append("brain_step", time, struct.pack("<5d", motor, 0.0, 0.0, 0.0, 0.0))
     for time, off, on in ((0.0, "", "a"), (1.0, "a", "b"), (2.0, "", "c"), (3.0, "b", "a")):
         record.append("switch", time, json.dumps([off, on, ""]).encode())
-    kept = read_brain(record, BrainNames(("a", "b"), ("a", "b"), ()), most)
+    kept = read_brain(record, BrainNames(("a", "b"), ("a", "b"), ())).thinned(most or 10)
     assert kept.shares(4.0) == {"a": 0.5, "b": 0.5}
     assert kept.shares(8.0) == {"a": 0.75, "b": 0.25}
     assert kept.behavior_switches == 2
@@ -193,8 +193,7 @@ def test_share_is_of_time_and_not_of_steps(most: int | None) -> None:
 
 
 def test_few_of_the_steps_are_shown_with_all_shares(result: RunResult) -> None:
-    assert result.brain_names is not None
-    few, whole = read_brain(result.record, result.brain_names, 50), record_of(result)
+    few, whole = record_of(result).thinned(50), record_of(result)
     assert len(few) == 51 and few.time[-1] == whole.time[-1]
     assert few.shares(10.0) == whole.shares(10.0) and few.behavior_switches == whole.behavior_switches
     assert set(few.switches) <= set(whole.switches)

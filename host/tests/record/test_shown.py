@@ -20,7 +20,7 @@ from boebot.errors import BrainError
 from boebot.record.brain_record import read_layers, read_shown
 from boebot.record.record import Record
 from boebot.result import RunResult, read_run
-from boebot.showing import BYTES_AT_ONCE, BYTES_S, NAMES, SKETCH, SKETCH_EACH_S, UNKNOWN, Showing, Sketch
+from boebot.showing import BYTES_AT_ONCE, BYTES_S, NAMES, SKETCH_EACH_S, UNKNOWN, Showing, Sketch
 from boebot.view import painter, scene
 
 START = (1.0, -2.0, math.pi / 2)
@@ -256,7 +256,7 @@ def test_many_sketches_are_thinned_to_few_bytes() -> None:
     record = Record()
     for row in kept.rows:
         record.append(*row)
-    great, small = read_layers(record.each_row(SKETCH), 100_000)
+    great, small = read_layers(record, 100_000)
     assert len(small.time) == 64 and great.time[0] == 0 and great.time[-1] == 63
     assert 5 <= len(great.time) <= 12
     assert [np.frombuffer(sketch.points, "<f4")[0] for sketch in great.sketches] == great.time.tolist()

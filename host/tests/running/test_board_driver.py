@@ -37,7 +37,7 @@ def test_run_over_a_port() -> None:
         result = boebot.run(straight, on=served.path, seconds=1.0)
         assert served.peer.command == (0.0, 0.0), "the motors are stopped at the end"
     assert result.truth is None and result.true_contacts is None and result.whisker_touches == 0
-    assert result.lost_frames == result.bad_frames == result.dead_man_stops == 0
+    assert result.lost_frames == result.bad_frames == result.overview.dead_man_stops == 0
     assert 0.5 < (result.wall_time or 0.0) < 2.0, "at the pace of the board, which catches up"
     assert result.true_distance is None and (result.odometry_distance or 0.0) > 0.05
 

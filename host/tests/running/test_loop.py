@@ -126,9 +126,9 @@ def test_brains_own_period_yields_to_the_callers(session: InProcess) -> None:
 
 def test_same_seed_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [run_on(Peer(), "wander", monkeypatch, seconds=20, seed=seed) for seed in (3, 3, 4)]
-    assert runs[0].bytes_from_board == runs[1].bytes_from_board
-    assert runs[0].bytes_to_board == runs[1].bytes_to_board
-    assert runs[0].bytes_to_board != runs[2].bytes_to_board
+    assert runs[0].record.rows("to_host") == runs[1].record.rows("to_host")
+    assert runs[0].record.rows("to_board") == runs[1].record.rows("to_board")
+    assert runs[0].record.rows("to_board") != runs[2].record.rows("to_board")
 
 
 def fails_after(seconds: float, error: BaseException) -> Callable[[Robot], None]:
@@ -286,7 +286,7 @@ def test_dead_man_stops_are_counted(session: InProcess) -> None:
     whole = session.peer.receive
     session.peer.receive = lambda data: None if 20 < session.peer.ticks < 80 else whole(data)  # type: ignore[method-assign]
     result = boebot.run(straight, seconds=1.5)
-    assert result.dead_man_stops == 1
+    assert result.overview.dead_man_stops == 1
 
 
 def test_takeovers_by_the_boards_own_brain_are_counted(session: InProcess) -> None:
@@ -296,7 +296,7 @@ def test_takeovers_by_the_boards_own_brain_are_counted(session: InProcess) -> No
         if 0.2 < robot.time < 0.4 or 0.6 < robot.time < 0.7:
             session.peer.status |= messages.Status.FALLBACK
 
-    assert boebot.run(taken_over_twice, seconds=1).fallback_takeovers == 2
+    assert boebot.run(taken_over_twice, seconds=1).overview.fallback_takeovers == 2
 
 
 def test_nothing_commanded_means_motors_off(session: InProcess) -> None:
@@ -389,7 +389,7 @@ def test_dead_man_stop_that_came_with_the_end_of_the_session_is_counted(session:
 
     session.channel.carry = cut  # type: ignore[method-assign]
     result = boebot.run(straight, seconds=4)
-    assert (result.error, result.sessions_lost, result.dead_man_stops) == (None, 1, 1)
+    assert (result.error, result.sessions_lost, result.overview.dead_man_stops) == (None, 1, 1)
     assert result.notices == []
     stop = next(event for event in result.record.events if event.kind == messages.EventKind.DEAD_MAN)
     assert stop.earlier and stop.time == pytest.approx(1.25, abs=0.05)
@@ -399,7 +399,7 @@ def test_stop_before_the_run_is_a_notice_and_not_the_runs(session: InProcess) ->
     session.peer._happened(messages.EventKind.DEAD_MAN, 7)
     session.read(0.5, 0.5)
     result = boebot.run(straight, seconds=1)
-    assert result.dead_man_stops == 0
+    assert result.overview.dead_man_stops == 0
     assert result.notices == [
         "before this run, by the clock of the board at peer: 0.000 s: motors stopped by the dead-man"
     ]
@@ -416,7 +416,7 @@ def test_period_fits_the_telemetry(session: InProcess, telemetry_ticks: int, per
     assert len(said) == (period != stepping)
     if said:
         assert f"the brain steps every {stepping * 1000:g} ms, not every {period * 1000:g} ms" in said[0]
-    assert result.late_steps == result.lost_frames == result.dead_man_stops == 0
+    assert result.late_steps == result.lost_frames == result.overview.dead_man_stops == 0
 
 
 def test_set_points_outlive_three_periods_of_slow_telemetry(session: InProcess) -> None:
@@ -509,7 +509,7 @@ def test_overruns_are_counted_over_their_roll_over_and_over_resets(session: InPr
     session.before_tick = overrun
     result = loop.execute(Request.single(straight, seconds=3))
     assert (result.error, result.resets) == (None, 1)
-    assert result.overruns == 10 + 3
+    assert result.overview.overruns == 10 + 3
 
 
 def test_realtime_run_takes_its_time(session: InProcess) -> None:

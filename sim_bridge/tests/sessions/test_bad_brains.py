@@ -361,7 +361,7 @@ def paced(brain: object, **options: Any) -> RunResult:
 def test_run_in_real_time_takes_its_time(clock: Clock) -> None:
     result = paced(late(clock, 0.0))
     assert 1.0 <= clock.now < 1.2, "and what it takes to greet the board and to stop it"
-    assert (result.steps, result.late_steps, result.dead_man_stops) == (20, 0, 0)
+    assert (result.steps, result.late_steps, result.overview.dead_man_stops) == (20, 0, 0)
 
 
 def test_late_step_of_a_paced_run_is_counted_and_the_run_goes_on(clock: Clock) -> None:
@@ -369,13 +369,13 @@ def test_late_step_of_a_paced_run_is_counted_and_the_run_goes_on(clock: Clock) -
     result = paced(late(clock, 0.12), step_timeout=60)
     assert result.error is None and result.run_time == pytest.approx(1.0)
     assert (result.steps, result.late_steps) == (19, 1)
-    assert result.dead_man_stops == 0, "two periods may be missed"
+    assert result.overview.dead_man_stops == 0, "two periods may be missed"
 
 
 def test_dead_man_stops_the_motors_in_a_step_that_outlasts_its_set_points(clock: Clock) -> None:
     """The last set-point came at 0.25 s and lives for 0.25 s: pulses end with the next servo frames."""
     result = paced(late(clock, 0.6), step_timeout=60)
-    assert result.error is None and result.dead_man_stops == 1
+    assert result.error is None and result.overview.dead_man_stops == 1
     missed = result.late_steps or 0
     assert missed >= 11 and result.steps + missed == 20
     time_s, pulses = result.series.time, result.series.number("servo_left", "pulse")

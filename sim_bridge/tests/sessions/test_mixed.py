@@ -50,8 +50,12 @@ def path(result: RunResult) -> bytes:
     """Of the true path and of all that the brain sensed and did."""
     assert result.error is None and result.truth is not None
     columns = (result.truth.x, result.truth.y, result.truth.heading, result.truth.contact)
-    sensed = repr((result.record.rows("readings"), result.record.steps, result.bytes_from_board)).encode()
+    sensed = repr((result.record.rows("readings"), result.record.steps, _received(result))).encode()
     return b"".join(column.tobytes() for column in columns) + sensed
+
+
+def _received(result: RunResult) -> bytes:
+    return b"".join(data for _, data in result.record.rows("to_host"))
 
 
 # ---- the same vehicle as alone in a world --------------------------------------------------------------------------

@@ -122,9 +122,13 @@ def test_two_that_drive_head_on_bump_and_go_on() -> None:
     for robot in one.robots:
         assert (robot.true_distance or 0.0) > 0.8
         assert robot.run_time == pytest.approx(20.0)
-        assert (robot.late_steps, robot.resets, robot.sessions_lost, robot.lost_frames, robot.dead_man_stops) == (
-            0,
-        ) * 5
+        assert (
+            robot.late_steps,
+            robot.resets,
+            robot.sessions_lost,
+            robot.lost_frames,
+            robot.overview.dead_man_stops,
+        ) == (0,) * 5
 
 
 def test_board_that_is_reset_in_mid_run_is_opened_again_and_nobody_else_notices(
@@ -195,7 +199,7 @@ def fails(robot: Robot) -> None:
 
 def stopped(result: RunResult) -> bool:
     """Its board has confirmed a stop."""
-    received = result.bytes_from_board
+    received = b"".join(data for _, data in result.record.rows("to_host"))
     hellos = [payload for number, _, payload in frame.Decoder(frame.NO_SESSION).feed(received) if number == Hello.ID]
     session = next(hello.session for hello in map(Hello.unpack, hellos) if hello.session)
     return Stopped.ID in [number for number, _, _ in frame.Decoder(session).feed(received)]
