@@ -30,11 +30,11 @@ def ray_segment(x: float, y: float, angle: float, p1: Point, p2: Point, reach: f
             f"segment {p1} to {p2}, ray from {(x, y)} at {angle}: expected finite numbers within ±{REACH_M:,.0f}"
         )
     wall = ffi.gc(lib.arena_new(), lib.arena_destroy)
-    ends = np.array((p1, p2), dtype=np.float64)
-    if lib.arena_add_wall(wall, ffi.from_buffer("double[]", ends), 2, ffi.NULL) < 0:
+    xy = ffi.from_buffer("double[]", np.array((p1, p2), dtype=np.float64))
+    if lib.arena_repeated(xy, 2, False) >= 0:
         raise ArenaError(f"segment {p1} to {p2}: expected two points apart")
+    lib.arena_add_edges(wall, xy, 2, lib.ARENA_WALL, ffi.NULL)
     lib.arena_use_index(wall, lib.ARENA_INDEX_NONE)
-    lib.arena_build(wall)
     distance: float = lib.arena_ray(wall, x, y, math.cos(angle), math.sin(angle), reach, 0.0, ffi.NULL)
     return None if distance < 0 else distance
 

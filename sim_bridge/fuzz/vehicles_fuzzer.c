@@ -53,38 +53,39 @@ static double number(input *in) {
 
 /* ---- what it is done to ------------------------------------------------------------------------------------------- */
 
+/* Of an arena, whose numbers its description checks. */
+static double position(input *in) { return ((double)byte(in) - 128.0) / 30.0; }
+static double size(input *in) { return ((double)byte(in) + 1.0) / 100.0; }
+
 static void add_shapes(arena *where, input *in) {
   double xy[10];
   path_waypoint way[3];
   for (uint8_t shapes = byte(in) % 6; shapes > 0; shapes--) {
-    const size_t count = byte(in) % 6;
-    for (size_t i = 0; i < 2 * count; i++) xy[i] = number(in);
-    const arena_surface surface = {.height = number(in), .infrared_reflectance = number(in), .sound_reflectance = 1.0};
+    const size_t count = 3 + byte(in) % 3;
+    for (size_t i = 0; i < 2 * count; i++) xy[i] = position(in);
+    const int is_polygon = arena_repeated(xy, count, 1) < 0;
+    const arena_surface surface = {.height = size(in), .infrared_reflectance = 0.5, .sound_reflectance = 1.0};
     const arena_surface *s = byte(in) % 2 ? &surface : NULL;
-    switch (byte(in) % 7) {
+    switch (byte(in) % 6) {
       case 0:
-        (void)arena_add_polygon(where, xy, count, byte(in) % 4, s);
+        if (is_polygon) (void)arena_add_edges(where, xy, count, byte(in) % 3, s);
         break;
       case 1:
-        (void)arena_add_wall(where, xy, count, s);
+        (void)arena_add_disc(where, position(in), position(in), size(in), s);
         break;
       case 2:
-        (void)arena_add_disc(where, number(in), number(in), number(in), s);
+        (void)arena_add_patch(where, xy, count, size(in));
         break;
       case 3:
-        (void)arena_add_patch(where, xy, count, number(in));
+        (void)arena_add_light(where, position(in), position(in), size(in), size(in));
         break;
       case 4:
-        (void)arena_add_light(where, number(in), number(in), number(in), number(in));
-        break;
-      case 5:
-        (void)arena_set_charger(where, number(in), number(in), number(in));
+        arena_set_charger(where, position(in), position(in), size(in));
         break;
       default:
-        for (size_t i = 0; i < 3; i++) way[i] = (path_waypoint){number(in), number(in), number(in), number(in)};
-        way[0].time = byte(in) % 4 ? 0.0 : way[0].time;
-        (void)arena_add_moving(where, byte(in) % 2 ? xy : NULL, count, number(in), s, way, 1 + byte(in) % 3,
-                               byte(in) % 4);
+        for (size_t i = 0; i < 3; i++) way[i] = (path_waypoint){(double)i, position(in), position(in), position(in)};
+        (void)arena_add_moving(where, byte(in) % 2 && is_polygon ? xy : NULL, count, size(in), s, way, 1 + byte(in) % 3,
+                               byte(in) % 3);
     }
   }
   arena_build(where);
@@ -93,7 +94,7 @@ static void add_shapes(arena *where, input *in) {
 static arena *room(input *in) {
   static const double walls[] = {-1.8, -1.8, 1.8, -1.8, 1.8, 1.8, -1.8, 1.8};
   arena *where = arena_new();
-  if (byte(in) % 2) arena_add_polygon(where, walls, 4, ARENA_OUTLINE, NULL);
+  if (byte(in) % 2) arena_add_edges(where, walls, 4, ARENA_OUTLINE, NULL);
   add_shapes(where, in);
   return where;
 }

@@ -27,8 +27,8 @@ static arena *room(void) {
   static const double pillar[] = {-0.9, 0.7, -0.7, 0.7, -0.7, 0.9, -0.9, 0.9};
   static const path_waypoint there_and_back[] = {{0.0, 1.0, -1.2, 0.0}, {4.0, 1.0, 1.2, 3.0}};
   arena *where = arena_new();
-  arena_add_polygon(where, outline, 4, ARENA_OUTLINE, NULL);
-  arena_add_polygon(where, pillar, 4, ARENA_OBSTACLE, NULL);
+  arena_add_edges(where, outline, 4, ARENA_OUTLINE, NULL);
+  arena_add_edges(where, pillar, 4, ARENA_OBSTACLE, NULL);
   arena_add_disc(where, 0.8, -0.8, 0.15, NULL);
   arena_add_light(where, 1.5, 1.5, 0.3, 2.0);
   arena_add_moving(where, NULL, 0, 0.1, NULL, there_and_back, 2, PATH_BACK_AND_FORTH);

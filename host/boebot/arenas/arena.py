@@ -66,11 +66,12 @@ class Arena:
         self._polygons: list[Floats] = []
         self.handle = ffi.gc(lib.arena_new(), lib.arena_destroy)
         for outline in self.description.outline:
-            self._add_polygon(outline, lib.ARENA_OUTLINE)
+            self._polygons.append(self._add_edges(outline.corners_m, lib.ARENA_OUTLINE, outline))
         for obstacle in self.description.obstacle:
-            self._add_polygon(obstacle, lib.ARENA_OBSTACLE)
+            self._polygons.append(self._add_edges(obstacle.corners_m, lib.ARENA_OBSTACLE, obstacle))
         for wall in self.description.wall:
-            self._add_wall(wall)
+            points = self._add_edges(wall.points_m, lib.ARENA_WALL, wall)
+            self._polygons.append(np.vstack((points, points[-2:0:-1])))  # there and back
         for disc in self.description.disc:
             self._added(lib.arena_add_disc(self.handle, disc.x_m, disc.y_m, disc.radius_m, _surface(disc)))
             self._polygons.append(_ring(disc.radius_m) + np.array((disc.x_m, disc.y_m)))
@@ -83,15 +84,10 @@ class Arena:
         """To copy and pickle it: made anew of its description."""
         return Arena, (self.description,)
 
-    def _add_polygon(self, polygon: Polygon, kind: int) -> None:
-        corners = np.array(polygon.corners_m, dtype=np.float64)
-        self._added(lib.arena_add_polygon(self.handle, _doubles(corners), len(corners), kind, _surface(polygon)))
-        self._polygons.append(corners)
-
-    def _add_wall(self, wall: Wall) -> None:
-        points = np.array(wall.points_m, dtype=np.float64)
-        self._added(lib.arena_add_wall(self.handle, _doubles(points), len(points), _surface(wall)))
-        self._polygons.append(np.vstack((points, points[-2:0:-1])))  # there and back
+    def _add_edges(self, points: Sequence[Point], kind: int, shape: Polygon | Wall) -> Floats:
+        xy = np.array(points, dtype=np.float64)
+        self._added(lib.arena_add_edges(self.handle, _doubles(xy), len(xy), kind, _surface(shape)))
+        return xy
 
     def _add_floor(self) -> None:
         """What rays do not meet."""
@@ -106,7 +102,7 @@ class Arena:
         for light in self.description.light:
             self._added(lib.arena_add_light(self.handle, light.x_m, light.y_m, light.height_m, light.power_w))
         if (charger := self.description.charger) is not None:
-            self._added(lib.arena_set_charger(self.handle, charger.x_m, charger.y_m, charger.radius_m))
+            lib.arena_set_charger(self.handle, charger.x_m, charger.y_m, charger.radius_m)
 
     def _add_moving(self, moving: Moving) -> None:
         corners = None if moving.corners_m is None else np.array(moving.corners_m, dtype=np.float64)

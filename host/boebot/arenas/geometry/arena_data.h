@@ -6,19 +6,19 @@
 #include "grid.h"
 #include "ray_lists.h"
 
+/* Something on the floor: a closed polygon, or a line of points with a width. */
 typedef struct {
   double *xy;
   size_t count;
-  double grip;
+  double half_width;
+  double value; /* grip, or reflectance */
   double box[4];
-} arena_patch;
+} arena_mark;
 
 typedef struct {
-  double *xy;
+  arena_mark *mark;
   size_t count;
-  double half_width, reflectance;
-  double box[4];
-} arena_line;
+} arena_marks;
 
 struct arena {
   arena_edge *edge;
@@ -27,17 +27,13 @@ struct arena {
   size_t disc_count;
   arena_shape *shape;
   size_t shape_count;
-  arena_patch *patch;
-  size_t patch_count;
-  arena_line *line;
-  size_t line_count;
+  arena_marks patches, lines;
   double floor_reflectance;
   arena_light *light;
   size_t light_count;
   arena_moving *moving;
   size_t moving_count;
-  arena_charger charger;
-  int has_charger;
+  arena_charger charger; /* radius 0: none */
   uint32_t version;
   int index_choice;
   grid grid;        /* columns == 0: none */

@@ -145,17 +145,21 @@ int arena_is_free(const arena *self, double x, double y, double radius) {
   return self->edge_count + self->disc_count == 0 || arena_clearance(self, x, y, 2.0 * radius) >= radius;
 }
 
+static int in_box(const arena_mark *m, double x, double y) {
+  return x >= m->box[0] && y >= m->box[1] && x <= m->box[2] && y <= m->box[3];
+}
+
 double arena_grip(const arena *self, double x, double y, double otherwise) {
-  for (size_t i = self->patch_count; i-- > 0;) {
-    const arena_patch *p = &self->patch[i];
-    if (!(x >= p->box[0] && y >= p->box[1] && x <= p->box[2] && y <= p->box[3])) continue;
+  for (size_t i = self->patches.count; i-- > 0;) {
+    const arena_mark *p = &self->patches.mark[i];
+    if (!in_box(p, x, y)) continue;
     int inside = 0;
     for (size_t k = 0; k < p->count; k++) {
       const double *a = &p->xy[2 * k];
       const double *b = &p->xy[k + 1 < p->count ? 2 * k + 2 : 0];
       inside ^= crosses(x, y, a[0], a[1], b[0], b[1]);
     }
-    if (inside) return p->grip;
+    if (inside) return p->value;
   }
   return otherwise;
 }
@@ -170,11 +174,11 @@ static int is_near_segment(double x, double y, const double *a, const double *b,
 }
 
 double arena_floor_reflectance(const arena *self, double x, double y) {
-  for (size_t i = self->line_count; i-- > 0;) {
-    const arena_line *l = &self->line[i];
-    if (!(x >= l->box[0] && y >= l->box[1] && x <= l->box[2] && y <= l->box[3])) continue;
+  for (size_t i = self->lines.count; i-- > 0;) {
+    const arena_mark *l = &self->lines.mark[i];
+    if (!in_box(l, x, y)) continue;
     for (size_t k = 0; k + 1 < l->count; k++) {
-      if (is_near_segment(x, y, &l->xy[2 * k], &l->xy[2 * k + 2], l->half_width)) return l->reflectance;
+      if (is_near_segment(x, y, &l->xy[2 * k], &l->xy[2 * k + 2], l->half_width)) return l->value;
     }
   }
   return self->floor_reflectance;
