@@ -199,6 +199,7 @@ setup(
         "": ["py.typed", "*.pyi", "*.html", "*.css", "*.js"],
         "boebot": ["slips.toml"],
         "boebot.brains": ["*.toml"],
+        "boebot.cli": ["*.txt"],
         "boebot.imperfections": ["*.toml"],
         "boebot.arenas.bundled": ["*.toml", "*.json"],
     },

@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from boebot.cli.new import FIRST_BRAIN, FROM_TOP, SEVERAL_BEHAVIORS
+from boebot.cli.new import template
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "build" / "examples"
@@ -34,9 +34,7 @@ def examples() -> dict[str, str]:
         cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
         code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
         found[f"notebook_{notebook.stem.replace('-', '_')}.py"] = "\n".join(code)
-    for name, template in {"first": FIRST_BRAIN, "from_top": FROM_TOP, "behaviors": SEVERAL_BEHAVIORS}.items():
-        found[f"new_{name}.py"] = template.format(name=name, file=f"{name}.py", stem=name)
-    return found
+    return found | {f"new_{kind}.py": template(kind, kind) for kind in ("step", "main", "brain")}
 
 
 def main() -> int:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.errors import BoardError, did_you_mean
-from boebot.guests import PORTS, Guest, guests
+from boebot.guests import PORTS, guests
 from boebot.link.transport import Transport
 from boebot.record.blocks import Group
 
@@ -315,7 +315,7 @@ def open_world(url: str, requests: Sequence[BoardRequest]) -> World:
         raise BoardError("there is no world for a robot without a board: the simulator is not installed")
     if kind is None:
         raise BoardError(_unknown(url))
-    factory: WorldFactory = _load(kind)
+    factory: WorldFactory = kind.load()
     return factory(requests)
 
 
@@ -351,7 +351,7 @@ def find_server() -> Server:
         BoardError: nobody does.
     """
     for point in guests(SERVERS_GROUP).values():
-        server: Server = _load(point)
+        server: Server = point.load()
         return server
     raise BoardError("there is nobody to serve an emulated robot: the simulator is not installed")
 
@@ -441,10 +441,3 @@ def _unknown(url: str) -> str:
         f"a port such as /dev/ttyACM0 or serial:PORT, socket://HOST:PORT, rfc2217://HOST:PORT{schemes}"
         + did_you_mean(url, kinds)
     )
-
-
-def _load(point: Guest) -> Any:
-    try:
-        return point.load()
-    except ImportError as error:
-        raise BoardError(f"the emulated board {point.name!r} is not usable here: {error}") from None

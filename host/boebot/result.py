@@ -17,23 +17,28 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-@dataclass(kw_only=True, repr=False)
-class RunResult(Run):
-    """What came of a run of one robot; its attributes are those of `boebot.record.run.Run`."""
+class _Shown:
+    """Pictures, pages and files of a run.
 
-    @property
-    def robots(self) -> list[RunResult]:
-        """The one robot, as a `TogetherResult` has several."""
-        return [self]
+    Attributes:
+        robots: a result per robot, in the order of the members.
+        error: why the run ended before its time, or None; of several robots it says which one was to blame.
+    """
+
+    robots: list[RunResult]
+    error: BaseException | None
 
     def _repr_html_(self) -> str:
-        """The figures as a table and the picture below it, for notebooks."""
-        table = figures.html_table(self.table() | self.wall_clock())
-        if not self.ticks:
-            return table
+        """The figures as a table for each robot and the picture below them, for notebooks."""
+        tables = "".join(
+            f"<h4>robot {number}</h4>" * (len(self.robots) > 1) + figures.html_table(robot.table() | robot.wall_clock())
+            for number, robot in enumerate(self.robots, 1)
+        )
+        if not any(robot.ticks for robot in self.robots):
+            return tables
         from boebot.view import on_screen
 
-        return table + on_screen.html_image(on_screen.drawn(self))
+        return tables + on_screen.html_image(on_screen.drawn(self.robots, self.error))
 
     def plot(self) -> Figure:
         """The run from above, as in run.png: a figure of matplotlib, to be shown or saved (`.savefig("mine.pdf")`).
@@ -43,7 +48,7 @@ class RunResult(Run):
         """
         from boebot.view import on_screen
 
-        return on_screen.drawn(self).figure
+        return on_screen.drawn(self.robots, self.error).figure
 
     def replay(self) -> Path | None:
         """The run, to play and scrub. In a notebook it is shown below the cell. Elsewhere it is opened in the browser,
@@ -58,25 +63,36 @@ class RunResult(Run):
 
     def to_pandas(self) -> DataFrame:
         """The columns of run.csv, by the same names (units are in them), one row per control tick; the index is
-        `time_s`, the run's time in s. Empty cells are NaN.
+        `time_s`, the run's time in s, and of several robots before it `robot`, its number from 1. Empty cells are NaN.
 
         Raises:
             BoebotError: pandas, an extra of the kit, is not installed.
         """
         from boebot.view import data_frame
 
-        return data_frame.of_run(self)
+        return data_frame.of_robots(self.robots)
 
     def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
         """Writes summary.json, run.png and replay.html; returns their paths. `csv`: also run.csv, to_board.bin,
-        to_host.bin and wire.csv, and of a brain of processes brain.csv and switches.csv."""
+        to_host.bin and wire.csv, and of a brain of processes brain.csv and switches.csv. Of several robots picture and
+        page have all of them, and the other files of each go into robot-1, robot-2 and so on."""
         from boebot.view import save
 
-        return save(self, Path(folder), csv=csv)
+        return save(self.robots, self.error, Path(folder), csv=csv)
 
 
 @dataclass(kw_only=True, repr=False)
-class TogetherResult:
+class RunResult(Run, _Shown):
+    """What came of a run of one robot; its attributes are those of `boebot.record.run.Run`."""
+
+    @property
+    def robots(self) -> list[RunResult]:  # type: ignore[override]
+        """The one robot, as a `TogetherResult` has several."""
+        return [self]
+
+
+@dataclass(kw_only=True, repr=False)
+class TogetherResult(_Shown):
     """What came of a run of several robots in one world.
 
     Attributes:
@@ -92,18 +108,6 @@ class TogetherResult:
         robots = "".join(f"\n  {number}: {robot.summary()}" for number, robot in enumerate(self.robots, 1))
         return f"<TogetherResult of {len(self.robots)}:{robots}>"
 
-    def _repr_html_(self) -> str:
-        """A table for each robot and the picture of them all, for notebooks."""
-        tables = "".join(
-            f"<h4>robot {n}</h4>{figures.html_table(robot.table() | robot.wall_clock())}"
-            for n, robot in enumerate(self.robots, 1)
-        )
-        if not any(robot.ticks for robot in self.robots):
-            return tables
-        from boebot.view import on_screen
-
-        return tables + on_screen.html_image(on_screen.drawn_together(self.robots, self.error))
-
     @property
     def notices(self) -> list[str]:
         """What the user should know, in sentences that say which robot they are about."""
@@ -117,31 +121,6 @@ class TogetherResult:
     def wall_clock(self) -> dict[str, Any]:
         """Of each robot. See `Run.wall_clock`."""
         return {"robots": [result.wall_clock() for result in self.robots]}
-
-    def plot(self) -> Figure:
-        """All robots from above, as in run.png. See `RunResult.plot`."""
-        from boebot.view import on_screen
-
-        return on_screen.drawn_together(self.robots, self.error).figure
-
-    def replay(self) -> Path | None:
-        """The run of all robots, to play and scrub. See `RunResult.replay`."""
-        from boebot.view import on_screen
-
-        return on_screen.play(self.robots)
-
-    def to_pandas(self) -> DataFrame:
-        """The rows of all robots; the index is `robot`, its number from 1, and `time_s`. See `RunResult.to_pandas`."""
-        from boebot.view import data_frame
-
-        return data_frame.of_together(self.robots)
-
-    def save(self, folder: str | Path, *, csv: bool = False) -> list[Path]:
-        """Writes run.png and replay.html with all robots, and the files of each into robot-1, robot-2 and so on;
-        returns their paths."""
-        from boebot.view import save_together
-
-        return save_together(self.robots, self.error, Path(folder), csv=csv)
 
 
 Result = RunResult | TogetherResult

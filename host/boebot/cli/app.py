@@ -81,7 +81,9 @@ def described(name: str) -> Command:
     """
     if name in COMMANDS:
         return COMMANDS[name]
-    found: Command = guests(GUESTS)[name].load()
+    found = (guest := guests(GUESTS)[name]).load()
+    if not isinstance(found, Command):
+        raise BoebotError(f"{name!r} of an installed package is no command: {guest.place}; expected a guests.Command")
     return found
 
 

@@ -78,7 +78,8 @@ def print_run(result: Result, wanted: Detail, *, is_said: bool = False) -> None:
             output.print_table(robot.wall_clock())
     elif wanted is Detail.FEW:
         if several:
-            output.print_rows(HEADER, [_row(number, robot) for number, robot in enumerate(robots, 1)])
+            rows = (_row(number, robot) for number, robot in enumerate(robots, 1))
+            output.print_columns(HEADER, rows, numbers=(1,), whole=1)
         else:
             table = output.empty_table(show_header=False)
             table.add_column(style="dim")

@@ -10,8 +10,6 @@ import contextlib
 import json
 import math
 import sys
-import textwrap
-import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,10 +25,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 BAR_AFTER_S = 2.0
-STEP_S = 5.0  # a step of a brain that takes longer is spoken of
-_GAP = 3  # between the columns of a table
-_INDENT = 4  # of a sentence below its row
-_SENTENCE_LEAST = 40  # columns that a sentence beside its row wants
 
 
 def line(text: str = "", file: TextIO | None = None) -> None:
@@ -112,30 +106,6 @@ def print_columns(
         console().print(printed)
 
 
-def print_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table with a header; the second column holds numbers, the last one sentences. Where the terminal is too narrow
-    for those beside the rest, each stands below its row."""
-    screen = console()
-    widths = [max(len(row[index]) for row in (header, *rows)) for index in range(len(header) - 1)]
-    beside = screen.width - sum(widths) - _GAP * len(widths) >= _SENTENCE_LEAST
-    if beside:
-        print_columns(header, rows, numbers=(1,), whole=len(widths))
-        return
-
-    def placed(cells: Sequence[str]) -> str:
-        padded = (
-            cell.rjust(width) if index == 1 else cell.ljust(width)
-            for index, (cell, width) in enumerate(zip(cells, widths, strict=False))
-        )
-        return (" " * _GAP).join(padded).rstrip()
-
-    screen.print(placed(header), style="bold")
-    for row in rows:
-        screen.print(placed(row))
-        for part in textwrap.wrap(row[-1], max(screen.width - _INDENT, _SENTENCE_LEAST)):
-            screen.print(" " * _INDENT + part, style="dim")
-
-
 @contextlib.contextmanager
 def progress_bar(title: str, total: float, quiet: bool = False, unit: str = " s") -> Iterator[Progress]:
     """Gives a function to call with how much of the total is done, such as the seconds that have passed; shows a bar
@@ -169,31 +139,3 @@ def progress_bar(title: str, total: float, quiet: bool = False, unit: str = " s"
     finally:
         if shown:
             bar.stop()
-
-
-@contextlib.contextmanager
-def step_watch(progress: Progress) -> Iterator[Progress]:
-    """Gives a function to call in place of `progress`; says so once if it is not called again for 5 s,
-    counted in looks: a computer that slept is not a brain that does not end its step."""
-    waited_s = -math.inf  # since the last call; the run has not begun
-    ended = threading.Event()
-
-    def report(passed: float) -> None:
-        nonlocal waited_s
-        waited_s = 0.0
-        progress(passed)
-
-    def watch() -> None:
-        nonlocal waited_s
-        while not ended.wait(0.1):
-            waited_s += 0.1
-            if waited_s > STEP_S:
-                sentence = f"the brain has been in its step for {STEP_S:g} s; Ctrl-C ends it"
-                say(sentence)
-                return
-
-    threading.Thread(target=watch, daemon=True).start()
-    try:
-        yield report
-    finally:
-        ended.set()

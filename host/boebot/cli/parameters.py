@@ -99,19 +99,9 @@ def list_all(on: options.On = "native", robot: options.RobotName = "shieldbot", 
     if json:
         output.print_json({"saved": saved, "parameters": rows})
         return
-    output.print_rows(
-        ("parameter", "value", "unit", "range", "meaning"),
-        [
-            (
-                row["name"],
-                f"{row['value']:.9g}",
-                row["unit"],
-                f"{row['least']:.9g} … {row['greatest']:.9g}",
-                row["meaning"],
-            )
-            for row in rows
-        ],
-    )
+    ranges = [f"{row['least']:.9g} … {row['greatest']:.9g}: {row['meaning']}" for row in rows]
+    cells = ((row["name"], f"{row['value']:.9g}", row["unit"], text) for row, text in zip(rows, ranges, strict=True))
+    output.print_columns(("parameter", "value", "unit", "range and meaning"), cells, numbers=(1,), whole=3)
     output.line("in force at start: those that were saved" if saved else "in force at start: the image's defaults")
 
 

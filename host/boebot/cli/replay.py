@@ -159,8 +159,7 @@ def _repeat(folder: Path, as_json: bool, trust: bool) -> None:
         trust = typer.confirm("run it?", err=True)
     with (
         streams.kept(for_the_answer=True),
-        output.progress_bar(f"{folder} again", run.seconds) as bar,
-        output.step_watch(bar) as progress,
+        output.progress_bar(f"{folder} again", run.seconds) as progress,
     ):
         repetition = again(run, progress, trust=trust)
     if repetition.part is not None:

@@ -149,8 +149,7 @@ def run(
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
             title = name if on is None else f"{name} on {on}"
-            bar = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
-            progress = None if view else shown.enter_context(output.step_watch(bar))
+            progress = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
             page = shown.enter_context(options.live_view(view=view, speed=speed, port=view_port))
             shown.enter_context(streams.kept(for_the_answer=json))
             if page is None:

@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-import codecs
 import contextlib
 import io
 import os
 import sys
-import unicodedata
 from collections.abc import Iterator
 
-_IN_ASCII = {
-    "µ": "u",
-    "Ω": "Ohm",
-    "·": ".",
-    "×": "x",
-    "°": "deg",
-    "±": "+-",
-    "−": "-",
-    "–": "-",
-    "—": "-",
-    "≤": "<=",
-    "≥": ">=",
-}
-_OTHER = "?"
 _STDOUT, _STDERR = 1, 2  # file descriptors
 
 
@@ -36,23 +20,10 @@ def open_closed() -> None:
 
 
 def accept_all_characters() -> None:
-    """From now on a character that a terminal lacks is printed as the nearest of ASCII, and no error."""
-    codecs.register_error("boebot.ascii", _in_ascii)
+    """From now on a character that a terminal lacks is printed as a question mark, and no error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="boebot.ascii")
-
-
-def _in_ascii(error: UnicodeError) -> tuple[str, int]:
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    found = (_IN_ASCII.get(char) or _decomposed(char) for char in error.object[error.start : error.end])
-    return "".join(found), error.end
-
-
-def _decomposed(char: str) -> str:
-    """Without accents and the like, as "e" of "é" and "..." of "…"."""
-    return "".join(part for part in unicodedata.normalize("NFKD", char) if part.isascii()) or _OTHER
+            stream.reconfigure(errors="replace")
 
 
 @contextlib.contextmanager

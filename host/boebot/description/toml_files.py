@@ -32,6 +32,7 @@ KEY_MAXIMUM = 100  # characters of a key, or of one part of a dotted key
 TEXT_MAXIMUM = 1000  # characters of a text
 
 _PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\]++|\\.)*"?|'[^']*'?)"""
+_STRING_OR_COMMENT = re.compile(r'''(?s:"""(?:[^\\]|\\.)*?"{3,5}|\'{3}.*?\'{3,5})|"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|#.*''')
 _KEY = re.compile(rf"#.*|{_PART}(?:[ \t]*+\.[ \t]*+{_PART})*")
 SLOW = 2_000_000  # bytes that take about a second: a notice says why nothing happens
 
@@ -50,7 +51,7 @@ class Fault(NamedTuple):
     """An error in a table.
 
     Attributes:
-        place: where, as `toml_lines` writes it.
+        place: where, as `line_of` takes it.
         what: the rest of the sentence, with the key.
     """
 
@@ -166,15 +167,47 @@ def overlaid(merged: dict[str, Any], top: dict[str, Any], base: dict[str, Any]) 
 
 
 def where(table: dict[str, Any], file: str, place: str) -> str:
-    """The file, with the line of the place if the table was read from it: "room.toml:12"."""
-    from boebot.description.toml_lines import line_of  # few files have errors
-
+    """The file, with the line of the place if the table was read from it: "room.toml:12". Of several files the one that
+    has more of the place."""
     sources = table.sources if isinstance(table, Table) and place else ()
     found = [(name, *line_of(text, place)) for name, text in sources]
-    for name, line, is_exact in found:
-        if is_exact:
-            return f"{name}:{line}"
-    return f"{file}:{found[0][1]}" if found else file
+    if not found:
+        return file
+    name, line, _ = max(found, key=lambda one: len(one[2]))
+    return f"{name}:{line}"
+
+
+def line_of(text: str, place: str) -> tuple[int, str]:
+    """The line, from 1, of a place such as "a.b[2].c", the key c in the third table of the array a.b; and what of the
+    place begins there: where the text does not say it, the innermost table around it, and of a part of a value in
+    brackets the whole value. tomllib, which has read the text, does not say it."""
+    lines, last, table, depth = {"": 1}, dict[str, int](), "", 0  # last: number of the last table of each array of them
+
+    def noted(place: str, key: str) -> str:
+        for part in re.findall(_PART, key):
+            if place in last:
+                place = f"{place}[{last[place]}]"
+            place = _below(place, part.strip("\"'"))
+            lines.setdefault(place, number)
+        return place
+
+    # within strings, which may have several lines, signs mean nothing
+    plain = _STRING_OR_COMMENT.sub(lambda found: re.sub(r"[][{}=]|#.*", "_", found[0]), text)
+    for number, line in enumerate(plain.split("\n"), 1):
+        if depth == 0 and (header := re.match(r"\s*\[(\[?)([^]]*)", line)):
+            table = noted("", header[2])
+            if header[1]:
+                last[table] = last.get(table, -1) + 1
+            if table in last:
+                table = f"{table}[{last[table]}]"
+                lines.setdefault(table, number)
+        elif depth == 0 and (key := re.match(r"[^=]*(?==)", line)):
+            noted(table, key[0])
+        depth += sum((sign in "[{") - (sign in "]}") for sign in line)
+    around = place
+    while around not in lines:
+        around = around[: max(around.rfind("."), around.rfind("["), 0)]
+    return lines[around], around
 
 
 def table_at(table: dict[str, Any], place: str) -> dict[str, Any]:

@@ -137,7 +137,7 @@ class Request:
         self.limit_s = limit_s
         self.answer: messages.Answer | None = None
         self.error: BoebotError | None = None
-        self.number = 0  # in the session; 0: it has none yet
+        self.number = -1  # in the session; -1: it has none yet
         self.tries = 0
         self.first_s = 0.0  # when it was submitted; then, when it was first sent
         self.last_s = 0.0  # when it was last sent
@@ -156,9 +156,7 @@ def check(answer: messages.Answer, where: str, what: str) -> None:
 
 
 class Requests:
-    """The requests of one link: one is under way at a time, the others wait."""
-
-    ROOM = 32  # requests that may wait
+    """The requests of one link, one at a time."""
 
     def __init__(self, send: Send, counts: HostCounters, where: str, restart: Callable[[float], None]) -> None:
         """Sends by `send` to the board at `where`. `restart` begins another session: a board that does not
@@ -168,31 +166,32 @@ class Requests:
         self._where = where
         self._restart = restart
         self._under_way: Request | None = None
-        self._waiting: deque[Request] = deque()
         self._number = 0
 
     def submit(self, request: Request, now_s: float) -> None:
-        """Queues it.
+        """Takes it.
 
         Raises:
-            BoardError: too many wait already.
+            BoardError: the one before is not done.
         """
-        if len(self._waiting) >= self.ROOM:
-            raise BoardError(f"{self.ROOM} requests wait for the board already; expected fewer at a time")
+        if self._under_way is not None:
+            raise BoardError(
+                f"the board at {self._where} is asked to {self._under_way.what}; expected its answer first"
+            )
         request.first_s = now_s
-        self._waiting.append(request)
+        self._under_way = request
 
     def service(self, now_s: float, retry_s: float) -> float:
         """In a session: sends a request that is due; returns when it is the next time (s)."""
         request = self._under_way
         if request is None:
-            if not self._waiting:
-                return NEVER
-            request = self._under_way = self._waiting.popleft()
+            return NEVER
+        if request.tries == 0:
             self._number = request.number = (self._number + 1) % _NUMBERS
-        if request.tries and now_s < request.last_s + retry_s:
+            request.first_s = now_s
+        elif now_s < request.last_s + retry_s:
             return request.last_s + retry_s
-        if request.tries and now_s >= request.first_s + request.limit_s:
+        elif now_s >= request.first_s + request.limit_s:
             request.error = BoardError(
                 f"the board at {self._where} did not {request.what} within {request.limit_s:g} s, "
                 f"though asked {request.tries} times"
@@ -200,24 +199,25 @@ class Requests:
             self._under_way = None
             self._restart(now_s)
             return NEVER
-        self._send(request.kind(request.number, *request.arguments))
-        if request.tries:
-            self._counts.retransmitted += 1
         else:
-            request.first_s = now_s
+            self._counts.retransmitted += 1
+        self._send(request.kind(request.number, *request.arguments))
         request.tries += 1
         request.last_s = now_s
         return now_s + retry_s
 
     def service_waiting(self, now_s: float) -> float:
-        """Without a session: gives up what waits for too long; returns when the next of them is given up (s)."""
-        for request in [request for request in self._waiting if now_s >= request.first_s + request.limit_s]:
-            self._waiting.remove(request)
+        """Without a session: gives up what waits for too long; returns when that is (s)."""
+        request = self._under_way
+        if request is None:
+            return NEVER
+        if now_s >= request.first_s + request.limit_s:
+            self._under_way = None
             request.error = BoardError(
                 f"the board at {self._where} was to {request.what}, but no session came about within "
                 f"{request.limit_s:g} s"
             )
-        return min((request.first_s + request.limit_s for request in self._waiting), default=NEVER)
+        return request.first_s + request.limit_s
 
     def receive(self, payload: bytes) -> Request | None:
         """Takes an `answer`: the request that is now done, or None: that was answered before, or never asked."""
@@ -239,11 +239,8 @@ class Requests:
 
     def session_ended(self) -> None:
         """Fails what was asked in it."""
-        waiting, self._waiting = self._waiting, deque()
-        if self._under_way is not None:
-            waiting.appendleft(self._under_way)
-            self._under_way = None
-        for request in waiting:
+        request, self._under_way = self._under_way, None
+        if request is not None:
             known = "it was not done" if request.tries == 0 else "whether it was done is not known"
             request.error = SessionLostError(
                 f"the session with the board at {self._where} ended while it was asked to {request.what}; {known}"

@@ -266,7 +266,7 @@ class Link:
         """As `request`, but does not wait: the answer comes while the program polls.
 
         Raises:
-            BoardError: too many wait already.
+            BoardError: the one before is not done.
         """
         request = Request(kind, arguments, what, limit_s)
         self._requests.submit(request, self._now())

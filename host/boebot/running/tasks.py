@@ -258,9 +258,15 @@ def _task(member: Member, request: Request, number: int) -> Task:
 
 
 def check_timing(robot: RobotDescription, period_s: float) -> Finding | None:
-    """The first finding of the installed checks."""
-    checks: list[Check] = [guest.load() for guest in guests(CHECKS).values()]
-    return next(filter(None, (check(robot, period_s) for check in checks)), None)
+    """The first finding of the installed checks, or that one of them is broken."""
+    for guest in guests(CHECKS).values():
+        try:
+            check: Check = guest.load()
+        except BoebotError as error:
+            return Finding(str(error), "mend that package, or uninstall it")
+        if (finding := check(robot, period_s)) is not None:
+            return finding
+    return None
 
 
 def prepare(

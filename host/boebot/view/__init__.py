@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from boebot.record.run import Run
 
     Write = Callable[[Path], object]
+    Draw = Callable[[Sequence[Run], Path], object]
 
 
 class IncompleteError(BoebotError):
@@ -41,9 +42,9 @@ class IncompleteError(BoebotError):
         self.files = files
 
 
-def save(result: Run, folder: Path, *, csv: bool = False) -> list[Path]:
-    """Writes the files of a run into `folder`, which is made if need be; returns their paths. `csv`: also its tables
-    and bytes.
+def save(robots: Sequence[Run], error: BaseException | None, folder: Path, *, csv: bool = False) -> list[Path]:
+    """Writes the files of a run into `folder`, which is made if need be; returns their paths. `error`: why it ended
+    before its time, or None; `csv`: also its tables and bytes.
 
     Raises:
         BoebotError: the folder cannot be written to.
@@ -51,57 +52,37 @@ def save(result: Run, folder: Path, *, csv: bool = False) -> list[Path]:
     """
     from boebot.view import tables
 
-    make_folder(folder)
-    names = result.brain_names
-    wanted: dict[str, Write] = {"summary.json": partial(tables.write_summary, result)}
-    if csv:
-        wanted |= {
-            "run.csv": partial(tables.write_run, result),
-            "to_board.bin": partial(tables.write_bytes, result, "to_board"),
-            "to_host.bin": partial(tables.write_bytes, result, "to_host"),
-            "wire.csv": partial(tables.write_wire, result),
-        }
-        if names is not None:
+    paths = []
+    for number, robot in enumerate(robots, 1):
+        make_folder(place := folder if len(robots) == 1 else folder / f"robot-{number}")
+        wanted: dict[str, Write] = {"summary.json": partial(tables.write_summary, robot)}
+        if csv:
             wanted |= {
-                "brain.csv": partial(tables.write_steps, result.record, names),
-                "switches.csv": partial(tables.write_switches, result.record),
+                "run.csv": partial(tables.write_run, robot),
+                "to_board.bin": partial(tables.write_bytes, robot, "to_board"),
+                "to_host.bin": partial(tables.write_bytes, robot, "to_host"),
+                "wire.csv": partial(tables.write_wire, robot),
             }
-    paths = [write_whole(folder / name, write) for name, write in wanted.items()]
-    if not result.ticks:
+            if robot.brain_names is not None:
+                wanted |= {
+                    "brain.csv": partial(tables.write_steps, robot.record, robot.brain_names),
+                    "switches.csv": partial(tables.write_switches, robot.record),
+                }
+        paths += [write_whole(place / name, write) for name, write in wanted.items()]
+    if not any(robot.ticks for robot in robots):
         return paths
-    drawn, failed = _draw(
-        folder, {"run.png": partial(_write_picture, result), "replay.html": partial(_write_page, [result])}
-    )
-    paths += drawn
+    failed = []
+    drawn: dict[str, Draw] = {"run.png": partial(_write_picture, error=error), "replay.html": _write_page}
+    for name, draw in drawn.items():
+        try:
+            paths.append(write_whole(folder / name, partial(draw, robots)))
+        except BoebotError:
+            raise
+        except Exception as why:  # whatever drawing meets: the run is worth more than its picture
+            what = str(why).strip().partition("\n")[0]
+            failed.append(f"{name} cannot be made: {type(why).__name__}" + (f": {what}" if what else ""))
     if failed:
         raise IncompleteError(f"{'; '.join(failed)}; the run's other files are in {folder}", paths)
-    return paths
-
-
-def save_together(robots: Sequence[Run], error: BaseException | None, folder: Path, *, csv: bool = False) -> list[Path]:
-    """Writes picture and page of all robots into `folder`, and the files of each into its own folder; returns
-    their paths.
-
-    Raises: as `save`.
-    """
-    make_folder(folder)
-    paths: list[Path] = []
-    failed: list[str] = []
-    for number, robot in enumerate(robots, 1):
-        try:
-            paths += save(robot, folder / f"robot-{number}", csv=csv)
-        except IncompleteError as incomplete:
-            paths += incomplete.files
-            failed.append(str(incomplete))
-    shown = [robot for robot in robots if robot.ticks]
-    if shown:
-        drawn, missing = _draw(
-            folder,
-            {"run.png": partial(_write_common_picture, robots, error), "replay.html": partial(_write_page, shown)},
-        )
-        paths, failed = drawn + paths, missing + failed
-    if failed:
-        raise IncompleteError("; ".join(failed), paths)
     return paths
 
 
@@ -122,33 +103,13 @@ def save_for_foxglove(results: Sequence[Run], folder: Path) -> Path:
     return write_whole(folder / "foxglove.mcap", partial(foxglove.write, results))
 
 
-def _draw(folder: Path, files: dict[str, Write]) -> tuple[list[Path], list[str]]:
-    """Writes those files; returns the paths of those that could be made, and why others could not."""
-    paths, failed = [], []
-    for name, write in files.items():
-        try:
-            paths.append(write_whole(folder / name, write))
-        except BoebotError:
-            raise
-        except Exception as error:  # whatever drawing meets: the run is worth more than its picture
-            what = str(error).strip().partition("\n")[0]
-            failed.append(f"{name} cannot be made: {type(error).__name__}" + (f": {what}" if what else ""))
-    return paths, failed
-
-
-def _write_picture(result: Run, path: Path) -> None:
+def _write_picture(robots: Sequence[Run], path: Path, error: BaseException | None) -> None:
     from boebot.view import picture
 
-    picture.draw(result).save(path)
+    picture.draw(robots, error).save(path)
 
 
-def _write_page(results: Sequence[Run], path: Path) -> None:
+def _write_page(robots: Sequence[Run], path: Path) -> None:
     from boebot.view import replay
 
-    replay.write(results, path)
-
-
-def _write_common_picture(robots: Sequence[Run], error: BaseException | None, path: Path) -> None:
-    from boebot.view import picture
-
-    picture.draw_together(robots, error).save(path)
+    replay.write([robot for robot in robots if robot.ticks], path)

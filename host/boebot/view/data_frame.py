@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from boebot.record.run import Run
 
 
-def of_run(result: Run) -> DataFrame:
-    """One row per control tick; the index is the time.
+def of_robots(robots: Sequence[Run]) -> DataFrame:
+    """One row per control tick; the index is the time. Of several robots the rows of each stand below those of the one
+    before, and the index is the robot's number, from 1, and the time.
 
     Raises:
         BoebotError: pandas is not installed.
@@ -28,19 +29,10 @@ def of_run(result: Run) -> DataFrame:
         raise BoebotError(
             "to_pandas() needs the package pandas, which is not installed; pip install pandas gets it"
         ) from None
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.csv"
-        tables.write_run(result, path)
-        return pandas.read_csv(path, index_col="time_s", keep_default_na=False, na_values=[""])
-
-
-def of_together(robots: Sequence[Run]) -> DataFrame:
-    """The rows of each robot below those of the one before; the index is the robot's number, from 1, and the time.
-
-    Raises:
-        BoebotError: pandas is not installed.
-    """
-    frames = {number: of_run(robot) for number, robot in enumerate(robots, 1)}
-    import pandas
-
-    return pandas.concat(frames, names=["robot"])
+    frames = {}
+    for number, robot in enumerate(robots, 1):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "run.csv"
+            tables.write_run(robot, path)
+            frames[number] = pandas.read_csv(path, index_col="time_s", keep_default_na=False, na_values=[""])
+    return frames[1] if len(frames) == 1 else pandas.concat(frames, names=["robot"])

@@ -20,24 +20,14 @@ if TYPE_CHECKING:
 FRAME_HEIGHT = 680  # pixels: the page fills what it is given
 
 
-def drawn(result: Run) -> Sheet:
+def drawn(robots: Sequence[Run], error: BaseException | None) -> Sheet:
     """The picture of a run.
 
     Raises:
         BoebotError: no control tick of it is known.
     """
-    _check([result])
-    return picture.draw(result)
-
-
-def drawn_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
-    """The picture of a run of several robots.
-
-    Raises:
-        BoebotError: as `drawn`.
-    """
     _check(robots)
-    return picture.draw_together(robots, error)
+    return picture.draw(robots, error)
 
 
 def play(results: Sequence[Run]) -> Path | None:

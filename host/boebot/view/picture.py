@@ -62,8 +62,12 @@ PIXELS_PER_INCH = 96  # of a page
 Shown = tuple[int, "Run", scene.View]
 
 
-def draw(result: Run) -> Sheet:
-    """Draws the run."""
+def draw(robots: Sequence[Run], error: BaseException | None) -> Sheet:
+    """Draws the run; `error`: why it ended before its time, or None."""
+    return _draw_one(robots[0]) if len(robots) == 1 else _draw_together(robots, error)
+
+
+def _draw_one(result: Run) -> Sheet:
     view = scene.view(result)
     low, high = scene.bounds(view)
     record = result.overview.brain if result.overview.brain else None
@@ -237,8 +241,7 @@ def _utility_entries(record: BrainRecord, end: float) -> list[Artist]:
 # ---- several robots --------------------------------------------------------------------------------------------------
 
 
-def draw_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
-    """Draws all robots of a run; `error`: why it ended before its time, or None."""
+def _draw_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
     shown: list[Shown] = [(n, robot, scene.view(robot)) for n, robot in enumerate(robots, 1) if robot.ticks]
     plan = shown[0][2].plan
     low, high = scene.bounds(*(view for _, _, view in shown))

@@ -47,12 +47,10 @@ def test_parameters_are_saved_and_reset() -> None:
 def test_board_that_is_busy_writing_is_asked_again() -> None:
     link, peer, session = open_link()
     saving = link.submit(messages.SaveParameters, what="save", limit_s=5.0)
-    listen(link, 0.005)
-    request = link.submit(messages.GetParameter, 7, what="send it")
-    listen(link, 0.1)
-    assert not saving.done and not request.done, "one at a time"
+    listen(link, 0.105)
+    assert not saving.done
     listen(link, 0.2)
-    assert saving.done and request.done
+    assert saving.done
     peer._saving_until = session.now() + 0.2
     assert link.parameters.set("ping_period", 9) == 9
     assert peer._saving_until is None

@@ -131,7 +131,7 @@ def test_picture_shows_something(folder: Path) -> None:
 def test_picture_counts_in_words_that_agree(result: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     texts: list[str] = []
     monkeypatch.setattr(Figure, "text", lambda self, x, y, text, **_: texts.append(text))
-    picture.draw(result).save(tmp_path / "run.png")
+    picture.draw([result], None).save(tmp_path / "run.png")
     assert "   ·   1 true contact   ·   2 whisker touches" in texts[1]
 
 

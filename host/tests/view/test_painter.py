@@ -193,7 +193,7 @@ def test_picture_names_only_what_the_robot_has(
     texts: list[str] = []
     monkeypatch.setattr(Figure, "legend", lambda self, handles, **_: named.extend(h.get_label() for h in handles))
     monkeypatch.setattr(Figure, "text", lambda self, x, y, text, **_: texts.append(text))
-    picture.draw(result).save(tmp_path / "run.png")
+    picture.draw([result], None).save(tmp_path / "run.png")
     assert ("path by odometry" in named) == estimate
     assert "whisker touch" not in named, "none happened"
     assert any("0 whisker touches" in text for text in texts)
@@ -204,7 +204,7 @@ def test_names_are_no_formulas(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
     """matplotlib would set what stands between two $ as mathematics, or fail at it."""
     result = run_of("shieldbot", monkeypatch)
     result.brain = "my $brain_{ and my \\frac$"
-    assert picture.draw(result).save(tmp_path / "run.png").stat().st_size > 10_000
+    assert picture.draw([result], None).save(tmp_path / "run.png").stat().st_size > 10_000
 
 
 def test_robot_without_whiskers_or_ways_to_measure_says_nothing_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -358,7 +358,7 @@ def test_sweeps_older_than_the_tick_that_has_them_are_where_they_were_taken(
 
 
 def test_picture_has_the_sweeps_of_start_and_end(scanned: RunResult) -> None:
-    drawn = [patch.get_xy()[:-1] for patch in picture.draw(scanned).axes.patches if isinstance(patch, Polygon)]
+    drawn = [patch.get_xy()[:-1] for patch in picture.draw([scanned], None).axes.patches if isinstance(patch, Polygon)]
     for swept in scene.view(scanned).swept:
         for index in (0, -1):
             area = swept.area(index)

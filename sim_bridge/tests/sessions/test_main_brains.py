@@ -17,7 +17,7 @@ import boebot
 from boebot import MainRobot, Member, Robot
 from boebot.arenas import load_arena
 from boebot.brains import load_brain
-from boebot.cli.new import FROM_TOP
+from boebot.cli.new import template
 from boebot.errors import BrainError
 from boebot.result import RunResult
 from boebot.running.loop import execute
@@ -269,7 +269,7 @@ def test_a_script_s_own_main_beside_step_is_left_alone(tmp_path: Path) -> None:
 
 def test_the_template_runs_to_its_end(tmp_path: Path) -> None:
     path = tmp_path / "mine.py"
-    path.write_text(FROM_TOP.format(name="mine", file="mine.py", stem="mine"))
+    path.write_text(template("main", "mine"))
     result = boebot.run(path)
     assert result.error is None and result.odometry_source == "encoders" and result.true_distance is not None
     assert result.true_distance > 1.0
