@@ -73,7 +73,10 @@ SANITIZERS = [
     "-O1",
     "-g1",
 ]
-WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Werror"]
+WARNINGS = [
+    *("-Wall", "-Wextra", "-Wno-unused-parameter", "-Wconversion", "-Wshadow"),
+    *("-Wstrict-prototypes", "-Wmissing-prototypes", "-Werror"),
+]
 SANITIZE = SANITIZERS if os.environ.get("BOEBOT_SANITIZE") == "1" else []
 
 

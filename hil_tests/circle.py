@@ -14,7 +14,8 @@ import msgspec
 from boebot.arenas import Arena, ArenaDescription, Disc, Light, Patch, Polygon
 from boebot.description.robots import RobotDescription, load_robot
 from hil_tests.rig import Rig
-from sim_bridge.boards.emulated import avr_board, avr_image, native_board, native_library
+from sim_bridge.boards import avr
+from sim_bridge.boards.emulated import avr_image, native_board, native_library
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sim import Sim, SimRobot
 
@@ -84,9 +85,8 @@ def circle(
     """The robot (boebot) in the arena, its board greeted and armed."""
     description = load_robot("boebot") if robot is None else robot
     sim = Sim(arena, seed=seed, noise=noise)
-    board = (
-        avr_board(avr_image(description.pin_map)) if url == "avr" else native_board(native_library(description.pin_map))
-    )
+    pins = description.pin_map
+    board = avr.create(avr_image(pins)) if url == "avr" else native_board(native_library(pins))
     rig = CircleRig(SimSession(sim.add(board, description, pose=pose, imperfections=imperfections), url, SimRobot.wait))
     with rig:
         rig.start()

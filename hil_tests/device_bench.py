@@ -8,7 +8,6 @@ It has the face of a board session, so that a Rig speaks with the board as with 
 from __future__ import annotations
 
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import BoardAccess, Level
 from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library
@@ -21,8 +20,7 @@ def power_on(kind: str, pin_map: str = "shieldbot", image: str | None = None) ->
     """A board, native or avr, with the image of that pin map or another one, and with nothing around it."""
     if kind == "avr":
         return avr.create(image_file(image) if image else avr_image(pin_map)).access()
-    board = native_board(native_library(pin_map))
-    return BoardAccess(lib, ffi, ffi.cast("board *", board.address), owner=board)
+    return native_board(native_library(pin_map)).access()
 
 
 class TwoWireDevice:

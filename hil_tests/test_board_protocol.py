@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 import reference_frame
 
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess, Level
 from sim_bridge.boards.emulated import avr_image, native_board, native_library
 
@@ -267,8 +266,7 @@ def power_on(kind: str) -> BoardAccess:
 
         board = avr.create(avr_image("shieldbot")).access()
     else:
-        native = native_board(native_library("shieldbot"))
-        board = BoardAccess(lib, ffi, ffi.cast("board *", native.address), owner=native)
+        board = native_board(native_library("shieldbot")).access()
     board.drive(WHISKER_LEFT, Level.HIGH)
     return board
 

@@ -18,7 +18,6 @@ from cffi import FFI
 BEFORE = """
 typedef struct part_kind part_kind;
 typedef struct sensor_kind sensor_kind;
-board *native_board_create(const uint8_t *image, size_t size, char *error, size_t error_size);
 """
 AFTER = """
 static const double WHISKER_HEIGHT_M;
@@ -41,8 +40,7 @@ SOURCES = [
     "boards/native/*.c",
     "loop/*.c",
 ]
-# What is declared here, or in boards/board_access.cdef.
-UNMARKED = ["world/body_step.h", "boards/board_access.h", "boards/native/native_board.h"]
+UNMARKED = ["world/body_step.h"]  # what is declared here
 ROOM = Path("sim_bridge")
 LIBRARIES = [] if sys.platform in ("win32", "darwin") else ["-ldl"]
 
@@ -73,8 +71,7 @@ def builder() -> FFI:
     names = headers()
     built = FFI()
     built.include(arena.ffi)
-    access = (ROOM / "boards/board_access.cdef").read_text("utf-8")
-    built.cdef("\n".join([access, BEFORE, *(arena.declarations(ROOM / name) for name in names), AFTER]))
+    built.cdef("\n".join([BEFORE, *(arena.declarations(ROOM / name) for name in names), AFTER]))
     built.set_source(
         "sim_bridge._core",
         "\n".join(f'#include "{name}"' for name in [*names, *UNMARKED]),

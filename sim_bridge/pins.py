@@ -11,7 +11,7 @@ from boebot.arguments import number, shown
 from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, BoardMemory, ResetCause
+from sim_bridge.boards.board import CLOCK_HZ, EDGE, BoardMemory, EmulatedBoard, ResetCause
 from sim_bridge.sim import SimRobot
 
 ECHO_MAXIMUM_US = 1e6
@@ -26,14 +26,14 @@ class BoardPins(BoardMemory):
     """
 
     def __init__(self, robot: SimRobot) -> None:
-        super().__init__(lib, ffi)
         self._robot = robot
         self._sim = robot.sim
         self._number = robot.number
 
     @property
-    def _board(self) -> Any:
-        return ffi.cast("board *", self._robot.board.address)
+    def board(self) -> EmulatedBoard:
+        """The board itself."""
+        return self._robot.board
 
     @property
     def _handle(self) -> Any:

@@ -21,8 +21,7 @@ from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.record.blocks import Block, Group, group_of
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
 from sim_bridge.robots.imperfections import Draw, applied, body_parameters, collision_outline
 from sim_bridge.robots.wiring import done, join
 from sim_bridge.vehicles import ENDS

@@ -29,8 +29,9 @@ FRAME = FIRMWARE / "link" / "frame.c"
 TEST = ROOT / "firmware" / "test"
 SANITIZE = "-fsanitize=fuzzer,address,undefined"
 FLAGS = (
-    *("-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-fno-omit-frame-pointer"),
-    *(SANITIZE, "-fno-sanitize-recover=all", "-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}", f"-I{ARENAS}"),
+    *("-O1", "-g", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Wconversion", "-Wshadow", "-Werror"),
+    *("-fno-omit-frame-pointer", SANITIZE, "-fno-sanitize-recover=all"),
+    *("-DPIN_MAP_SHIELDBOT", f"-I{FIRMWARE}", f"-I{ARENAS}"),
 )
 
 MOST_MB = 2048  # of memory, libFuzzer's own limit

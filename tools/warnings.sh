@@ -4,7 +4,7 @@
 # computer and for the microcontroller.
 set -eu
 cd "$(dirname "$0")/.."
-warnings="-std=gnu11 -O2 -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
+warnings="-std=gnu11 -O2 -Wall -Wextra -Wno-unused-parameter -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
 simavr=$(find build/simavr -name sim_avr.h -exec dirname {} \; 2>/dev/null | sed 's|/sim$||' | head -n 1)
 lists=$(mktemp -d)
 trap 'rm -rf "$lists"' EXIT

@@ -27,6 +27,7 @@
 /* What the firmware does to a pin, and what the outside may do to it (the first three only). */
 enum { BOARD_LOW = 0, BOARD_HIGH = 1, BOARD_RELEASED = 2, BOARD_PULLED_UP = 3 };
 
+/* python: begin */
 typedef enum { BOARD_RESET_POWER, BOARD_RESET_EXTERNAL, BOARD_RESET_BROWN_OUT, BOARD_RESET_WATCHDOG } board_reset_cause;
 
 typedef enum {
@@ -54,6 +55,15 @@ typedef void board_edge_sink(void *context, uint64_t cycle, uint8_t pin, uint8_t
 /* The voltage at analog channel 0..5, or at BOARD_ANALOG_SUPPLY; 0 for what the source does not know. */
 typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channel);
 
+/* An edge as logs keep it; `level`: LOW, HIGH, RELEASED, PULLED_UP. */
+typedef struct {
+  uint64_t cycle;
+  uint8_t pin;
+  uint8_t level;
+  uint8_t unused[6];
+} board_edge;
+/* python: end */
+
 /* What `extension` may offer under these names. */
 #define BOARD_DATA "data" /* uint8_t[BOARD_DATA_SIZE]: data space of an AVR, I/O registers as last written */
 #define BOARD_DATA_SIZE 0x0900u
@@ -66,7 +76,9 @@ typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channe
 #define BOARD_WATCHDOG_LOG "watchdog log" /* a board_watchdog_log */
 
 #define BOARD_NOTES "notes" /* a board_notes */
-#define BOARD_NOTES_MAXIMUM 64u
+
+/* python: begin */
+enum { BOARD_NOTES_MAXIMUM = 64 };
 
 /* Something that the program asked for and did not get, because it is not built or the chip does not give it so, or
  * something legal that is seldom meant: once per run, where it happened first. */
@@ -104,8 +116,8 @@ typedef struct {
 } board_watchdog_reset;
 
 typedef struct {
-  board_watchdog_reset *resets; /* oldest first */
-  size_t count;
+  board_watchdog_reset *resets; /* oldest first, to `end` */
+  size_t first, end, capacity;
 } board_watchdog_log;
 
 typedef struct {
@@ -166,6 +178,7 @@ struct board {
   board_edge_sink *sink; /* NULL: nobody listens */
   void *sink_context;
 };
+/* python: end */
 
 /* The supply as a source gives it. */
 static inline double board_supply_volts(board_analog_source *source, void *context, uint64_t cycle) {

@@ -1,13 +1,11 @@
-"""A board by itself: drive its pins, send it bytes, see what it does and what it remembers. For tests and tools; no
-world, no loop.
-
-Works on every kind of board: the extension that made it lends its `board_access` functions.
-"""
+"""Emulated boards as Python has them: what they remember, and one by itself, for tests and tools: drive its pins, send
+it bytes, see what it does; no world, no loop."""
 
 from __future__ import annotations
 
+import weakref
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,10 +21,9 @@ DATA_SIZE = 0x900
 EEPROM_SIZE = 1024
 ROOM = 4096  # bytes that are read from the line at once
 
-EDGE = np.dtype(  # board_edge of board_access.h, sim_edge of loop.h
+EDGE = np.dtype(  # board_edge of board.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
 )
-NO_EDGES = np.empty(0, dtype=EDGE)
 
 
 class Level(IntEnum):
@@ -74,53 +71,105 @@ class SentByte(NamedTuple):
     byte: int
 
 
-COUNTERS = (
-    "executed_cycles",
-    "interrupts",
-    "bytes_in",
-    "bytes_out",
-    "overruns",
-    "framing_errors",
-    "resets",
-    "edges_out",
-)
+class EmulatedBoard:
+    """A board in C (boards/board.h). It is freed when nobody holds it any more, or by `close`.
+
+    Attributes:
+        ffi, lib: of the extension that made it.
+        description: what kind of board it is.
+        elf: the file that says where in the source an address comes from.
+        assumed: what that file does not say and was assumed.
+        is_in_use: whether a simulation runs it.
+    """
+
+    def __init__(
+        self, extension: Any, board: Any, description: str, *, elf: Path | None = None, assumed: str = ""
+    ) -> None:
+        """`board`: a C `board *` of that extension."""
+        self.ffi, self.lib = extension.ffi, extension.lib
+        self._board = board
+        self.description, self.elf, self.assumed = description, elf, assumed
+        self._free = weakref.finalize(self, board.op.destroy, board)
+        self._free.atexit = False  # its world may still hold it
+        self.is_in_use: Callable[[], bool] = lambda: False
+
+    @property
+    def handle(self) -> Any:
+        """The board in C.
+
+        Raises:
+            BoardError: it is closed.
+        """
+        if not self._free.alive:
+            raise BoardError(f"the {self.description} is closed; expected one that is open")
+        return self._board
+
+    @property
+    def address(self) -> int:
+        """Of the board in C; raises as `handle`."""
+        return int(self.ffi.cast("uintptr_t", self.handle))
+
+    def extension(self, name: str, kind: str) -> Any:
+        """What only some kinds of boards offer, by its name in board.h, as a pointer to that C type; None: not this
+        one."""
+        found = self.handle.op.extension(self.handle, name.encode())
+        return self.ffi.cast(f"{kind} *", found) if found else None
+
+    def fault(self) -> str | None:
+        """What is wrong after a crash, with function and line where they are known, or None."""
+        text = self.handle.op.fault(self.handle)
+        if not text:
+            return None
+        data, at = self.extension("data", "uint8_t"), self.extension("fault address", "uint32_t")
+        z = 0 if data is None else data[30] | data[31] << 8
+        return with_place(self.ffi.string(text).decode(), self.elf, -1 if at is None else at[0], z)
+
+    def access(self) -> BoardAccess:
+        """Its operations, for use without a simulated world."""
+        return BoardAccess(self)
+
+    def close(self) -> None:
+        """Frees the board. May be called twice.
+
+        Raises:
+            BoardError: a simulation runs it.
+        """
+        if self.is_in_use():
+            raise BoardError(f"the {self.description} is in a simulation; expected Sim.close()")
+        self._free()
 
 
 class BoardMemory(ABC):
     """What lies inside a board: the data space of an AVR, the EEPROM of every kind of microcontroller, the log of its
     watchdog."""
 
-    def __init__(self, lib: Any, ffi: Any) -> None:
-        """By the functions of that extension."""
-        self._memory_lib = lib
-        self._memory_ffi = ffi
-
     @property
     @abstractmethod
-    def _board(self) -> Any:
-        """Its C `board *`, which its owner keeps alive.
+    def board(self) -> EmulatedBoard:
+        """Whose memory it is.
 
         Raises:
-            BoardError: the board is closed.
+            BoardError: there is no board any more.
         """
 
     def output(self, pin: int) -> Level:
         """What the firmware does to a pin now."""
-        return Level(self._memory_lib.board_output(self._board, pin))
+        board = self.board.handle
+        return Level(board.op.output(board, pin))
 
     def counters(self) -> dict[str, int]:
         """What the board counted since power-on."""
-        out = self._memory_ffi.new("board_counters *")
-        self._memory_lib.board_count(self._board, out)
-        return {name: int(getattr(out, name)) for name in COUNTERS}
+        board, out = self.board.handle, self.board.ffi.new("board_counters *")
+        board.op.counters(board, out)
+        return {name: int(getattr(out, name)) for name, _ in self.board.ffi.typeof(out[0]).fields}
 
     def _data(self, address: int, count: int) -> Any:
-        board = self._board
+        board = self.board
         check_range("data", address, count, DATA_SIZE)
-        data = self._memory_lib.board_memory(board)
-        if data == self._memory_ffi.NULL:
+        data = board.extension("data", "uint8_t")
+        if data is None:
             raise BoardError("this kind of board has no data memory to look into; only the emulated ATmega328P has")
-        return self._memory_ffi.buffer(data + address, count)
+        return board.ffi.buffer(data + address, count)
 
     def read_memory(self, address: int, count: int) -> bytes:
         """Bytes of the data space: registers from 0, I/O registers from 0x20 as last written, RAM from 0x100.
@@ -140,20 +189,20 @@ class BoardMemory(ABC):
         self._data(address, len(data))[:] = data
 
     def _eeprom(self) -> Any:
-        eeprom = self._memory_lib.board_eeprom_of(self._board)
-        if eeprom == self._memory_ffi.NULL:
+        eeprom = self.board.extension("eeprom", "board_eeprom")
+        if eeprom is None:
             raise BoardError("this kind of board has no EEPROM")
         return eeprom
 
     def read_eeprom(self) -> bytes:
         """The whole EEPROM; a cell changes when its write is complete."""
-        return bytes(self._memory_ffi.buffer(self._eeprom().bytes, EEPROM_SIZE))
+        return bytes(self.board.ffi.buffer(self._eeprom().bytes, EEPROM_SIZE))
 
     def write_eeprom(self, address: int, data: bytes | Iterable[int]) -> None:
         """Puts bytes into the EEPROM at once."""
         data = bytes(data)
         check_range("EEPROM", address, len(data), EEPROM_SIZE)
-        self._memory_ffi.buffer(self._eeprom().bytes + address, len(data))[:] = data
+        self.board.ffi.buffer(self._eeprom().bytes + address, len(data))[:] = data
 
     def eeprom_damage(self, damage: Damage, garbage: int = 0x5A) -> None:
         """What becomes of a cell whose write is cut short by a power-on or brown-out reset; `garbage`: for GARBAGE."""
@@ -163,16 +212,16 @@ class BoardMemory(ABC):
     def watchdog_log(self) -> list[tuple[int, int]]:
         """Cycle and address (bytes) at which its watchdog found the program, for each of its resets since power-on,
         oldest first (board.h); empty where the board has no watchdog, and of resets in its name from outside."""
-        log = self._memory_lib.board_watchdog_log_of(self._board)
-        if log == self._memory_ffi.NULL:
+        log = self.board.extension("watchdog log", "board_watchdog_log")
+        if log is None:
             return []
-        return [(int(log.resets[i].cycle), int(log.resets[i].address)) for i in range(log.count)]
+        return [(int(log.resets[i].cycle), int(log.resets[i].address)) for i in range(log.end)]
 
     def notes(self, since: int = 0) -> list[tuple[int, int, str, str]]:
         """Cycle, address (bytes), what the program did there and why that is not what it seems (board.h): each once,
         oldest first, without the first `since`; empty of a board that cannot be seen into."""
-        log, text = self._memory_lib.board_notes_of(self._board), self._memory_ffi.string
-        if log == self._memory_ffi.NULL:
+        log, text = self.board.extension("notes", "board_notes"), self.board.ffi.string
+        if log is None:
             return []
         found = (log.notes[i] for i in range(since, log.count))
         words = ((note, *(text(part).decode() for part in (note.does, note.what, note.why))) for note in found)
@@ -188,34 +237,38 @@ def check_range(what: str, address: int, count: int, size: int) -> None:
 class BoardAccess(BoardMemory):
     """One board's operations, times in CPU cycles since power-on, pins by their Arduino numbers (A0 is 14)."""
 
-    def __init__(self, lib: Any, ffi: Any, pointer: Any, owner: object = None, elf: Path | None = None) -> None:
-        """Becomes the listener of the board at `pointer`; `owner` is kept alive. `elf`: what it runs, for the place
-        of a fault."""
-        super().__init__(lib, ffi)
-        self._pointer = pointer
-        self._lib = lib
-        self._ffi = ffi
-        self._owner = owner
-        self._elf = elf
-        self._access = lib.board_access_open(pointer)
-        if self._access == ffi.NULL:
+    def __init__(self, board: EmulatedBoard) -> None:
+        """Becomes the listener of the board, and keeps it alive.
+
+        Raises:
+            BoardError: it was built for another version of board.h.
+        """
+        self._listens_to: EmulatedBoard | None = board
+        self._access = board.lib.board_access_open(board.handle)
+        if not self._access:
             raise BoardError("This board was built for another version of the board interface; build it again.")
-        self._bytes, self._cycles = ffi.new("uint8_t[]", ROOM), ffi.new("uint64_t[]", ROOM)
+        self._bytes, self._cycles = board.ffi.new("uint8_t[]", ROOM), board.ffi.new("uint64_t[]", ROOM)
 
     @property
-    def _board(self) -> Any:
-        if self._pointer == self._ffi.NULL:
+    def board(self) -> EmulatedBoard:
+        """The board itself."""
+        if self._listens_to is None:
             raise BoardError("this board is closed")
-        return self._pointer
+        return self._listens_to
+
+    def _call(self, operation: str, *arguments: Any) -> Any:
+        """One of the operations of board.h."""
+        board = self.board.handle
+        return getattr(board.op, operation)(board, *arguments)
 
     @property
     def now(self) -> int:
         """The cycle up to which the board has run."""
-        return int(self._lib.board_access_now(self._access))
+        return int(self._call("now"))
 
     def advance(self, until: int) -> None:
         """Runs until `until`, or up to an instruction's length beyond. A crash raises BoardError."""
-        if self._lib.board_access_advance(self._access, until):
+        if self._call("advance", until):
             raise BoardError(f"The board stopped: {self.fault}.")
 
     def run(self, cycles: int) -> None:
@@ -224,17 +277,17 @@ class BoardAccess(BoardMemory):
 
     def drive(self, pin: int, level: Level, at: int = 0) -> None:
         """From cycle `at` (or now) on the outside drives `pin`; replaces what was queued for it from then on."""
-        self._lib.board_access_drive(self._access, at, pin, level)
+        self._call("drive", at, pin, level)
 
     def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None:
         """Drives `pin` to `level` (LOW or HIGH) at cycle `first`, to the other one `half` cycles later, and so on,
         `count` times."""
-        self._lib.board_access_drive_wave(self._access, first, half, count, pin, level)
+        self.board.lib.board_access_drive_wave(self._access, first, half, count, pin, level)
 
     def send(self, data: bytes | Iterable[int], at: int = 0) -> None:
         """Puts bytes on the line towards the board, not before cycle `at`."""
         data = bytes(data)
-        self._lib.board_access_send(self._access, at, data, len(data))
+        self._call("send", at, data, len(data))
 
     def receive(self) -> list[SentByte]:
         """Takes the bytes that left the board since the last call."""
@@ -243,19 +296,19 @@ class BoardAccess(BoardMemory):
 
     def received(self) -> tuple[bytes, list[int]]:
         """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
-        data, cycles = b"", []
-        while count := self._lib.board_access_receive(self._access, self._bytes, self._cycles, ROOM):
-            data += self._ffi.buffer(self._bytes, count)[:]
-            cycles += self._ffi.unpack(self._cycles, count)
+        data, cycles, ffi = b"", [], self.board.ffi
+        while count := self._call("receive", self._bytes, self._cycles, ROOM):
+            data += ffi.buffer(self._bytes, count)[:]
+            cycles += ffi.unpack(self._cycles, count)
         return data, cycles
 
     def line_rate(self, baud: int) -> None:
         """Sets the outside's bit rate."""
-        self._lib.board_access_line_rate(self._access, baud)
+        self._call("line_rate", baud)
 
     def reset(self, cause: ResetCause = ResetCause.EXTERNAL) -> None:
         """Resets the microcontroller at its next instruction."""
-        self._lib.board_access_reset(self._access, cause)
+        self._call("reset", cause)
 
     def log(self) -> list[Edge]:
         """Takes the output edges since the last call."""
@@ -264,11 +317,9 @@ class BoardAccess(BoardMemory):
     def edges(self) -> NDArray[Any]:
         """The same as an array (dtype EDGE)."""
         log = self._access.log
-        if not log.count:
-            return NO_EDGES
-        found = np.frombuffer(self._ffi.buffer(log.edges, log.count * EDGE.itemsize)[:], dtype=EDGE)
-        self._lib.board_log_clear(self._ffi.addressof(self._access, "log"))
-        return found
+        size = log.end * EDGE.itemsize
+        log.end = 0
+        return np.frombuffer(self.board.ffi.buffer(log.edges, size)[:] if size else b"", dtype=EDGE)
 
     def analog(self, channel: int, volts: float) -> None:
         """Sets the voltage at analog channel 0..5."""
@@ -287,14 +338,13 @@ class BoardAccess(BoardMemory):
     @property
     def fault(self) -> str | None:
         """What is wrong after a crash, with function and line where they are known, or None."""
-        return fault_of(self._lib, self._ffi, self._board, self._elf)
+        return self.board.fault()
 
     def close(self) -> None:
         """Lets go of the board."""
-        if self._access != self._ffi.NULL:
-            self._lib.board_access_close(self._access)
-            self._access = self._pointer = self._ffi.NULL
-            self._owner = None
+        if self._listens_to is not None:
+            self._listens_to.lib.board_access_close(self._access)
+            self._listens_to = None
 
 
 # ---- places in the program: its ELF file is read only where something went wrong ------------------------------------
@@ -329,16 +379,6 @@ def with_place(fault: str, elf: Path | None, address: int, z: int = 0) -> str:
     if where == f"in {PROLOGUE}" and (caller := found[2 * z]):
         where += f" of {caller.removeprefix('in ')}"
     return f"{fault} {where}".rstrip()
-
-
-def fault_of(lib: Any, ffi: Any, board: Any, elf: Path | None) -> str | None:
-    """What is wrong with a board (C `board *`) after a crash, or None."""
-    text = lib.board_fault(board)
-    if text == ffi.NULL:
-        return None
-    data = lib.board_memory(board)
-    z = 0 if data == ffi.NULL else data[30] | data[31] << 8
-    return with_place(ffi.string(text).decode(), elf, lib.board_fault_address(board), z)
 
 
 def note_sentences(notes: Sequence[tuple[int, int, str, str]], elf: Path | None) -> list[str]:

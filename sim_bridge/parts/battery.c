@@ -18,7 +18,6 @@ static void step(part *base) {
 
 static double analog(part *base, uint64_t cycle) {
   battery *self = (battery *)base;
-  (void)cycle;
   const double noise = self->parameters.noise_v * noise_next_normal(&base->noise);
   const double v = self->supply.pack_v * self->parameters.divider + noise;
   return v < 0.0 ? 0.0 : (v > SUPPLY_NOMINAL_V ? SUPPLY_NOMINAL_V : v);

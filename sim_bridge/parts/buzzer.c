@@ -55,7 +55,6 @@ static void on_rise(buzzer *self, uint64_t cycle) {
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   buzzer *self = (buzzer *)base;
-  (void)pin;
   const uint8_t high = level == BOARD_HIGH;
   if (high == self->high) return;
   self->high = high;
@@ -75,7 +74,6 @@ static void step(part *base) {
 static const part_operations OPERATIONS = {.edge = edge, .step = step};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
-  (void)parameters;
   part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS}, 1);
   return 0;
 }

@@ -48,7 +48,6 @@ static void look(infrared *self, uint64_t cycle) {
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   infrared *self = (infrared *)base;
-  (void)pin;
   if (level != BOARD_HIGH) return;
   if (cycle - self->last_rise > GAP) {
     self->carrier_cycles = 0;

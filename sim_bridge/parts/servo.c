@@ -3,7 +3,6 @@
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   servo *self = (servo *)base;
-  (void)pin;
   const uint8_t high = level == BOARD_HIGH;
   if (high == self->high) return;
   self->high = high;

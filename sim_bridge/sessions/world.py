@@ -18,8 +18,9 @@ from boebot.arenas import load_arena
 from boebot.boards import BoardRequest
 from boebot.errors import BoardError
 from sim_bridge._core import lib
-from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.emulated import EmulatedBoard, avr_board, avr_image, image_file, native_board, native_library
+from sim_bridge.boards import avr
+from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
+from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library
 from sim_bridge.sessions.places import places_of
 from sim_bridge.sessions.session import DirectSession, SimSession
 from sim_bridge.sim import NEVER, Sim, SimRobot
@@ -149,7 +150,7 @@ class BoardKind(NamedTuple):
 
 
 NATIVE = BoardKind("native", native_library, native_board)
-AVR = BoardKind("avr", avr_image, avr_board)
+AVR = BoardKind("avr", avr_image, avr.create)
 
 
 def native_world(requests: Sequence[BoardRequest]) -> SimWorld:

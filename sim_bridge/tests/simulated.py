@@ -16,9 +16,9 @@ from cffi import FFI
 
 from boebot.arenas import Arena, ArenaDescription, Polygon, Start
 from boebot.description.robots import RobotDescription, Supply, load_robot
+from sim_bridge import _core
 from sim_bridge._core import ffi
-from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.emulated import EmulatedBoard
+from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim, SimRobot
 
@@ -114,8 +114,8 @@ class Scripted:
 def script_board() -> tuple[Any, EmulatedBoard]:
     """A board that plays a script, and its place in a simulation."""
     script = scripts.script_board_new()
-    address = int(scripts.script_board_address(script))
-    return script, EmulatedBoard(address, "script", lambda: scripts.script_board_destroy(script))
+    board = ffi.cast("board *", int(scripts.script_board_address(script)))
+    return script, EmulatedBoard(_core, board, "script")
 
 
 def scripted(

@@ -16,7 +16,8 @@ import pytest
 from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoebotError
-from sim_bridge.boards.emulated import EmulatedBoard, native_board, native_library
+from sim_bridge.boards.board import EmulatedBoard
+from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim
 

@@ -18,7 +18,8 @@ OPERATORS |= {"+": "-", "-": "+", "*": "/", "/": "*", "//": "*", "%": "*", "+=":
 ARITHMETIC = {"+", "-", "*", "/", "//", "%", "+=", "-="}
 BOOLEAN = {"and", "or", "&&", "||"}
 TEXTS = re.compile(r"(cast|print|echo|warn|log|debug|info|add_argument|Option|Argument|TypeVar|NewType)$")
-WARNINGS = "-std=gnu11 -O2 -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
+WARNINGS = "-std=gnu11 -O2 -Wall -Wextra -Wno-unused-parameter -Wconversion -Wshadow -Wstrict-prototypes"
+WARNINGS += " -Wmissing-prototypes -Werror"
 INCLUDES = "-Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src"
 PIN_MAPS = ("SHIELDBOT", "SHIELDBOT_LINE", "SHIELDBOT_QUAD", "BOEBOT")
 

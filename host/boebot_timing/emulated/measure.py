@@ -65,7 +65,7 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
     what = watched(image)
     board = avr.create(image)
     board.record(what.watch)
-    access = WorldAccess(board, image, robot, seed=1) if scenario == "everything" else board.access()
+    access = WorldAccess(board, robot, seed=1) if scenario == "everything" else board.access()
     with Bench(image, access) as bench:
         line = prepare(bench, robot, scenario)
         loaded_from, before = bench.now, bench.access.counters()

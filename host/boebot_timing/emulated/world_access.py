@@ -3,7 +3,6 @@ answer at its pins, and others may take some of the pins from them."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -13,7 +12,6 @@ from boebot.arenas import load_arena
 from boebot.description.robots import RobotDescription
 from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import Level
-from sim_bridge.boards.emulated import EmulatedBoard
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim
 
@@ -29,11 +27,10 @@ def with_all_devices(robot: RobotDescription) -> RobotDescription:
 class WorldAccess:
     """See `loads.Access`."""
 
-    def __init__(self, board: AvrBoard, elf: Path, robot: RobotDescription, seed: int) -> None:
-        """Puts the board into a room, without noise. `elf` is what it runs."""
+    def __init__(self, board: AvrBoard, robot: RobotDescription, seed: int) -> None:
+        """Puts the board into a room, without noise."""
         self._sim = Sim(load_arena(ARENA), seed=seed, noise=False, record=False)
-        emulated = EmulatedBoard(board.pointer, "emulated ATmega328P", board.close, keep=board, elf=elf)
-        self._robot = self._sim.add(emulated, with_all_devices(robot))
+        self._robot = self._sim.add(board, with_all_devices(robot))
         self._pins = BoardPins(self._robot)
         self._to_send: list[tuple[int, bytes]] = []
         self._edges_seen = 0

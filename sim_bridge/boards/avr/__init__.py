@@ -18,7 +18,7 @@ from boebot import resources
 from boebot.errors import AnalysisError, BoardError
 from boebot.files import regular
 from boebot.image.chip import assumed_chip
-from sim_bridge.boards.board import BoardAccess
+from sim_bridge.boards.board import EmulatedBoard
 
 ERROR_SIZE = 200
 FLASH_SIZE = 0x8000  # bytes
@@ -63,11 +63,8 @@ def _extension() -> Any:
         ) from error
 
 
-class AvrBoard:
-    """An emulated Arduino Uno. `pointer` is its `board *` as an integer, valid until `close` or the end of this
-    object: the user of the pointer keeps this object. `assumed_chip`: a sentence where the image does not say for which
-    chip it is, or "".
-    """
+class AvrBoard(EmulatedBoard):
+    """An emulated Arduino Uno. `assumed`: a sentence where the image does not say for which chip it is, or ""."""
 
     def __init__(self, elf: bytes, path: Path) -> None:
         """Powers on a board whose flash holds the program of an ELF file, which is at `path`.
@@ -76,44 +73,27 @@ class AvrBoard:
             BoardError: it is no such file, or one for another chip.
         """
         extension = _extension()
-        self._ffi, self._lib = extension.ffi, extension.lib
-        self.elf = path
-        self._board = self._ffi.NULL
         try:
-            self.assumed_chip = assumed_chip(f"the firmware image {path}", elf)
+            assumed = assumed_chip(f"the firmware image {path}", elf)
         except AnalysisError as refused:
             raise BoardError(str(refused)) from None
-        error = self._ffi.new("char[]", ERROR_SIZE)
-        self._board = self._lib.avr_board_create(elf, len(elf), error, ERROR_SIZE)
-        if self._board == self._ffi.NULL:
-            raise BoardError(f"the firmware image {path} cannot be loaded: {self._ffi.string(error).decode()}")
-
-    @property
-    def pointer(self) -> int:
-        """The address of the board."""
-        if self._board == self._ffi.NULL:
-            raise BoardError("this board is closed")
-        return int(self._ffi.cast("uintptr_t", self._board))
-
-    def access(self) -> BoardAccess:
-        """The board's operations, for use without a simulated world."""
-        return BoardAccess(self._lib, self._ffi, self._ffi.cast("board *", self.pointer), owner=self, elf=self.elf)
+        error = extension.ffi.new("char[]", ERROR_SIZE)
+        board = extension.lib.avr_board_create(elf, len(elf), error, ERROR_SIZE)
+        if not board:
+            raise BoardError(f"the firmware image {path} cannot be loaded: {extension.ffi.string(error).decode()}")
+        super().__init__(extension, board, "emulated ATmega328P", elf=path, assumed=assumed)
 
     def hang_at(self, address: int) -> None:
         """From now on the instruction at that byte address of the program jumps to itself."""
         if not 0 <= address < FLASH_SIZE or address % 2:
             raise ValueError(f"no instruction at 0x{address:X}; expected an even address below 0x{FLASH_SIZE:X}")
-        self._lib.avr_board_flash(self._running)[address : address + 2] = JUMP_TO_ITSELF
+        self.ffi.buffer(self.extension("flash", "uint8_t") + address, 2)[:] = JUMP_TO_ITSELF
 
     def one_by_one(self) -> None:
         """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""
-        self._lib.avr_board_one_by_one(self._running)
+        self.lib.avr_board_one_by_one(self.handle)
 
     # ---- recorder ----------------------------------------------------------------------------------------------------
-
-    @property
-    def _running(self) -> Any:
-        return self._ffi.cast("board *", self.pointer)
 
     def record(self, watch: Watch) -> None:
         """Records from now on, anew if it did already: the board takes longer, and does the same.
@@ -121,48 +101,31 @@ class AvrBoard:
         Raises:
             BoardError: too many functions, or one that begins at no address of flash.
         """
-        entries = self._ffi.new("uint32_t[]", list(watch.functions))
-        what = self._ffi.new(
-            "avr_watch *",
-            {
-                "entries": entries,
-                "entry_count": len(watch.functions),
-                "patience": watch.patience,
-            },
-        )
-        if not self._lib.avr_board_record(self._running, what):
+        entries = self.ffi.new("uint32_t[]", list(watch.functions))
+        what = self.ffi.new("avr_watch *", (entries, len(watch.functions), watch.patience))
+        if not self.lib.avr_board_record(self.handle, what):
             raise BoardError(
                 f"record: {len(watch.functions)} functions; expected even addresses below 0x8000, at most "
-                f"{self._lib.AVR_FUNCTIONS_MAXIMUM} of them"
+                f"{self.lib.AVR_FUNCTIONS_MAXIMUM} of them"
             )
 
     def stop_recording(self) -> None:
         """Forgets all that was recorded; the board is as fast as before."""
-        self._lib.avr_board_stop_recording(self._running)
+        self.lib.avr_board_stop_recording(self.handle)
 
     def spans(self) -> NDArray[Any]:
         """Takes the spans (dtype SPAN) that have ended since the last call, in the order in which they began."""
-        count = self._ffi.new("size_t *")
-        spans = self._lib.avr_board_spans(self._running, count)
+        count = self.ffi.new("size_t *")
+        spans = self.lib.avr_board_spans(self.handle, count)
         size = count[0] * SPAN.itemsize
-        found = np.frombuffer(self._ffi.buffer(spans, size)[:] if size else b"", dtype=SPAN)
-        self._lib.avr_board_forget_spans(self._running)
+        found = np.frombuffer(self.ffi.buffer(spans, size)[:] if size else b"", dtype=SPAN)
+        self.lib.avr_board_forget_spans(self.handle)
         return found[np.argsort(found["begin"], kind="stable")]
 
     @property
     def lowest_stack(self) -> int:
         """Lowest value of the stack pointer while it records."""
-        return int(self._lib.avr_board_lowest_stack(self._running))
-
-    def close(self) -> None:
-        """Frees the board."""
-        if self._board != self._ffi.NULL:
-            self._lib.board_free(self._board)
-            self._board = self._ffi.NULL
-
-    def __del__(self) -> None:
-        if getattr(self, "_board", None) is not None:
-            self.close()
+        return int(self.lib.avr_board_lowest_stack(self.handle))
 
 
 def create(elf: Path) -> AvrBoard:

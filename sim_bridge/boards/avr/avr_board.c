@@ -13,71 +13,17 @@
 #define RESERVED_RAMPZ 0x5Bu /* where larger AVRs have RAMPZ */
 #define Z_RANGE 0x10000u
 
-/* ---- registers ---- */
-
-void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param) {
-  avr_register_io_read(b->avr, address, read, param);
-}
-
-void on_bit_write(avr_board *b, uint16_t address, avr_io_write_bit_t write, void *param) {
-  avr_register_io_bit_write(b->avr, address, write, param);
-}
-
-static uint8_t read_flags(avr_t *avr, avr_io_addr_t address, void *param) {
-  const flag_register *self = param;
-  (void)avr;
-  (void)address;
-  uint64_t cycle = begin_access(self->owner);
-  uint8_t value = 0;
-  for (unsigned bit = 0; bit < 8; bit++) {
-    if (!self->vectors[bit]) continue;
-    timer_state *timer = timer_of_vector(self->owner, self->vectors[bit]);
-    if (timer) timer_bring_up(timer, cycle);
-    if (self->owner->raised & FLAG(self->vectors[bit])) value |= (uint8_t)(1u << bit);
-  }
-  return value;
-}
-
-static void write_flags(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  const flag_register *self = param;
-  (void)avr;
-  (void)address;
-  uint64_t cycle = begin_access(self->owner);
-  for (unsigned bit = 0; bit < 8; bit++) {
-    if (!self->vectors[bit] || !(value >> bit & 1)) continue;
-    timer_state *timer = timer_of_vector(self->owner, self->vectors[bit]);
-    if (timer) timer_bring_up(timer, cycle);
-    clear_flag(self->owner, self->vectors[bit]);
-    if (timer) timer_plan(timer);
-  }
-}
-
-static int write_flag_bit(avr_t *avr, uint8_t bit, uint8_t value, void *param) {
-  if (value) write_flags(avr, 0, (uint8_t)(1u << bit), param);
-  return 1;
-}
-
-void add_flag_register(avr_board *b, uint16_t address, const uint8_t vectors[8]) {
-  flag_register *self = &b->flag_registers[b->flag_register_count++];
-  self->owner = b;
-  memcpy(self->vectors, vectors, sizeof self->vectors);
-  on_read(b, address, read_flags, self);
-  on_write(b, address, write_flags, self);
-  on_bit_write(b, address, write_flag_bit, self);
-}
-
 /* MCUSR: flags can only be cleared. */
-static void write_reset_flags(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  if (value & ~avr->data[address])
-    note(param, avr->pc, "writes 1 to", "MCUSR", "its flags can only be cleared (11.9.1)");
-  avr->data[address] &= value;
+static void write_reset_flags(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  if (value & ~b->avr->data[address])
+    note(b, b->avr->pc, "writes 1 to", "MCUSR", "its flags can only be cleared (11.9.1)");
+  b->avr->data[address] &= value;
 }
 
 /* ---- construction ---- */
 
 /* WDR arrives as a request to all of simavr's modules. */
 static int on_request(avr_io_t *io, uint32_t request, void *param) {
-  (void)param;
   if (request != AVR_IOCTL_WATCHDOG_RESET) return -1;
   watchdog_kick((avr_board *)io->avr->custom.data);
   return 0;
@@ -94,7 +40,7 @@ void mx8_init(struct avr_t *avr) {
   avr_flash_init(avr, &chip->selfprog);
   avr_register_io(avr, &b->io);
   registers_init(b);
-  on_write(b, REG_MCUSR, write_reset_flags, b);
+  on_write(b, REG_MCUSR, write_reset_flags);
   pins_init(b);
   timers_init(b);
   usart_init(b);
@@ -184,7 +130,7 @@ static void *extension(board *self, const char *name) {
   if (!strcmp(name, BOARD_DATA)) return b->avr->data;
   if (!strcmp(name, BOARD_EEPROM)) return &b->eeprom.face;
   if (!strcmp(name, AVR_BOARD_FLASH)) return b->avr->flash;
-  if (!strcmp(name, BOARD_WATCHDOG_LOG)) return &b->watchdog_history.log;
+  if (!strcmp(name, BOARD_WATCHDOG_LOG)) return &b->watchdog_log;
   if (!strcmp(name, BOARD_NOTES)) return &b->notes;
   if (!strcmp(name, BOARD_FAULT_ADDRESS)) {
     return b->crashed && b->fault_address != NO_ADDRESS ? &b->fault_address : NULL;
@@ -215,8 +161,6 @@ void avr_board_one_by_one(board *self) { ((avr_board *)self)->one_by_one = true;
 
 /* Of what simavr says of a program, only that an address was "wrapped" is news. */
 static void hear_simavr(avr_t *avr, const int level, const char *format, va_list arguments) {
-  (void)level;
-  (void)arguments;
   if (!strstr(format, "Wrapping")) return;
   note(avr->custom.data, avr->pc, "reads or writes", "behind the memory's end",
        "nothing is there; here it is RAM again");

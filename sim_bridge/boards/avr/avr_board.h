@@ -10,12 +10,14 @@
 
 #include "../board.h"
 
+/* python: begin */
 /* A board with the program of an ELF file (its bytes, not its name) in flash, powered on at cycle 0. On failure NULL,
  * and one sentence in `error`. */
 board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
 
 /* For tests of what else is faster: from now on each instruction is executed by itself, and by simavr's core. */
 void avr_board_one_by_one(board *self);
+/* python: end */
 
 /* The board's extension "flash": its program memory. */
 #define AVR_BOARD_FLASH "flash"

@@ -93,59 +93,45 @@ void converter_due(avr_board *b, uint64_t cycle) {
   }
 }
 
-static uint8_t read_control(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  begin_access(b);
-  return (uint8_t)((avr->data[address] & ~ADIF) | (b->raised & FLAG(VECTOR_ADC) ? ADIF : 0));
+static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
+  return (uint8_t)((b->avr->data[address] & ~ADIF) | (b->raised & FLAG(VECTOR_ADC) ? ADIF : 0));
 }
 
-static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   converter_state *c = &b->converter;
-  uint64_t cycle = begin_access(b) + 1;
   bool converting = b->due[DUE_CONVERTER] != NEVER;
-  bool was_enabled = avr->data[address] & ADEN;
+  bool was_enabled = b->avr->data[address] & ADEN;
   if (value & ADIF) clear_flag(b, VECTOR_ADC);
-  avr->data[address] = (uint8_t)(value & ~ADIF);
+  b->avr->data[address] = (uint8_t)(value & ~ADIF);
   enable_interrupt(b, VECTOR_ADC, value & ADIE);
   if (!(value & ADEN)) {
-    avr->data[address] &= (uint8_t)~ADSC;
+    b->avr->data[address] &= (uint8_t)~ADSC;
     set_due(b, DUE_CONVERTER, NEVER);
     return;
   }
   if (!was_enabled) {
-    c->enabled_at = cycle;
+    c->enabled_at = end;
     c->first = true;
   }
   if (converting) {
-    avr->data[address] |= ADSC; /* writing 0 does not stop it */
+    b->avr->data[address] |= ADSC; /* writing 0 does not stop it */
   } else if (value & ADSC) {
     note_missing(b);
-    start(b, cycle);
+    start(b, end);
   }
 }
 
-static void write_selection(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  uint64_t cycle = begin_access(b) + 1;
-  if ((avr->data[address] & MUX) != MUX_BAND_GAP) b->converter.band_gap_from = cycle;
-  avr->data[address] = value;
+static void write_selection(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  if ((b->avr->data[address] & MUX) != MUX_BAND_GAP) b->converter.band_gap_from = end;
+  b->avr->data[address] = value;
 }
 
-static uint8_t read_low(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
-  begin_access(b);
+static uint8_t read_low(avr_board *b, uint16_t address, uint64_t cycle) {
   b->converter.locked = true; /* until the high byte is read */
   return (uint8_t)b->converter.result;
 }
 
-static uint8_t read_high(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
-  begin_access(b);
+static uint8_t read_high(avr_board *b, uint16_t address, uint64_t cycle) {
   b->converter.locked = false;
   return (uint8_t)(b->converter.result >> 8);
 }
@@ -158,9 +144,9 @@ void converter_reset(avr_board *b) {
 }
 
 void converter_init(avr_board *b) {
-  on_read(b, REG_ADCSRA, read_control, b);
-  on_write(b, REG_ADCSRA, write_control, b);
-  on_write(b, REG_ADMUX, write_selection, b);
-  on_read(b, REG_ADCL, read_low, b);
-  on_read(b, REG_ADCH, read_high, b);
+  on_read(b, REG_ADCSRA, read_control);
+  on_write(b, REG_ADCSRA, write_control);
+  on_write(b, REG_ADMUX, write_selection);
+  on_read(b, REG_ADCL, read_low);
+  on_read(b, REG_ADCH, read_high);
 }

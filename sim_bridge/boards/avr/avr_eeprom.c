@@ -49,72 +49,53 @@ static void end_write(avr_board *b) {
 }
 
 void eeprom_due(avr_board *b, uint64_t cycle) {
-  (void)cycle;
   b->eeprom.cells[b->eeprom.address] = b->eeprom.value;
   end_write(b);
 }
 
-static uint8_t read_control(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  uint64_t cycle = begin_access(b);
-  uint8_t value = avr->data[address] & (EEPM | EERIE);
+static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
+  uint8_t value = b->avr->data[address] & (EEPM | EERIE);
   if (cycle < b->eeprom.armed_until) value |= EEMPE;
   if (b->eeprom.writing) value |= EEPE;
   return value;
 }
 
-static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   eeprom_state *e = &b->eeprom;
-  uint64_t cycle = begin_access(b);
-  uint8_t mode = (e->writing ? avr->data[address] : value) & EEPM;
-  bool armed = cycle < e->armed_until;
-  avr->data[address] = mode | (value & EERIE);
+  uint8_t mode = (e->writing ? b->avr->data[address] : value) & EEPM;
+  bool armed = end <= e->armed_until;
+  b->avr->data[address] = mode | (value & EERIE);
   enable_interrupt(b, VECTOR_EE_READY, value & EERIE);
   if (armed && (value & EEPE) && !e->writing) {
-    start_write(b, mode, cycle + 1);
+    start_write(b, mode, end);
     return;
   }
   if ((value & EEPE) && !e->writing)
-    note(b, avr->pc, "sets", "EEPE", "it is dropped: EEMPE was not set just before (8.6.3)");
-  if ((value & EERE) && e->writing) note(b, avr->pc, "sets", "EERE", BUSY);
-  if ((value & EEMPE) && (e->writing || !(value & EEPE))) e->armed_until = cycle + 1 + ARMED_CYCLES;
+    note(b, b->avr->pc, "sets", "EEPE", "it is dropped: EEMPE was not set just before (8.6.3)");
+  if ((value & EERE) && e->writing) note(b, b->avr->pc, "sets", "EERE", BUSY);
+  if ((value & EEMPE) && (e->writing || !(value & EEPE))) e->armed_until = end + ARMED_CYCLES;
   if ((value & EERE) && !e->writing) {
     e->data = e->cells[e->selected];
     halt_cpu(b, READ_HALT_CYCLES);
   }
 }
 
-static void write_address(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_address(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   eeprom_state *e = &b->eeprom;
-  begin_access(b);
   unsigned high = address == REG_EEARH ? value & (BOARD_EEPROM_SIZE / 256u - 1u) : e->selected >> 8;
   unsigned low = address == REG_EEARH ? e->selected & 0xFFu : value;
   const uint16_t selected = (uint16_t)(high << 8 | low);
-  if (e->writing && selected != e->selected) note(b, avr->pc, "writes to", "EEAR", BUSY);
+  if (e->writing && selected != e->selected) note(b, b->avr->pc, "writes to", "EEAR", BUSY);
   if (!e->writing) e->selected = selected;
 }
 
-static uint8_t read_address(avr_t *avr, avr_io_addr_t address, void *param) {
-  const avr_board *b = param;
-  (void)avr;
+static uint8_t read_address(avr_board *b, uint16_t address, uint64_t cycle) {
   return (uint8_t)(address == REG_EEARH ? b->eeprom.selected >> 8 : b->eeprom.selected);
 }
 
-static void write_data(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
-  b->eeprom.data = value;
-}
+static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t end) { b->eeprom.data = value; }
 
-static uint8_t read_data(avr_t *avr, avr_io_addr_t address, void *param) {
-  const avr_board *b = param;
-  (void)avr;
-  (void)address;
-  return b->eeprom.data;
-}
+static uint8_t read_data(avr_board *b, uint16_t address, uint64_t cycle) { return b->eeprom.data; }
 
 void eeprom_reset(avr_board *b, bool power_failed) {
   eeprom_state *e = &b->eeprom;
@@ -135,12 +116,12 @@ void eeprom_reset(avr_board *b, bool power_failed) {
 void eeprom_init(avr_board *b) {
   memset(b->eeprom.cells, 0xFF, sizeof b->eeprom.cells);
   b->eeprom.face.bytes = b->eeprom.cells;
-  on_read(b, REG_EECR, read_control, b);
-  on_write(b, REG_EECR, write_control, b);
-  on_read(b, REG_EEDR, read_data, b);
-  on_write(b, REG_EEDR, write_data, b);
-  on_read(b, REG_EEARL, read_address, b);
-  on_write(b, REG_EEARL, write_address, b);
-  on_read(b, REG_EEARH, read_address, b);
-  on_write(b, REG_EEARH, write_address, b);
+  on_read(b, REG_EECR, read_control);
+  on_write(b, REG_EECR, write_control);
+  on_read(b, REG_EEDR, read_data);
+  on_write(b, REG_EEDR, write_data);
+  on_read(b, REG_EEARL, read_address);
+  on_write(b, REG_EEARL, write_address);
+  on_read(b, REG_EEARH, read_address);
+  on_write(b, REG_EEARH, write_address);
 }

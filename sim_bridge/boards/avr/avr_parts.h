@@ -22,7 +22,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "../board.h"
+#include "board.h"
+#include "queue.h"
 #include "sim_megax8.h"
 
 #define NEVER UINT64_MAX
@@ -314,11 +315,6 @@ typedef struct {
   uint64_t warned_cycle; /* when that was */
 } watchdog_state;
 
-typedef struct {
-  board_watchdog_log log;
-  size_t capacity;
-} watchdog_history;
-
 /* ---- EEPROM ---- */
 
 typedef struct {
@@ -335,19 +331,11 @@ typedef struct {
 
 /* ---- the board ---- */
 
-/* A register of interrupt flags: bit n is the flag of vectors[n], 0 where there is none. */
-typedef struct {
-  struct avr_board *owner;
-  uint8_t vectors[8];
-} flag_register;
+/* What the program reads at a register; `cycle`: of the access. All that is due until then has happened. */
+typedef uint8_t register_read(struct avr_board *b, uint16_t address, uint64_t cycle);
 
-#define FLAG_REGISTERS 5
-
-/* What a write to a register does. */
-typedef struct {
-  avr_io_write_t write; /* NULL: it is kept */
-  void *param;
-} register_write;
+/* The program writes to a register, which takes effect at `end`. All that is due before has happened. */
+typedef void register_write(struct avr_board *b, uint16_t address, uint8_t value, uint64_t end);
 
 typedef struct avr_board {
   board base;
@@ -371,9 +359,9 @@ typedef struct avr_board {
   bool one_by_one;        /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   board_counters counters;
-  flag_register flag_registers[FLAG_REGISTERS];
-  uint8_t flag_register_count;
-  register_write built_write[0x100]; /* by address, of registers in the table of avr_registers.c */
+  register_read *reads[0x100];   /* by address */
+  register_write *writes[0x100]; /* NULL: it is kept */
+  const struct chip_register *unbuilt[0x100];
   board_notes notes;
   uint64_t timer_base[2]; /* when the prescalers were reset: timers 0 and 1, timer 2 */
   port_state port[PORT_COUNT];
@@ -385,7 +373,7 @@ typedef struct avr_board {
   twi_state twi;
   converter_state converter;
   watchdog_state watchdog;
-  watchdog_history watchdog_history;
+  board_watchdog_log watchdog_log;
   eeprom_state eeprom;
 } avr_board;
 
@@ -415,14 +403,11 @@ static inline bool is_code(const avr_board *b, uint32_t address) {
   return address - b->code_begin < b->code_end - b->code_begin;
 }
 
-/* avr_board.c */
-void on_read(avr_board *b, uint16_t address, avr_io_read_t read, void *param);
-void on_bit_write(avr_board *b, uint16_t address, avr_io_write_bit_t write, void *param);
-/* A register of interrupt flags for `vectors`, bit 0 first: read, write 1 to clear, SBI clears one. */
-void add_flag_register(avr_board *b, uint16_t address, const uint8_t vectors[8]);
-
 /* avr_registers.c */
-void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param);
+void on_read(avr_board *b, uint16_t address, register_read *read);
+void on_write(avr_board *b, uint16_t address, register_write *write);
+void on_ones(avr_board *b,
+             uint16_t address);    /* SBI writes its bit alone, CBI does nothing: the register acts on ones */
 void registers_init(avr_board *b); /* before all that claim registers */
 /* Keeps what the instruction at `address` does, and `why` that is not what it seems; all literals. Once for each. */
 void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why);

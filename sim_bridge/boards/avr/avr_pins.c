@@ -7,7 +7,6 @@
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <stdlib.h>
-#include <string.h>
 
 #include "avr_parts.h"
 
@@ -39,27 +38,9 @@ static uint8_t pin_of(uint8_t port, unsigned bit) {
 
 /* ---- queues of changes ---- */
 
-/* Room for one more at the end. */
-static void reserve(change_queue *q) {
-  if (q->end < q->capacity) return;
-  if (q->first > q->capacity / 2) {
-    memmove(q->items, q->items + q->first, (q->end - q->first) * sizeof *q->items);
-  } else {
-    size_t capacity = q->capacity ? 2 * q->capacity : 64;
-    pin_change *items = malloc(capacity * sizeof *items);
-    if (!items) abort(); /* an edge cannot be left out */
-    if (q->items) memcpy(items, q->items + q->first, (q->end - q->first) * sizeof *items);
-    free(q->items);
-    q->items = items;
-    q->capacity = capacity;
-  }
-  q->end -= q->first;
-  q->first = 0;
-}
-
 /* Behind all that are not later. */
 static void insert(change_queue *q, pin_change change) {
-  reserve(q);
+  q->items = board_room_for(q->items, sizeof *q->items, &q->first, &q->end, &q->capacity, 1);
   size_t i = q->end++;
   for (; i > q->first && q->items[i - 1].at > change.at; i--) q->items[i] = q->items[i - 1];
   q->items[i] = change;
@@ -127,52 +108,29 @@ void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
   }
 }
 
-static uint8_t port_of(avr_io_addr_t address) { return (uint8_t)((address - REG_PINB) / 3); }
+static uint8_t port_of(uint16_t address) { return (uint8_t)((address - REG_PINB) / 3); }
 
-static uint8_t read_pins(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  uint64_t cycle = begin_access(b);
+static uint8_t read_pins(avr_board *b, uint16_t address, uint64_t cycle) {
   const uint8_t port = port_of(address);
   const port_state *p = &b->port[port];
   uint8_t level = p->changed >= cycle ? p->level_before : p->level;
   return port == PORT_D ? usart_at_pins(b, level, cycle) : level;
 }
 
-static void write_port(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  uint64_t cycle = begin_access(b);
-  if (avr->data[address] == value) return;
-  avr->data[address] = value;
-  pins_update(b, port_of(address), cycle + 1);
+static void write_port(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  if (b->avr->data[address] == value) return;
+  b->avr->data[address] = value;
+  pins_update(b, port_of(address), end);
 }
 
 /* Ones written to PINx toggle PORTx (14.2.2). */
-static void write_pins(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  write_port(avr, (avr_io_addr_t)(address + 2), avr->data[address + 2] ^ value, param);
+static void write_pins(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  write_port(b, (uint16_t)(address + 2), b->avr->data[address + 2] ^ value, end);
 }
 
-/* simavr does not say which register; there is one function for each. */
-static int toggle_b(avr_t *avr, uint8_t bit, uint8_t value, void *param) {
-  if (value) write_pins(avr, REG_PINB, (uint8_t)(1u << bit), param);
-  return 1;
-}
-
-static int toggle_c(avr_t *avr, uint8_t bit, uint8_t value, void *param) {
-  if (value) write_pins(avr, REG_PINC, (uint8_t)(1u << bit), param);
-  return 1;
-}
-
-static int toggle_d(avr_t *avr, uint8_t bit, uint8_t value, void *param) {
-  if (value) write_pins(avr, REG_PIND, (uint8_t)(1u << bit), param);
-  return 1;
-}
-
-static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  uint64_t cycle = begin_access(b);
-  avr->data[address] = value;
-  for (uint8_t port = 0; port < PORT_COUNT; port++) pins_update(b, port, cycle + 1);
+static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  b->avr->data[address] = value;
+  for (uint8_t port = 0; port < PORT_COUNT; port++) pins_update(b, port, end);
 }
 
 /* ---- interrupts ---- */
@@ -231,35 +189,28 @@ void pins_due_seen(avr_board *b, uint64_t cycle) {
   set_due(b, DUE_SEEN_EDGE, first_due(q));
 }
 
-static void write_pin_change_enables(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  begin_access(b);
-  avr->data[address] = value;
+static void write_pin_change_enables(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  b->avr->data[address] = value;
   for (uint8_t port = 0; port < PORT_COUNT; port++) {
     enable_interrupt(b, (uint8_t)(VECTOR_PCINT0 + port), value >> port & 1);
   }
 }
 
-static void write_pin_change_mask_d(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  usart_watched(b, value, begin_access(b) + 1);
-  avr->data[address] = value;
+static void write_pin_change_mask_d(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  usart_watched(b, value, end);
+  b->avr->data[address] = value;
 }
 
-static void write_external_enables(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  begin_access(b);
-  avr->data[address] = value;
+static void write_external_enables(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  b->avr->data[address] = value;
   for (uint8_t number = 0; number < 2; number++) {
     enable_interrupt(b, (uint8_t)(VECTOR_INT0 + number), value >> number & 1);
     update_level_interrupt(b, number);
   }
 }
 
-static void write_external_modes(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  begin_access(b);
-  avr->data[address] = value;
+static void write_external_modes(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  b->avr->data[address] = value;
   for (uint8_t number = 0; number < 2; number++) update_level_interrupt(b, number);
 }
 
@@ -306,23 +257,18 @@ void pins_reset(avr_board *b, uint64_t cycle) {
 }
 
 void pins_init(avr_board *b) {
-  static const avr_io_write_bit_t toggle[PORT_COUNT] = {toggle_b, toggle_c, toggle_d};
-  static const uint8_t pin_change_flags[8] = {VECTOR_PCINT0, VECTOR_PCINT1, VECTOR_PCINT2};
-  static const uint8_t external_flags[8] = {VECTOR_INT0, VECTOR_INT1};
   for (uint8_t port = 0; port < PORT_COUNT; port++) {
-    on_read(b, ADDRESSES[port], read_pins, b);
-    on_write(b, ADDRESSES[port], write_pins, b);
-    on_bit_write(b, ADDRESSES[port], toggle[port], b);
-    on_write(b, (uint16_t)(ADDRESSES[port] + 1), write_port, b);
-    on_write(b, (uint16_t)(ADDRESSES[port] + 2), write_port, b);
+    on_read(b, ADDRESSES[port], read_pins);
+    on_write(b, ADDRESSES[port], write_pins);
+    on_ones(b, ADDRESSES[port]);
+    on_write(b, (uint16_t)(ADDRESSES[port] + 1), write_port);
+    on_write(b, (uint16_t)(ADDRESSES[port] + 2), write_port);
   }
-  on_write(b, REG_MCUCR, write_control, b);
-  add_flag_register(b, REG_PCIFR, pin_change_flags);
-  on_write(b, REG_PCICR, write_pin_change_enables, b);
-  on_write(b, REG_PCMSK0 + PORT_D, write_pin_change_mask_d, b);
-  add_flag_register(b, REG_EIFR, external_flags);
-  on_write(b, REG_EIMSK, write_external_enables, b);
-  on_write(b, REG_EICRA, write_external_modes, b);
+  on_write(b, REG_MCUCR, write_control);
+  on_write(b, REG_PCICR, write_pin_change_enables);
+  on_write(b, REG_PCMSK0 + PORT_D, write_pin_change_mask_d);
+  on_write(b, REG_EIMSK, write_external_enables);
+  on_write(b, REG_EICRA, write_external_modes);
   /* the line to the outside rests high */
   b->port[PORT_D].driven = b->port[PORT_D].driven_level = 1u << RX_BIT;
 }

@@ -15,7 +15,7 @@ static const char SPI[] = "SPI is not built: no transfer ends, SPIF stays 0";
 static const char DIGITAL[] = "not built: digital inputs stay on";
 static const char SLAVE[] = "slave modes of the two-wire interface are not built: no address is answered";
 
-typedef struct {
+typedef struct chip_register {
   uint8_t address;
   uint8_t missing; /* bits that are not built */
   bool answers;    /* what is read there would come from what is not built */
@@ -57,47 +57,110 @@ void note(avr_board *b, uint32_t address, const char *does, const char *what, co
   all->notes[all->count++] = (board_note){b->avr->cycle, address, does, what, why};
 }
 
-static void write_checked(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = avr->custom.data;
-  const chip_register *r = param;
-  const register_write *built = &b->built_write[address];
-  begin_access(b);
-  if ((value ^ avr->data[address]) & r->missing) note(b, avr->pc, "writes to", r->name, r->why);
-  if (built->write) {
-    built->write(avr, address, value, built->param);
+static uint8_t read_register(avr_t *avr, avr_io_addr_t address, void *param) {
+  avr_board *b = param;
+  return b->reads[address](b, address, begin_access(b));
+}
+
+static void write_register(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+  avr_board *b = param;
+  const chip_register *r = b->unbuilt[address];
+  const uint64_t end = begin_access(b) + 1;
+  if (r && ((value ^ avr->data[address]) & r->missing)) note(b, avr->pc, "writes to", r->name, r->why);
+  if (b->writes[address]) {
+    b->writes[address](b, address, value, end);
   } else {
     avr->data[address] = value;
   }
 }
 
-static uint8_t read_unbuilt(avr_t *avr, avr_io_addr_t address, void *param) {
-  const chip_register *r = param;
-  note(avr->custom.data, avr->pc, "reads", r->name, r->why);
-  return avr->data[address];
+/* SBI and CBI, of which simavr does not say the register. */
+static int write_bit(avr_t *avr, uint8_t bit, uint8_t value, void *param) {
+  if (value) write_register(avr, (avr_io_addr_t)(uintptr_t)param, (uint8_t)(1u << bit), avr->custom.data);
+  return 1;
 }
 
-static void write_reserved(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  (void)address;
-  if (value) note(param, avr->pc, "writes to", "a reserved address", "the ATmega328P has no register there");
+static uint8_t read_unbuilt(avr_board *b, uint16_t address, uint64_t cycle) {
+  const chip_register *r = b->unbuilt[address];
+  note(b, b->avr->pc, "reads", r->name, r->why);
+  return b->avr->data[address];
 }
 
-void on_write(avr_board *b, uint16_t address, avr_io_write_t write, void *param) {
-  const uint16_t io = AVR_DATA_TO_IO(address);
-  if (b->avr->io[io].w.c == write_checked) {
-    b->built_write[address] = (register_write){write, param};
-  } else {
-    b->avr->io[io].w.c = write;
-    b->avr->io[io].w.param = param;
+static void write_reserved(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  if (value) note(b, b->avr->pc, "writes to", "a reserved address", "the ATmega328P has no register there");
+}
+
+void on_read(avr_board *b, uint16_t address, register_read *read) {
+  b->reads[address] = read;
+  avr_register_io_read(b->avr, address, read_register, b);
+}
+
+void on_write(avr_board *b, uint16_t address, register_write *write) { b->writes[address] = write; }
+
+void on_ones(avr_board *b, uint16_t address) {
+  avr_register_io_bit_write(b->avr, address, write_bit, (void *)(uintptr_t)address);
+}
+
+/* ---- registers of interrupt flags: a bit is read, a 1 clears it ---- */
+
+/* Bit n is the flag of vectors[n]; 0: there is none. */
+static const struct {
+  uint8_t address, vectors[8];
+} FLAGS[] = {
+    {REG_TIFR0, {VECTOR_TIMER0_OVF, VECTOR_TIMER0_COMPA, VECTOR_TIMER0_COMPB}},
+    {REG_TIFR1, {VECTOR_TIMER1_OVF, VECTOR_TIMER1_COMPA, VECTOR_TIMER1_COMPB, 0, 0, VECTOR_TIMER1_CAPT}},
+    {REG_TIFR2, {VECTOR_TIMER2_OVF, VECTOR_TIMER2_COMPA, VECTOR_TIMER2_COMPB}},
+    {REG_PCIFR, {VECTOR_PCINT0, VECTOR_PCINT1, VECTOR_PCINT2}},
+    {REG_EIFR, {VECTOR_INT0, VECTOR_INT1}},
+};
+
+#define FLAG_REGISTERS (sizeof FLAGS / sizeof *FLAGS)
+
+static uint8_t vector_of(uint16_t address, unsigned bit) {
+  size_t i = 0;
+  while (FLAGS[i].address != address) i++;
+  return FLAGS[i].vectors[bit];
+}
+
+static uint8_t read_flags(avr_board *b, uint16_t address, uint64_t cycle) {
+  uint8_t value = 0;
+  for (unsigned bit = 0; bit < 8; bit++) {
+    const uint8_t vector = vector_of(address, bit);
+    if (!vector) continue;
+    timer_state *timer = timer_of_vector(b, vector);
+    if (timer) timer_bring_up(timer, cycle);
+    if (b->raised & FLAG(vector)) value |= (uint8_t)(1u << bit);
+  }
+  return value;
+}
+
+static void write_flags(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  for (unsigned bit = 0; bit < 8; bit++) {
+    const uint8_t vector = vector_of(address, bit);
+    if (!vector || !(value >> bit & 1)) continue;
+    timer_state *timer = timer_of_vector(b, vector);
+    if (timer) timer_bring_up(timer, end - 1);
+    clear_flag(b, vector);
+    if (timer) timer_plan(timer);
   }
 }
 
 void registers_init(avr_board *b) {
   for (uint16_t address = 0x20; address <= 0xFF; address++) {
-    if (!memchr(KEPT, address, sizeof KEPT)) on_write(b, address, write_reserved, b);
+    if (memchr(KEPT, address, sizeof KEPT)) continue;
+    b->avr->io[AVR_DATA_TO_IO(address)].w.c = write_register;
+    b->avr->io[AVR_DATA_TO_IO(address)].w.param = b;
+    on_write(b, address, write_reserved);
   }
   for (size_t i = 0; i < sizeof REGISTERS / sizeof *REGISTERS; i++) {
     const chip_register *r = &REGISTERS[i];
-    on_write(b, r->address, write_checked, (void *)r);
-    if (r->answers) on_read(b, r->address, read_unbuilt, (void *)r);
+    b->unbuilt[r->address] = r;
+    on_write(b, r->address, NULL);
+    if (r->answers) on_read(b, r->address, read_unbuilt);
+  }
+  for (size_t i = 0; i < FLAG_REGISTERS; i++) {
+    on_read(b, FLAGS[i].address, read_flags);
+    on_write(b, FLAGS[i].address, write_flags);
+    on_ones(b, FLAGS[i].address);
   }
 }

@@ -152,8 +152,6 @@ static bool enter_interrupt(avr_board *b) {
 /* simavr reports RETI; the instruction after it runs even if I was set before. */
 static void on_reti(struct avr_irq_t *irq, uint32_t value, void *param) {
   avr_board *b = param;
-  (void)irq;
-  (void)value;
   if (b->avr->sreg[S_I]) b->avr->interrupt_state = -1;
 }
 
@@ -206,7 +204,6 @@ static void check_jump(avr_board *b, uint32_t address) {
 
 static void on_bad_opcode(struct avr_irq_t *irq, uint32_t opcode, void *param) {
   avr_board *b = param;
-  (void)irq;
   uint32_t address = (uint32_t)b->avr->pc;
   if (is_code(b, address)) {
     crash_at(b, address, "the program reached the invalid instruction 0x%04X", (unsigned)opcode);

@@ -9,7 +9,6 @@
 #include "avr_spans.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 #include "avr_board.h"
 #include "avr_instructions.h"
@@ -31,7 +30,7 @@ typedef struct avr_recorder {
   instruction_stops stops; /* marked: 1 + index of the function that begins there */
   uint64_t patience;
   avr_span *spans;
-  size_t count, capacity;
+  size_t first, end, capacity;
   open_span open[OPEN_MAXIMUM];
   unsigned open_count;
   uint64_t request[VECTOR_TWI + 1], next_request[VECTOR_TWI + 1]; /* since when each interrupt is wanted, or NEVER */
@@ -44,14 +43,8 @@ typedef struct avr_recorder {
 /* ---- spans ---- */
 
 static void keep(avr_recorder *r, const avr_span *span) {
-  if (r->count == r->capacity) {
-    size_t capacity = r->capacity ? 2 * r->capacity : 4096;
-    avr_span *spans = realloc(r->spans, capacity * sizeof *spans);
-    if (!spans) abort(); /* a record with a gap would lie */
-    r->spans = spans;
-    r->capacity = capacity;
-  }
-  r->spans[r->count++] = *span;
+  r->spans = board_room_for(r->spans, sizeof *r->spans, &r->first, &r->end, &r->capacity, 1);
+  r->spans[r->end++] = *span;
 }
 
 static void open_one(avr_board *b, uint16_t id, uint64_t begin, uint32_t latency, uint16_t stack) {
@@ -219,13 +212,13 @@ void avr_board_stop_recording(board *self) { spans_free((avr_board *)self); }
 
 const avr_span *avr_board_spans(const board *self, size_t *count) {
   const avr_recorder *r = ((const avr_board *)self)->recorder;
-  *count = r ? r->count : 0;
+  *count = r ? r->end : 0;
   return r ? r->spans : NULL;
 }
 
 void avr_board_forget_spans(board *self) {
   avr_recorder *r = ((avr_board *)self)->recorder;
-  if (r) r->count = 0;
+  if (r) r->end = 0;
 }
 
 uint16_t avr_board_lowest_stack(const board *self) {

@@ -17,8 +17,9 @@
 
 #include "../board.h"
 
-#define AVR_FUNCTION_IDS 64u /* id of the first watched function; below are vectors */
-#define AVR_FUNCTIONS_MAXIMUM 128u
+/* python: begin */
+enum { AVR_FUNCTION_IDS = 64 }; /* id of the first watched function; below are vectors */
+enum { AVR_FUNCTIONS_MAXIMUM = 128 };
 
 typedef struct {
   uint64_t begin;    /* cycle */
@@ -46,5 +47,6 @@ void avr_board_forget_spans(board *self);
 
 /* Lowest value of the stack pointer while it records. */
 uint16_t avr_board_lowest_stack(const board *self);
+/* python: end */
 
 #endif

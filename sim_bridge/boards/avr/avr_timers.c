@@ -77,11 +77,9 @@ static const timer_state BUILT_IN[3] = {
 
 /* ---- registers ---- */
 
-/* To be called before anything of the timer changes: brings it up to the end of the instruction. */
-static uint64_t begin_change(timer_state *t) {
-  uint64_t cycle = begin_access(t->owner) + 1;
-  timer_bring_up(t, cycle);
-  return cycle;
+static timer_state *timer_at(avr_board *b, uint16_t address) {
+  if (address >= REG_TIMSK0 && address < REG_TIMSK0 + 3) return &b->timer[address - REG_TIMSK0];
+  return &b->timer[(address >= BUILT_IN[1].address_control_a) + (address >= BUILT_IN[2].address_control_a)];
 }
 
 static void take_over_pins(timer_state *t, uint64_t cycle) {
@@ -94,65 +92,59 @@ static void take_over_pins(timer_state *t, uint64_t cycle) {
   }
 }
 
-static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  timer_state *t = param;
-  uint64_t cycle = begin_change(t);
+static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  timer_state *t = timer_at(b, address);
+  timer_bring_up(t, end);
   unsigned which = address - (unsigned)t->address_control_a;
   uint8_t strobes = (which == CONTROL_C || (which == CONTROL_B && !is_wide(t))) ? value & 0xC0 : 0;
-  avr->data[address] = (uint8_t)(value & ~strobes);
-  uint8_t a = avr->data[t->address_control_a], b = avr->data[t->address_control_a + CONTROL_B];
-  const waveform *w = is_wide(t) ? &WIDE[(a & 3) | (b >> 1 & 0x0C)] : &NARROW[(a & 3) | (b >> 1 & 0x04)];
+  b->avr->data[address] = (uint8_t)(value & ~strobes);
+  const uint8_t *control = b->avr->data + t->address_control_a;
+  uint8_t wave = (uint8_t)((control[CONTROL_A] & 3) | (control[CONTROL_B] >> 1 & 0x0C));
+  const waveform *w = is_wide(t) ? &WIDE[wave] : &NARROW[wave & 7];
   t->mode = (count_mode)w->mode;
   t->top_from = (top_source)w->top_from;
   t->fixed_top = w->fixed_top;
-  t->divider = t->dividers[b & 7];
-  if (which == CONTROL_B && t->number != 2 && (b & 7) >= EXTERNAL_CLOCK) {
-    note(t->owner, avr->pc, "writes to", t->number ? "TCCR1B" : "TCCR0B",
+  t->divider = t->dividers[control[CONTROL_B] & 7];
+  if (which == CONTROL_B && t->number != 2 && (control[CONTROL_B] & 7) >= EXTERNAL_CLOCK) {
+    note(t->owner, b->avr->pc, "writes to", t->number ? "TCCR1B" : "TCCR0B",
          "external clocks are not built: it stands still");
   }
-  t->action[0] = a >> 6;
-  t->action[1] = a >> 4 & 3;
+  t->action[0] = control[CONTROL_A] >> 6;
+  t->action[1] = control[CONTROL_A] >> 4 & 3;
   if (!is_buffered(t)) {
     t->compare[0] = t->compare_written[0];
     t->compare[1] = t->compare_written[1];
   }
   timer_set_count(t, t->count);
-  take_over_pins(t, cycle);
-  if (strobes & 0x80) timer_force_match(t, 0, cycle);
-  if (strobes & 0x40) timer_force_match(t, 1, cycle);
+  take_over_pins(t, end);
+  if (strobes & 0x80) timer_force_match(t, 0, end);
+  if (strobes & 0x40) timer_force_match(t, 1, end);
   timer_plan(t);
 }
 
-static uint8_t read_count(avr_t *avr, avr_io_addr_t address, void *param) {
-  timer_state *t = param;
-  (void)avr;
-  (void)address;
-  timer_bring_up(t, begin_access(t->owner));
+static uint8_t read_count(avr_board *b, uint16_t address, uint64_t cycle) {
+  timer_state *t = timer_at(b, address);
+  timer_bring_up(t, cycle);
   if (is_wide(t)) t->high_byte = (uint8_t)(t->count >> 8);
   return (uint8_t)t->count;
 }
 
-static uint8_t read_capture(avr_t *avr, avr_io_addr_t address, void *param) {
-  timer_state *t = param;
-  (void)avr;
-  (void)address;
-  begin_access(t->owner);
+static uint8_t read_capture(avr_board *b, uint16_t address, uint64_t cycle) {
+  timer_state *t = timer_at(b, address);
   t->high_byte = (uint8_t)(t->capture >> 8);
   return (uint8_t)t->capture;
 }
 
 /* High bytes of TCNT1 and ICR1 come from, and all high bytes go to, one temporary register (16.3). */
-static uint8_t read_high_byte(avr_t *avr, avr_io_addr_t address, void *param) {
-  const timer_state *t = param;
-  (void)avr;
-  (void)address;
+static uint8_t read_high_byte(avr_board *b, uint16_t address, uint64_t cycle) {
+  const timer_state *t = timer_at(b, address);
   return t->high_byte;
 }
 
-static void write_high_byte(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  timer_state *t = param;
+static void write_high_byte(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  timer_state *t = timer_at(b, address);
   if (t->open_half == address - 1 && value != t->high_byte) {
-    note(t->owner, avr->pc, "writes", "a high byte behind its low one", "the register took the old one (16.3)");
+    note(t->owner, b->avr->pc, "writes", "a high byte behind its low one", "the register took the old one (16.3)");
   }
   t->open_half = address;
   t->high_byte = value;
@@ -160,49 +152,48 @@ static void write_high_byte(avr_t *avr, avr_io_addr_t address, uint8_t value, vo
 
 /* The value that a write of a low byte completes. It waits for no other half if a high byte, which has an odd address,
  * came just before. */
-static uint32_t whole(timer_state *t, avr_io_addr_t address, uint8_t low) {
+static uint32_t whole(timer_state *t, uint16_t address, uint8_t low) {
   if (!is_wide(t)) return low;
   t->open_half = t->open_half & 1 ? 0 : address;
   return (uint32_t)t->high_byte << 8 | low;
 }
 
-static void write_count(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  timer_state *t = param;
-  (void)avr;
-  begin_change(t);
+static void write_count(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  timer_state *t = timer_at(b, address);
+  timer_bring_up(t, end);
   timer_set_count(t, whole(t, address, value));
   t->match_blocked = true;
   timer_plan(t);
 }
 
-static void write_compare(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  timer_state *t = param;
-  begin_change(t);
+static void write_compare(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  timer_state *t = timer_at(b, address);
+  timer_bring_up(t, end);
   int channel = address == t->address_compare[1];
   t->compare_written[channel] = whole(t, address, value);
-  avr->data[address] = value;
-  if (is_wide(t)) avr->data[address + 1] = t->high_byte;
+  b->avr->data[address] = value;
+  if (is_wide(t)) b->avr->data[address + 1] = t->high_byte;
   if (!is_buffered(t)) t->compare[channel] = t->compare_written[channel];
   timer_plan(t);
 }
 
 /* ICR1 can be written only where it is the top. */
-static void write_capture(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  timer_state *t = param;
-  begin_change(t);
+static void write_capture(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  timer_state *t = timer_at(b, address);
+  timer_bring_up(t, end);
   const uint32_t capture = whole(t, address, value);
   if (t->top_from == TOP_ICR) {
     t->capture = capture;
   } else if (t->capture != capture) {
-    note(t->owner, avr->pc, "writes to", "ICR1", "it is dropped: the mode has not ICR1 as its top (16.6)");
+    note(t->owner, b->avr->pc, "writes to", "ICR1", "it is dropped: the mode has not ICR1 as its top (16.6)");
   }
   timer_plan(t);
 }
 
-static void write_mask(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  timer_state *t = param;
-  begin_change(t);
-  avr->data[address] = value;
+static void write_mask(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  timer_state *t = timer_at(b, address);
+  timer_bring_up(t, end);
+  b->avr->data[address] = value;
   enable_interrupt(t->owner, t->vector_overflow, value & 1);
   enable_interrupt(t->owner, t->vector_compare[0], value & 2);
   enable_interrupt(t->owner, t->vector_compare[1], value & 4);
@@ -211,14 +202,11 @@ static void write_mask(avr_t *avr, avr_io_addr_t address, uint8_t value, void *p
 }
 
 /* PSRSYNC and PSRASY start the prescalers anew; TSM, which would hold them, is not built. */
-static void write_prescaler_reset(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
+static void write_prescaler_reset(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   for (int i = 0; i < 3; i++) {
     if (!(value & (i == 2 ? 2 : 1))) continue;
-    uint64_t cycle = begin_change(&b->timer[i]);
-    b->timer_base[i == 2] = cycle;
+    timer_bring_up(&b->timer[i], end);
+    b->timer_base[i == 2] = end;
   }
   for (int i = 0; i < 3; i++) timer_plan(&b->timer[i]);
 }
@@ -239,24 +227,21 @@ void timers_init(avr_board *b) {
   for (int i = 0; i < 3; i++) {
     timer_state *t = &b->timer[i];
     *t = BUILT_IN[i];
-    const uint8_t capture = is_wide(t) ? VECTOR_TIMER1_CAPT : 0;
-    const uint8_t flags[8] = {t->vector_overflow, t->vector_compare[0], t->vector_compare[1], 0, 0, capture};
-    add_flag_register(b, (uint16_t)(REG_TIFR0 + i), flags);
-    on_write(b, t->address_control_a, write_control, t);
-    on_write(b, t->address_control_a + CONTROL_B, write_control, t);
-    on_read(b, t->address_count, read_count, t);
-    on_write(b, t->address_count, write_count, t);
-    on_write(b, (uint16_t)(REG_TIMSK0 + i), write_mask, t);
-    for (int channel = 0; channel < 2; channel++) on_write(b, t->address_compare[channel], write_compare, t);
+    on_write(b, t->address_control_a, write_control);
+    on_write(b, t->address_control_a + CONTROL_B, write_control);
+    on_read(b, t->address_count, read_count);
+    on_write(b, t->address_count, write_count);
+    on_write(b, (uint16_t)(REG_TIMSK0 + i), write_mask);
+    for (int channel = 0; channel < 2; channel++) on_write(b, t->address_compare[channel], write_compare);
     if (!is_wide(t)) continue;
-    on_write(b, t->address_control_a + CONTROL_C, write_control, t);
-    on_read(b, t->address_count + 1, read_high_byte, t);
-    on_write(b, t->address_count + 1, write_high_byte, t);
-    for (int channel = 0; channel < 2; channel++) on_write(b, t->address_compare[channel] + 1, write_high_byte, t);
-    on_read(b, REG_ICR1L, read_capture, t);
-    on_write(b, REG_ICR1L, write_capture, t);
-    on_read(b, REG_ICR1L + 1, read_high_byte, t);
-    on_write(b, REG_ICR1L + 1, write_high_byte, t);
+    on_write(b, t->address_control_a + CONTROL_C, write_control);
+    on_read(b, t->address_count + 1, read_high_byte);
+    on_write(b, t->address_count + 1, write_high_byte);
+    for (int channel = 0; channel < 2; channel++) on_write(b, t->address_compare[channel] + 1, write_high_byte);
+    on_read(b, REG_ICR1L, read_capture);
+    on_write(b, REG_ICR1L, write_capture);
+    on_read(b, REG_ICR1L + 1, read_high_byte);
+    on_write(b, REG_ICR1L + 1, write_high_byte);
   }
-  on_write(b, REG_GTCCR, write_prescaler_reset, b);
+  on_write(b, REG_GTCCR, write_prescaler_reset);
 }

@@ -219,73 +219,43 @@ static void switch_off(avr_board *b, uint64_t cycle) {
   pins_update(b, PORT_C, cycle);
 }
 
-static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   twi_state *t = &b->twi;
-  const uint64_t cycle = begin_access(b) + 1;
   const bool was_on = t->control & TWEN;
   const uint8_t writable = TWEA | TWSTA | TWSTO | TWEN | TWIE;
-  (void)avr;
-  (void)address;
   const bool stopping = t->phase == TWI_STOP_RISE || t->phase == TWI_STOP_END ||
                         (t->phase == TWI_WAIT_HIGH && t->after_rise == TWI_STOP_END);
   t->control = (uint8_t)((value & writable) | (t->control & TWWC) | (stopping ? TWSTO : 0));
   enable_interrupt(b, VECTOR_TWI, value & TWIE);
   if (value & TWINT) clear_flag(b, VECTOR_TWI);
   if (!(value & TWEN)) {
-    if (was_on) switch_off(b, cycle);
+    if (was_on) switch_off(b, end);
     return;
   }
-  if (!was_on) put(b, false, false, cycle);
-  if (t->phase == TWI_IDLE && !flag_is_set(b) && ((value & TWINT) || (!t->owner && (value & TWSTA)))) begin(b, cycle);
+  if (!was_on) put(b, false, false, end);
+  if (t->phase == TWI_IDLE && !flag_is_set(b) && ((value & TWINT) || (!t->owner && (value & TWSTA)))) begin(b, end);
 }
 
-static uint8_t read_control(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
-  begin_access(b);
+static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
   return (uint8_t)(b->twi.control | (flag_is_set(b) ? TWINT : 0));
 }
 
-static uint8_t read_status(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
-  begin_access(b);
+static uint8_t read_status(avr_board *b, uint16_t address, uint64_t cycle) {
   return (uint8_t)((flag_is_set(b) ? b->twi.status : STATUS_NONE) | b->twi.prescaler);
 }
 
-static void write_status(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
-  begin_access(b);
-  b->twi.prescaler = value & 3u;
-}
+static void write_status(avr_board *b, uint16_t address, uint8_t value, uint64_t end) { b->twi.prescaler = value & 3u; }
 
-static void write_rate(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  begin_access(b);
-  avr->data[address] = value;
+static void write_rate(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  b->avr->data[address] = value;
   b->twi.rate = value;
 }
 
-static uint8_t read_data(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  (void)avr;
-  (void)address;
-  begin_access(b);
-  return b->twi.data;
-}
+static uint8_t read_data(avr_board *b, uint16_t address, uint64_t cycle) { return b->twi.data; }
 
 /* While an operation is under way the register does not take a byte, and says so. */
-static void write_data(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   twi_state *t = &b->twi;
-  (void)avr;
-  (void)address;
-  begin_access(b);
   if (flag_is_set(b)) {
     t->control &= (uint8_t)~TWWC;
     t->data = value;
@@ -302,11 +272,11 @@ void twi_reset(avr_board *b) {
 }
 
 void twi_init(avr_board *b) {
-  on_write(b, REG_TWBR, write_rate, b);
-  on_read(b, REG_TWSR, read_status, b);
-  on_write(b, REG_TWSR, write_status, b);
-  on_read(b, REG_TWDR, read_data, b);
-  on_write(b, REG_TWDR, write_data, b);
-  on_read(b, REG_TWCR, read_control, b);
-  on_write(b, REG_TWCR, write_control, b);
+  on_write(b, REG_TWBR, write_rate);
+  on_read(b, REG_TWSR, read_status);
+  on_write(b, REG_TWSR, write_status);
+  on_read(b, REG_TWDR, read_data);
+  on_write(b, REG_TWDR, write_data);
+  on_read(b, REG_TWCR, read_control);
+  on_write(b, REG_TWCR, write_control);
 }

@@ -13,7 +13,6 @@
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <stdlib.h>
-#include <string.h>
 
 #include "avr_parts.h"
 
@@ -66,25 +65,8 @@ static void forget_line(line_queue *q, uint64_t until) {
   if (q->first == q->end) q->first = q->end = 0;
 }
 
-/* Makes room for `count` more items behind `*end`. */
-static void *grow(void *items, size_t size, size_t *first, size_t *end, size_t *capacity, size_t count) {
-  if (*end + count <= *capacity) return items;
-  size_t used = *end - *first;
-  size_t wanted = 2 * (used + count) + 64;
-  char *moved = wanted > *capacity ? malloc(wanted * size) : items;
-  if (!moved) abort(); /* a byte cannot be left out */
-  if (used) memmove(moved, (const char *)items + *first * size, used * size);
-  if (moved != items) {
-    free(items);
-    *capacity = wanted;
-  }
-  *first = 0;
-  *end = used;
-  return moved;
-}
-
 static void put_on_line(line_queue *q, line_frame frame) {
-  q->frames = grow(q->frames, sizeof *q->frames, &q->first, &q->end, &q->capacity, 1);
+  q->frames = board_room_for(q->frames, sizeof *q->frames, &q->first, &q->end, &q->capacity, 1);
   q->frames[q->end++] = frame;
 }
 
@@ -157,7 +139,6 @@ static void stop_bit(avr_board *b) {
 }
 
 void usart_due_receiver(avr_board *b, uint64_t cycle) {
-  (void)cycle;
   if (b->usart.receiver == RECEIVER_SEARCHING) {
     start_bit(b);
   } else {
@@ -172,12 +153,8 @@ static void empty_receiver(usart_state *u) {
   u->lost = false;
 }
 
-static uint8_t read_data(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
+static uint8_t read_data(avr_board *b, uint16_t address, uint64_t cycle) {
   usart_state *u = &b->usart;
-  (void)avr;
-  (void)address;
-  begin_access(b);
   uint8_t byte = u->buffer[0].byte;
   if (u->buffered) {
     u->buffer[0] = u->buffer[1];
@@ -208,7 +185,7 @@ void usart_due_outside(avr_board *b, uint64_t cycle) {
   for (unsigned bit = 0; bit < 8; bit++) {
     if (line_level(&u->from_board, u->outside_start + bit_time * (2 * bit + 3) / 2)) byte |= (uint8_t)(1u << bit);
   }
-  u->out = grow(u->out, sizeof *u->out, &u->out_first, &u->out_end, &u->out_capacity, 1);
+  u->out = board_room_for(u->out, sizeof *u->out, &u->out_first, &u->out_end, &u->out_capacity, 1);
   u->out[u->out_end++] = (sent_byte){cycle, byte};
   u->outside_from = u->outside_start + bit_time * (2 * LINE_BITS - 1) / 2;
   forget_line(&u->from_board, u->outside_from);
@@ -277,13 +254,10 @@ void usart_due_transmitter(avr_board *b, uint64_t cycle) {
   }
 }
 
-static void write_data(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   usart_state *u = &b->usart;
-  (void)address;
-  uint64_t cycle = begin_access(b) + 1;
-  if (!(avr->data[REG_UCSR0B] & TXEN) || u->holding) {
-    note(b, avr->pc, "writes to", "UDR0", "it is dropped: TXEN0 or UDRE0 is not set (20.11.1)");
+  if (!(b->avr->data[REG_UCSR0B] & TXEN) || u->holding) {
+    note(b, b->avr->pc, "writes to", "UDR0", "it is dropped: TXEN0 or UDRE0 is not set (20.11.1)");
     return;
   }
   if (u->sending) {
@@ -291,7 +265,7 @@ static void write_data(avr_t *avr, avr_io_addr_t address, uint8_t value, void *p
     u->holding_byte = value;
     clear_flag(b, VECTOR_USART_UDRE);
   } else {
-    begin_frame(b, value, cycle);
+    begin_frame(b, value, end);
   }
 }
 
@@ -309,11 +283,9 @@ static void update_settings(avr_board *b) {
   plan_receiver(b);
 }
 
-static uint8_t read_status(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
+static uint8_t read_status(avr_board *b, uint16_t address, uint64_t cycle) {
   const usart_state *u = &b->usart;
-  begin_access(b);
-  uint8_t value = avr->data[address] & (U2X | MPCM);
+  uint8_t value = b->avr->data[address] & (U2X | MPCM);
   if (b->raised & FLAG(VECTOR_USART_RX)) value |= RXC;
   if (b->raised & FLAG(VECTOR_USART_TX)) value |= TXC;
   if (b->raised & FLAG(VECTOR_USART_UDRE)) value |= UDRE;
@@ -322,29 +294,25 @@ static uint8_t read_status(avr_t *avr, avr_io_addr_t address, void *param) {
   return value;
 }
 
-static void write_status(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  begin_access(b);
+static void write_status(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   if (value & TXC) clear_flag(b, VECTOR_USART_TX);
-  avr->data[address] = value & (U2X | MPCM);
+  b->avr->data[address] = value & (U2X | MPCM);
   update_settings(b);
 }
 
-static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   usart_state *u = &b->usart;
-  uint64_t cycle = begin_access(b) + 1;
-  avr->data[address] = value;
+  b->avr->data[address] = value;
   enable_interrupt(b, VECTOR_USART_RX, value & RXCIE);
   enable_interrupt(b, VECTOR_USART_TX, value & TXCIE);
   enable_interrupt(b, VECTOR_USART_UDRE, value & UDRIE);
   port_state *p = &b->port[PORT_D];
   p->forced_in = (uint8_t)(value & RXEN ? p->forced_in | RX_MASK : p->forced_in & ~RX_MASK);
-  pins_update(b, PORT_D, cycle);
-  drive_transmit_pin(b, cycle);
+  pins_update(b, PORT_D, end);
+  drive_transmit_pin(b, end);
   if ((value & RXEN) && u->receiver == RECEIVER_OFF) {
     u->receiver = RECEIVER_SEARCHING;
-    u->from = cycle << FRACTION;
+    u->from = end << FRACTION;
     forget_line(&u->to_board, u->from);
   } else if (!(value & RXEN)) {
     u->receiver = RECEIVER_OFF;
@@ -354,10 +322,8 @@ static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void
   update_settings(b);
 }
 
-static void write_setting(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  begin_access(b);
-  avr->data[address] = value;
+static void write_setting(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  b->avr->data[address] = value;
   update_settings(b);
 }
 
@@ -412,14 +378,14 @@ void usart_reset(avr_board *b) {
 }
 
 void usart_init(avr_board *b) {
-  on_read(b, REG_UDR0, read_data, b);
-  on_write(b, REG_UDR0, write_data, b);
-  on_read(b, REG_UCSR0A, read_status, b);
-  on_write(b, REG_UCSR0A, write_status, b);
-  on_write(b, REG_UCSR0B, write_control, b);
-  on_write(b, REG_UCSR0C, write_setting, b);
-  on_write(b, REG_UBRR0L, write_setting, b);
-  on_write(b, REG_UBRR0H, write_setting, b);
+  on_read(b, REG_UDR0, read_data);
+  on_write(b, REG_UDR0, write_data);
+  on_read(b, REG_UCSR0A, read_status);
+  on_write(b, REG_UCSR0A, write_status);
+  on_write(b, REG_UCSR0B, write_control);
+  on_write(b, REG_UCSR0C, write_setting);
+  on_write(b, REG_UBRR0L, write_setting);
+  on_write(b, REG_UBRR0H, write_setting);
 }
 
 void usart_free(avr_board *b) {

@@ -27,17 +27,10 @@ static void plan(avr_board *b) {
 }
 
 static void note_reset(avr_board *b, uint64_t cycle) {
-  watchdog_history *history = &b->watchdog_history;
-  board_watchdog_log *log = &history->log;
-  if (log->count == history->capacity) {
-    size_t capacity = history->capacity ? 2 * history->capacity : 8;
-    board_watchdog_reset *resets = realloc(log->resets, capacity * sizeof *resets);
-    if (!resets) abort(); /* a log with a gap would lie */
-    log->resets = resets;
-    history->capacity = capacity;
-  }
+  board_watchdog_log *log = &b->watchdog_log;
+  log->resets = board_room_for(log->resets, sizeof *log->resets, &log->first, &log->end, &log->capacity, 1);
   bool warned = b->watchdog.warned_at != NO_ADDRESS;
-  log->resets[log->count++] = (board_watchdog_reset){
+  log->resets[log->end++] = (board_watchdog_reset){
       .cycle = warned ? b->watchdog.warned_cycle : cycle,
       .address = warned ? b->watchdog.warned_at : (uint32_t)b->avr->pc,
   };
@@ -74,35 +67,31 @@ void watchdog_kick(avr_board *b) {
   if (b->due[DUE_WATCHDOG] != NEVER) plan(b);
 }
 
-static uint8_t read_control(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  uint64_t cycle = begin_access(b);
-  uint8_t value = avr->data[address] & (WDIE | WDP3 | WDE | WDP_LOW);
+static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
+  uint8_t value = b->avr->data[address] & (WDIE | WDP3 | WDE | WDP_LOW);
   if (cycle < b->watchdog.change_until) value |= WDCE;
   if (b->raised & FLAG(VECTOR_WDT)) value |= WDIF;
   return value;
 }
 
-static void write_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
-  uint64_t cycle = begin_access(b);
-  bool may_change = cycle < b->watchdog.change_until;
-  uint8_t old = avr->data[address];
+static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
+  bool may_change = end <= b->watchdog.change_until;
+  uint8_t old = b->avr->data[address];
   uint8_t control = old & (WDP3 | WDP_LOW | WDE);
   if (may_change && !(value & WDCE)) { /* the second write of the timed sequence */
     control = value & (WDP3 | WDP_LOW | WDE);
     b->watchdog.change_until = 0;
   } else if ((value & WDCE) && (value & WDE)) {
-    b->watchdog.change_until = cycle + 1 + CHANGE_CYCLES;
+    b->watchdog.change_until = end + CHANGE_CYCLES;
   }
   control |= value & WDE; /* can always be set */
-  if (avr->data[REG_MCUSR] & WDRF) control |= WDE;
+  if (b->avr->data[REG_MCUSR] & WDRF) control |= WDE;
   if (!(value & WDCE) && ((value ^ control) & (WDP3 | WDP_LOW | WDE))) {
-    note(b, avr->pc, "writes to", "WDTCSR", "it is dropped: WDRF is set, or WDCE was not just before (11.9.2)");
+    note(b, b->avr->pc, "writes to", "WDTCSR", "it is dropped: WDRF is set, or WDCE was not just before (11.9.2)");
   }
   control |= value & WDIE;
-  avr->data[address] = control;
-  if (!(old & (WDE | WDIE))) b->watchdog.since = cycle + 1;
+  b->avr->data[address] = control;
+  if (!(old & (WDE | WDIE))) b->watchdog.since = end;
   if (value & WDIF) clear_flag(b, VECTOR_WDT);
   enable_interrupt(b, VECTOR_WDT, control & WDIE);
   plan(b);
@@ -114,9 +103,9 @@ void watchdog_reset(avr_board *b, uint64_t cycle) {
   plan(b);
 }
 
-void watchdog_free(avr_board *b) { free(b->watchdog_history.log.resets); }
+void watchdog_free(avr_board *b) { free(b->watchdog_log.resets); }
 
 void watchdog_init(avr_board *b) {
-  on_read(b, REG_WDTCSR, read_control, b);
-  on_write(b, REG_WDTCSR, write_control, b);
+  on_read(b, REG_WDTCSR, read_control);
+  on_write(b, REG_WDTCSR, write_control);
 }

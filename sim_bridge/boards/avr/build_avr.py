@@ -1,13 +1,11 @@
 """Builds `sim_bridge.boards.avr._avr`: simavr and our board layer in one extension, GPL-3.0-or-later.
 
-setup.py takes `ffi` from here. Run by itself, this script puts the extension in place in a checkout:
-`python tools/fetch_simavr.py && python sim_bridge/boards/avr/build_avr.py`.
+setup.py takes `ffi` from here, once `python tools/fetch_simavr.py` has fetched simavr's sources.
 """
 
 from __future__ import annotations
 
-import os
-import sys
+import re
 from pathlib import Path
 
 from cffi import FFI
@@ -55,33 +53,8 @@ COMPILER_FLAGS = [
     *("--param=inline-unit-growth=400", "--param=max-inline-insns-auto=200"),
 ]
 
-DECLARATIONS = """
-board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
-uint8_t *avr_board_flash(board *self);
-void avr_board_one_by_one(board *self);
-typedef struct { uint64_t begin, executed; uint32_t gross, net, latency; uint16_t id, depth; ...; } avr_span;
-typedef struct {
-  const uint32_t *entries;
-  size_t entry_count;
-  uint64_t patience;
-  ...;
-} avr_watch;
-#define AVR_FUNCTION_IDS ...
-#define AVR_FUNCTIONS_MAXIMUM ...
-bool avr_board_record(board *self, const avr_watch *watch);
-void avr_board_stop_recording(board *self);
-const avr_span *avr_board_spans(const board *self, size_t *count);
-void avr_board_forget_spans(board *self);
-uint16_t avr_board_lowest_stack(const board *self);
-"""
-
-PREAMBLE = """
-#include "avr_board.h"
-#include "avr_spans.h"
-#include "../board_access.h"
-
-static uint8_t *avr_board_flash(board *self) { return self->op->extension(self, AVR_BOARD_FLASH); }
-"""
+# Ours that Python may call (what is between their marks).
+HEADERS = ("board.h", "board_access.h", "avr/avr_board.h", "avr/avr_spans.h")
 
 
 def simavr_folder() -> Path:
@@ -101,52 +74,27 @@ def write_configuration() -> None:
             file.write_text(text, encoding="ascii")
 
 
-def headers() -> list[Path]:
-    """Our headers."""
-    return [*(ROOT / HERE).glob("*.h"), *(ROOT / BOARDS).glob("*.h")]
-
-
 def make_ffi() -> FFI:
     """The builder of the extension."""
     simavr = simavr_folder()
     write_configuration()
     ours = sorted(path.relative_to(ROOT) for path in (ROOT / HERE).glob("*.c"))
     builder = FFI()
-    builder.cdef((ROOT / BOARDS / "board_access.cdef").read_text(encoding="ascii") + DECLARATIONS)
+    texts = "".join((ROOT / BOARDS / name).read_text("utf-8") for name in HEADERS)
+    builder.cdef("\n".join(re.findall(r"/\* python: begin \*/(.*?)/\* python: end \*/", texts, re.S)))
     builder.set_source(
         "sim_bridge.boards.avr._avr",
-        PREAMBLE,
+        "\n".join(f'#include "{name}"' for name in HEADERS),
         sources=[
-            *(str(source) for source in ours if source.name != "_avr.c"),
+            *map(str, ours),
             str(BOARDS / "board_access.c"),
             *(str(simavr / "sim" / f"{name}.c") for name in SIMAVR_SOURCES),
             str(simavr / CHIP_SOURCE),
         ],
-        include_dirs=[str(path) for path in (HERE, simavr / "sim", simavr / "cores", CONFIGURATION)],
-        depends=[str(HERE / "build_avr.py"), *(str(path.relative_to(ROOT)) for path in headers())],
+        include_dirs=[str(path) for path in (HERE, BOARDS, simavr / "sim", simavr / "cores", CONFIGURATION)],
         extra_compile_args=COMPILER_FLAGS,
     )
     return builder
 
 
 ffi = make_ffi()
-
-
-def main() -> int:
-    """Compiles the extension and puts it beside this file."""
-    from setuptools import Distribution
-
-    os.chdir(ROOT)
-    extension = ffi.distutils_extension(tmpdir="build/avr")
-    extension.py_limited_api = True  # type: ignore[attr-defined]  # the same name as setup.py gives it
-    command = Distribution({"ext_modules": [extension]}).get_command_obj("build_ext")
-    command.inplace = True
-    command.build_temp = "build/avr"
-    command.parallel = os.cpu_count()
-    command.ensure_finalized()
-    command.run()
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "boards/native/library_copy.h"
+#include "boards/queue.h"
 #include "generated/messages.h"
 #include "hal/native/machine.h"
 
@@ -47,32 +48,16 @@ static native_board *of_machine(native_machine *machine) {
   return (native_board *)(void *)((char *)machine - offsetof(native_board, machine));
 }
 
-/* Room for one more item at the end of a queue, first in, first out. Memory may not fail: a board that lost edges or bytes
- * would be wrong in silence. */
-static void *room_in(void *items, size_t *first, size_t count, size_t *capacity, size_t size) {
-  if (*first + count < *capacity) return items;
-  if (*first > *capacity / 2) {
-    memmove(items, (char *)items + *first * size, count * size);
-    *first = 0;
-    return items;
-  }
-  *capacity = *capacity == 0 ? 64 : 2 * *capacity;
-  void *grown = realloc(items, *capacity * size);
-  if (grown == NULL) {
-    fputs("native board: out of memory\n", stderr);
-    abort();
-  }
-  return grown;
-}
-
 static void push_edge(native_edge_queue *queue, native_edge edge) {
-  queue->edges = room_in(queue->edges, &queue->first, queue->count, &queue->capacity, sizeof edge);
-  queue->edges[queue->first + queue->count++] = edge;
+  size_t end = queue->first + queue->count++;
+  queue->edges = board_room_for(queue->edges, sizeof edge, &queue->first, &end, &queue->capacity, 1);
+  queue->edges[end] = edge;
 }
 
 static void push_byte(native_byte_queue *queue, native_byte byte) {
-  queue->bytes = room_in(queue->bytes, &queue->first, queue->count, &queue->capacity, sizeof byte);
-  queue->bytes[queue->first + queue->count++] = byte;
+  size_t end = queue->first + queue->count++;
+  queue->bytes = board_room_for(queue->bytes, sizeof byte, &queue->first, &end, &queue->capacity, 1);
+  queue->bytes[end] = byte;
 }
 
 static void on_edge(native_machine *machine, uint64_t cycle, uint8_t pin, uint8_t level) {

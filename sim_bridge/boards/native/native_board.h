@@ -10,8 +10,10 @@
 
 #include "boards/board.h"
 
+/* python: begin */
 /* A board at cycle 0, just powered on, with the firmware library whose file has these bytes. NULL and one sentence in `error`
  * if it cannot be used. */
 board *native_board_create(const uint8_t *image, size_t size, char *error, size_t error_size);
+/* python: end */
 
 #endif

@@ -12,8 +12,8 @@ import pytest
 
 from boebot.devices.device import pin_name
 from sim_bridge._core import ffi, lib
+from sim_bridge.boards import avr
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.emulated import avr_board
 from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots.wiring import add_part
 from sim_bridge.sim import Sim
@@ -321,7 +321,7 @@ def test_the_chip_of_the_emulated_board_reads_it(heading: float) -> None:
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder, "program.elf")
         image.write_bytes(assemble(MACROS + PROGRAM))
-        board = avr_board(image)
+        board = avr.create(image)
     from boebot.description.robots import load_robot
 
     sim = Sim(arena_of(outline=square(0, 0, 2)), noise=False)

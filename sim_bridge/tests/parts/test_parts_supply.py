@@ -11,8 +11,9 @@ import pytest
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, RobotError
 from sim_bridge._core import lib
+from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.boards.emulated import avr_board, native_board, native_library
+from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.devices import battery as battery_model
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim, SimRobot
@@ -33,7 +34,7 @@ def avr() -> SimRobot:
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder, "program.elf")
         image.write_bytes(assemble(TOGGLE))
-        return Sim(arena_of(), noise=False).add(avr_board(image), load_robot("shieldbot"))
+        return Sim(arena_of(), noise=False).add(create(image), load_robot("shieldbot"))
 
 
 def native() -> SimRobot:

@@ -27,12 +27,10 @@ static size_t make(void *self, const void *parameters) {
 }
 
 static void step(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise) {
-  (void)noise;
   accelerometer_step(self, (accelerometer_state *)memory->numbers, s->acceleration, s->dt);
 }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
-  (void)s;
   *readings = accelerometer_read(self, (const accelerometer_state *)memory->numbers, noise);
 }
 

@@ -9,7 +9,6 @@ static size_t make(void *self, const void *parameters) {
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const charge_parameters *p = self;
-  (void)memory;
   const double noisy = p->sigma > 0.0 ? p->sigma * noise_next_normal(noise) : 0.0;
   *readings = p->empty + s->energy * (p->full - p->empty) + noisy;
 }

@@ -35,7 +35,6 @@ static size_t make(void *self, const void *parameters) {
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const compass_parameters *p = self;
-  (void)memory;
   const double current = p->current_x != 0.0 || p->current_y != 0.0 ? s->motor_current(s->robot) : 0.0;
   *readings = compass_read(p, &s->from, current, noise);
 }

@@ -49,7 +49,6 @@ double infrared_proximity_read(const infrared_proximity *self, const viewpoint *
 static size_t make(void *self, const void *parameters) { return infrared_proximity_init(self, parameters) == 0; }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
-  (void)memory;
   *readings = infrared_proximity_read(self, &s->from, noise);
 }
 

@@ -68,7 +68,6 @@ static void *work(const void *self) { return laser_new(self); }
 static void free_work(void *work) { laser_destroy(work); }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
-  (void)self;
   laser_scan(memory->work, &s->from, noise, readings);
 }
 

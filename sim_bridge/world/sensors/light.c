@@ -47,7 +47,6 @@ double phototransistor_decay_time(double irradiance, double scale, double maximu
 static size_t make(void *self, const void *parameters) { return phototransistor_init(self, parameters) == 0; }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
-  (void)memory;
   *readings = phototransistor_read(self, &s->from, noise);
 }
 

@@ -36,7 +36,6 @@ double reflectance_read(const reflectance *self, const viewpoint *from, noise_so
 static size_t make(void *self, const void *parameters) { return reflectance_init(self, parameters) == 0; }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
-  (void)memory;
   *readings = reflectance_read(self, &s->from, noise);
 }
 

@@ -64,7 +64,6 @@ static size_t make(void *self, const void *parameters) {
 
 static void start(const void *self, sensor_memory *memory, const sensing *s) {
   const body_state *b = &s->body->state;
-  (void)self;
   odometer_calibrate((odometer_state *)memory->numbers, b->x, b->y, b->heading, b->wheel_left, b->wheel_right);
 }
 
@@ -75,9 +74,6 @@ static void step(const void *self, sensor_memory *memory, const sensing *s, nois
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const odometer_state *state = (const odometer_state *)memory->numbers;
-  (void)self;
-  (void)s;
-  (void)noise;
   readings[0] = state->x;
   readings[1] = state->y;
   readings[2] = state->heading;

@@ -65,7 +65,6 @@ double sonar_read(const sonar *self, const viewpoint *from, noise_source *noise)
 static size_t make(void *self, const void *parameters) { return sonar_init(self, parameters) == 0; }
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
-  (void)memory;
   *readings = sonar_read(self, &s->from, noise);
 }
 

@@ -22,7 +22,6 @@ static size_t make(void *self, const void *parameters) {
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const table *t = self;
-  (void)memory;
   const beam_origin at = beam_from(&t->beam, &s->from);
   double nearest = -1.0;
   double angle = 0.0;

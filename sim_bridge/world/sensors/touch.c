@@ -16,8 +16,6 @@ static size_t make(void *self, const void *parameters) {
 
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const touch_parameters *p = self;
-  (void)memory;
-  (void)noise;
   *readings = body_segment_touches(s->body, s->from.around, p->root_x, p->root_y, p->tip_x, p->tip_y, WHISKER_HEIGHT_M);
 }
 

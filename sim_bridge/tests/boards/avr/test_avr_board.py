@@ -57,13 +57,13 @@ def test_image_for_another_microcontroller(tmp_path: Path) -> None:
         create(image)
 
 
-def test_closed_board_has_no_pointer() -> None:
+def test_closed_board_has_no_address() -> None:
     machine = Machine("main: rjmp main")
-    assert machine.avr.pointer != 0
+    assert machine.avr.address != 0
     machine.board.close()
     machine.avr.close()
     with pytest.raises(BoardError, match="closed"):
-        _ = machine.avr.pointer
+        _ = machine.avr.address
 
 
 def test_session_that_nobody_closes(tmp_path: Path) -> None:

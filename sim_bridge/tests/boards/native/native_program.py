@@ -7,7 +7,6 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess
 from sim_bridge.boards.emulated import native_board
 
@@ -57,5 +56,4 @@ def native_program(source: str) -> BoardAccess:
     with tempfile.NamedTemporaryFile(suffix=".so") as library:
         library.write(compiled(source))
         library.flush()
-        board = native_board(Path(library.name))
-    return BoardAccess(lib, ffi, ffi.cast("board *", board.address), owner=board)
+        return native_board(Path(library.name)).access()

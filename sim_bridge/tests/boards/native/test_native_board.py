@@ -13,7 +13,6 @@ from boebot.errors import BoardError
 from boebot.link import frame, messages
 from hil_tests.device_bench import DeviceRig
 from sim_bridge import _core
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
 from sim_bridge.boards.emulated import native_board, native_library
 
@@ -32,7 +31,7 @@ def make() -> Iterator[Maker]:
 
     def one() -> BoardAccess:
         board = native_board(native_library("shieldbot"))
-        access = BoardAccess(lib, ffi, ffi.cast("board *", board.address), owner=board)
+        access = board.access()
         opened.append((access, board))
         return access
 
