@@ -164,7 +164,7 @@ class Run(Protocol):
         """Readings of a device of a robot without a board, shape (ticks, readings of the device)."""
 
     def ages(self, device: str) -> NDArray[np.float64]:
-        """Their ages (s)."""
+        """Their ages (s); 0: of the tick itself."""
 
 
 class Held(NamedTuple):

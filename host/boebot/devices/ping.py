@@ -53,6 +53,7 @@ TEMPERATURE_C = 20.0
 SPEED_OF_SOUND = 331.5 + 0.6 * TEMPERATURE_C  # m/s, in air
 METRES_PER_US = SPEED_OF_SOUND / 2 * 1e-6
 _SHADE, _ECHO = 0.10, 0.14
+_SHOWN = ("distance", "m", 1.0, 2)
 
 
 class Ping(NamedTuple):
@@ -91,6 +92,7 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
     period_ticks: Annotated[int, msgspec.Meta(ge=4, le=250)]
 
     READING: ClassVar = Ping
+    SHOWN: ClassVar = _SHOWN
     NAMES: ClassVar[tuple[str, ...]] = ("ping",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "SIG"), Wire(FIVE_VOLTS, "5 V"), Wire(GROUND, "GND"))

@@ -49,6 +49,7 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     READING: ClassVar = Servo
     GROUP: ClassVar[str] = "servos"
     NAMES: ClassVar[tuple[str, ...]] = ("servo_left", "servo_right")
+    SHOWN: ClassVar = ("pulse", "µs", 1.0, 0)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}

@@ -1,7 +1,7 @@
 """What people want of a run: taken from their pages in the server's thread, carried out before steps of the brains.
 
-One page drives a robot by hand at a time. While it does, the robot stops when the page is hidden, closed, or silent for
-0.3 s of the wall clock; its brain drives again only once somebody says so.
+One page drives a robot by hand at a time. While it does, the robot stops when the page is closed, or silent for 0.3 s
+of the wall clock (a hidden page lets go); its brain drives again only once somebody says so.
 """
 
 from __future__ import annotations
@@ -67,14 +67,12 @@ class Controls:
         self._lock = threading.Lock()
         self._deeds: list[deque[Deed]] = [deque() for _ in range(robots)]
         self._wheels: list[Wheel | None] = [None] * robots
-        self._hidden: set[int] = set()
 
     # ---- from pages ------------------------------------------------------------------------------------------------
 
-    def went(self, page: int) -> None:
-        """It is gone. What it drove stops; a run that stands still goes on if that was the last page."""
+    def went(self) -> None:
+        """A page is gone. What it drove stops; a run that stands still goes on if that was the last page."""
         with self._lock:
-            self._hidden.discard(page)
             if not self._pages() and self.pace.paused:
                 self.pace.resume()
 
@@ -105,8 +103,6 @@ class Controls:
                 self.begin_afresh(asked)
             case messages.Do(robot, deed):
                 self._do(page, robot, deed)
-            case messages.Visible(visible):
-                (self._hidden.discard if visible else self._hidden.add)(page)
 
     def begin_afresh(self, restart: messages.Restart) -> None:
         """Another run is asked for."""
@@ -155,8 +151,8 @@ class Controls:
             if wheel is None:
                 return deeds
             is_silent = time.monotonic() - wheel.heard_s > SILENT_S
-            is_absent = wheel.page in self._hidden or wheel.page not in self._pages()
-            hand = Hand(0.0, 0.0) if is_silent or is_absent else wheel.hand
+            is_gone = wheel.page not in self._pages()
+            hand = Hand(0.0, 0.0) if is_silent or is_gone else wheel.hand
             return deeds if hand == held else [*deeds, hand]
 
     def drivers(self) -> list[int | None]:

@@ -11,7 +11,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
 from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
@@ -25,7 +24,6 @@ from boebot.live.controls import Controls
 from boebot.live.outbox import LETTERS, Message
 from boebot.live.pace import Pace
 from boebot.live.page_server import LOOPBACK
-from boebot.record.blocks import Group
 from boebot.record.interventions import Deed
 from boebot.record.run import Run
 from boebot.running import interrupts
@@ -85,7 +83,7 @@ class LiveView:
     def _went(self, page: int) -> None:
         with self._changing:
             if self._controls is not None:
-                self._controls.went(page)
+                self._controls.went()
 
     def _asked(self, page: int, what: messages.Asked) -> None:
         """Once the run has ended, only another one can be asked for."""
@@ -102,7 +100,7 @@ class LiveView:
         self._pace = Pace(self._speed if "speed" in can else None)
         self._robots = list(robots)
         self._chunks = [
-            Chunks(each.driver.session, partial(_news, each), result, n)
+            Chunks(each.driver.session, each.task.record.news, result, n)
             for n, (each, result) in enumerate(zip(robots, results, strict=True), 1)
         ]
         world = results[0].world
@@ -144,12 +142,12 @@ class LiveView:
         """See `Onlooker`."""
         self._audience.tell({"type": "refused", "sentence": str(error)})
 
-    def look(self, time_s: float) -> None:
+    def look(self, time_s: float, *, is_over: bool = False) -> None:
         """See `Onlooker`."""
         now = time.perf_counter()
-        if now < self._due_s:
+        if now < self._due_s and not is_over:
             return
-        self._make_chunk(time_s)
+        self._make_chunk(time_s, is_over=is_over)
         took = time.perf_counter() - now
         each = EACH_S if self._audience.is_there else EACH_UNSEEN_S
         self._due_s = now + (max(each, min(SHARE * took, EACH_AT_MOST_S)) if self._hurries else each)
@@ -159,12 +157,13 @@ class LiveView:
         """The run goes as fast as possible."""
         return self._controls is not None and "speed" in self._controls.can and self._pace.speed is None
 
-    def _make_chunk(self, time_s: float) -> None:
-        if not self._audience.knows_run and not all(chunks.gather() for chunks in self._chunks):
-            return  # a robot has not begun: the first chunk has all of them from their beginning
+    def _make_chunk(self, time_s: float, *, is_over: bool = False) -> None:
+        for robot in self._robots if not is_over else ():
+            _gather(robot)
+        # the first chunk has all robots from their beginning
+        if not (any if self._audience.knows_run else all)([chunks.gather() for chunks in self._chunks]):
+            return
         rows = [chunks.make() for chunks in self._chunks]
-        if not any(rows):
-            return  # nothing is new
         self._rates.append((time.perf_counter(), time_s))
         if not self._audience.knows_run:
             poses = [pose for pose in map(_pose_now, self._robots) if pose is not None] or [(0.0, 0.0, 0.0)]
@@ -172,8 +171,7 @@ class LiveView:
             self._audience.begin(self._plan, poses, contents, self._live())
         with self._printing:
             printed, self._printed = self._printed, ""
-        runs = [one or chunks.nothing() for one, chunks in zip(rows, self._chunks, strict=True)]
-        self._audience.add(runs, self._chunks[0].moving(self._plan), self._state(time_s), printed)
+        self._audience.add(rows, self._chunks[0].moving(self._plan), self._state(time_s), printed)
 
     def _live(self) -> Message:
         assert self._controls is not None
@@ -201,6 +199,7 @@ class LiveView:
                     "driver": page,
                     "pose": _pose_now(robot),
                     "link": _quality(robot),
+                    "load": robot.driver.session.counters().get("load"),
                 }
                 for robot, page in zip(self._robots, self._controls.drivers(), strict=True)
             ],
@@ -290,8 +289,8 @@ class Heard:
         return getattr(self._own, name)
 
 
-def _news(robot: Hands) -> Group:
-    """Rows of its record that came since this was last asked; none is lost by Ctrl-C.
+def _gather(robot: Hands) -> None:
+    """Brings what has happened into its record; no row is lost by Ctrl-C.
 
     Raises:
         KeyboardInterrupt: Ctrl-C.
@@ -300,7 +299,6 @@ def _news(robot: Hands) -> Group:
         gather_rows(robot.driver, robot.task)
     if interrupts.first is not None:
         raise KeyboardInterrupt
-    return robot.task.record.news()
 
 
 def _possible(robots: Sequence[Hands]) -> frozenset[str]:

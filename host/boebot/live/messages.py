@@ -55,13 +55,7 @@ class Do(_Message, frozen=True):
     deed: Deed
 
 
-class Visible(_Message, frozen=True):
-    """The page can be seen, or is hidden."""
-
-    visible: bool
-
-
-Asked = Hello | Pause | Resume | Step | Speed | Restart | Do | Visible
+Asked = Hello | Pause | Resume | Step | Speed | Restart | Do
 _DECODER: msgspec.json.Decoder[Asked] = msgspec.json.Decoder(Asked)
 
 

@@ -13,7 +13,6 @@ import msgspec
 Message = dict[str, Any]
 EVENTS = 500  # of a kind, that wait at most
 LETTERS = 20_000  # printed, that wait at most
-_ADDED = ("events", "true_contacts", "touches")  # lists of rows that are not lost with their chunk
 
 
 class Outbox:
@@ -77,7 +76,7 @@ def merged(old: Message, new: Message) -> Message:
 
 def _merged_rows(old: Message, new: Message) -> Message:
     layers = {layer["name"]: layer for layer in (*old["layers"], *new["layers"])}
-    rows = new | {name: (old[name] + new[name])[-EVENTS:] for name in _ADDED} | {"layers": list(layers.values())}
+    rows = new | {"events": (old["events"] + new["events"])[-EVENTS:], "layers": list(layers.values())}
     if old["mind"] is not None and new["mind"] is not None:
         switches = (old["mind"]["switches"] + new["mind"]["switches"])[-EVENTS:]
         rows["mind"] = new["mind"] | {"switches": switches}

@@ -97,8 +97,7 @@ class ServedView:
 
     def _asked(self, page: int, what: messages.Asked) -> None:
         """Nothing can be done but looking."""
-        if not isinstance(what, messages.Visible):
-            raise BoebotError("a served robot is driven by the program that has its port; this page only shows it")
+        raise BoebotError("a served robot is driven by the program that has its port; this page only shows it")
 
     def visit(self, visit: Visit) -> None:
         """A program came, went or was refused."""
@@ -110,9 +109,9 @@ class ServedView:
             self._source = ReadAlong(session)
             self._chunks = Chunks(session, self._source.news, self._result(session), 1)
         self._source.hear(data)
-        rows = self._chunks.make()
-        if rows is None:
+        if not self._chunks.gather():
             return
+        rows = self._chunks.make()
         if not self._audience.knows_run:
             assert self._chunks.content is not None
             now = session.truth_now()

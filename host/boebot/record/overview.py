@@ -17,6 +17,7 @@ from boebot.record.columns import Columns, Recorded, chained, columns, whole
 from boebot.record.truth import APART_S, Bools, Floats, Pose, Track
 
 POINTS = 20_000  # ticks at most that are drawn
+STEPS = 6_000  # of a brain of processes, at most
 PLACES = 5_000  # touches at most whose places are drawn
 ODOMETRY_S = 0.1  # from place to place of a path by odometry
 
@@ -33,7 +34,7 @@ class Overview:
         overruns, dead_man_stops, fallback_takeovers: counted.
         slow_reading_age: the greatest that a slow device's reading had at a step of the brain; None: none had one.
         shown, layers: what the brain showed, and its sketches.
-        brain: of a brain of processes, at most `POINTS` of its steps; None: a brain of another kind, or not recorded.
+        brain: of a brain of processes, about `STEPS` of its steps; None: a brain of another kind, or not recorded.
     """
 
     columns: Columns
@@ -194,5 +195,5 @@ def overview(result: Recorded, whiskers: list[str], names: BrainNames | None) ->
         slow_reading_age=counts.oldest,
         shown=read_shown(record, POINTS),
         layers=read_layers(record),
-        brain=None if names is None else read_brain(record, names).thinned(POINTS),
+        brain=None if names is None else read_brain(record, names).thinned(STEPS),
     )

@@ -55,8 +55,8 @@ class Onlooker(Protocol):
             BoebotError: the run is to end.
         """
 
-    def look(self, time_s: float) -> None:
-        """Steps are done; nothing happens meanwhile."""
+    def look(self, time_s: float, *, is_over: bool = False) -> None:
+        """Steps are done; nothing happens meanwhile. `is_over`: nothing happens any more, and all is in the record."""
 
 
 class Hands:
@@ -147,5 +147,5 @@ class Repeated:
     def refuse(self, number: int, error: BoebotError) -> None:
         """What could be done once can be done again, or the runs differ: they are compared."""
 
-    def look(self, time_s: float) -> None:
+    def look(self, time_s: float, *, is_over: bool = False) -> None:
         """Nobody looks."""

@@ -426,6 +426,8 @@ class _Loop:
             results.append(result)
         if not self._is_recorded:
             self._begin_record()
+        if self._onlooker is not None:
+            self._onlooker.look(max(result.run_time for result in results), is_over=True)
         unkept = self._recording.end(results)
         if len(results) == 1:
             results[0].error = unkept or results[0].error

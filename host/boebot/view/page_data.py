@@ -26,6 +26,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -35,6 +36,7 @@ from boebot.description import robots
 from boebot.devices.device import pin_name
 from boebot.devices.drawing import Item
 from boebot.link.messages import Status
+from boebot.record.interventions import STREAM, in_words
 from boebot.record.truth import touch_indices
 from boebot.view import scene, style
 
@@ -46,10 +48,11 @@ if TYPE_CHECKING:
     from boebot.record.blocks import Block
     from boebot.record.brain_record import BrainRecord, Layer, Shown
     from boebot.record.columns import Columns
+    from boebot.record.record import Record
     from boebot.record.run import Run
     from boebot.record.truth import Bools, Floats, Pose
 
-FORMAT = 10
+FORMAT = 11
 RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
 WHOLE = 65535  # such a number for the whole reach
 EVENTS_AT_MOST = 2_000  # of a stretch
@@ -77,27 +80,16 @@ Event = tuple[float, str, str]
 
 
 def plan_data(plan: FloorPlan) -> dict[str, Any]:
-    """The plan as the page has it (m, rad): display lists, and for the pointer what has remarks."""
+    """The plan as the page has it (m, rad): display lists."""
     return {
         "items": [_item(item) for item in scene.arena_items(plan)],
         "outlines": [_points(outline.points) for outline in plan.outlines],
-        "remarks": [
-            {"points": _item(scene.solid_item(solid))["points"], "text": ", ".join(solid.remarks)}
-            for solid in plan.obstacles
-            if solid.remarks and solid.kind != "wall"
-        ],
         "moving": [_item(scene.moving_item(moving.solid)) for moving in plan.moving],
     }
 
 
 def robot_data(
-    result: Run,
-    view: scene.View,
-    number: int,
-    *,
-    table: Mapping[str, Any],
-    way: Sequence[str] = (),
-    cognitive: Sequence[str] = (),
+    result: Run, view: scene.View, number: int, *, table: Mapping[str, Any], way: Sequence[str] = ()
 ) -> dict[str, Any]:
     """What the page knows of a robot from the start.
 
@@ -106,12 +98,11 @@ def robot_data(
         view: any of its ticks, even none: which readings and sweeps it has.
         number: of the robot in the run, from 1.
         table, way: as `Run` has them.
-        cognitive: those of its brain's cognitive processes that are drawn.
     """
     series, names = view.columns, result.brain_names
     mind = names and {
         "behaviors": [{"name": name, "colour": style.behavior(index)} for index, name in enumerate(names.behaviors)],
-        "cognitive": [{"name": name} for name in cognitive],
+        "cognitive": [{"name": name} for name in names.cognitive[: scene.COGNITIVE_AT_MOST]],
     }
     return {
         "title": result.title,
@@ -151,7 +142,6 @@ def _robot(robot: robots.RobotDescription) -> dict[str, Any]:
         "items": [_item(item) for item in scene.robot_items(robot)],
         "ghost": [_item(item) for item in scene.ghost_items(robot)],
         "pivot": scene.pivot(robot),
-        "devices": [name for name, device in robot.device.items() if device.on],
     }
 
 
@@ -164,50 +154,37 @@ def moving_data(moving: Sequence[Moving]) -> list[dict[str, Any]]:
 
 
 def rows_data(
-    view: scene.View,
-    *,
-    events: Sequence[Event] = (),
-    pins: Mapping[str, tuple[Floats, NDArray[np.uint8]]] | None = None,
-    load: float | None = None,
-    cognitive: Sequence[str] = (),
-    steps_at_most: int | None = None,
-    sweeps_room: int | None = None,
+    result: Run, view: scene.View, ticks: Columns, record: Record, *, sweeps_room: int | None = None
 ) -> dict[str, Any]:
     """What a robot did in a stretch of time, which the page appends to what it has.
 
     Args:
+        result: of the robot.
         view: what it did.
-        events: as the page has them.
-        pins: output edges by the name of the pin: times (s of the run) and levels.
-        load: share of the tick that the board's work took; None: not known.
-        cognitive: as of `robot_data`.
-        steps_at_most: of the brain; None: all.
+        ticks: all of that stretch, of which the view may have a few.
+        record: has the rows of that stretch.
         sweeps_room: how many numbers of two bytes the sweeps of each sensor may take; None: all of them.
     """
     series = view.columns
-    pulses = [series.number(name, "pulse") for name in ("servo_left", "servo_right")]
-    readouts = series.readouts()
+    deeds = [(time_s, "intervention", in_words(data)) for time_s, data in record.rows(STREAM)]
+    happened = sorted(events(ticks, result.whiskers) + deeds, key=itemgetter(0))
+    edges = pins(record.block("pins"), result.robot, result.clock_offset)
     return {
         "time": _array(series.time),
         "path": _pose(view.path),
         "estimate": None if view.estimate is None else _pose(view.estimate),
-        "turret": _array(np.nan_to_num(series.number("turret", "angle"), nan=0.0)),
+        "turret": _array(view.turret),
         "left": _array(series.signals[0]),
         "right": _array(series.signals[1]),
-        "pulses": None if any(np.isnan(each).all() for each in pulses) else [_array(each) for each in pulses],
-        "ping": _array(np.nan_to_num(series.number("ping", "distance"), nan=-1.0)),
         "flags": _small(flags(series)),
         "signs": [_small(values) for _, _, values in series.signs()],
-        "readings": [{"values": _array(one.values), "ages": _array(one.ages)} for one in readouts],
+        "readings": [{"values": _array(one.values), "ages": _array(one.ages)} for one in series.readouts()],
         "shown": _shown(view.shown),
         "layers": [_layer(layer, view.start) for layer in view.layers],
         "swept": [_swept(one, sweeps_room) for one in view.swept],
-        "mind": None if view.brain is None else _mind(view.brain, cognitive, steps_at_most),
-        "true_contacts": np.round(view.true_contacts, 4).tolist(),
-        "touches": np.round(view.touches, 4).tolist(),
-        "events": [[round(time, 4), kind, text] for time, kind, text in events[:EVENTS_AT_MOST]],
-        "load": None if load is None else _array(np.full(len(series), load)),
-        "pins": [_pin(name, time, level) for name, (time, level) in (pins or {}).items()],
+        "mind": None if view.brain is None else _mind(view.brain),
+        "events": [[round(time, 4), kind, text] for time, kind, text in happened[:EVENTS_AT_MOST]],
+        "pins": [_pin(name, time, level) for name, (time, level) in edges.items()],
     }
 
 
@@ -311,20 +288,19 @@ def _swept(swept: scene.Swept, room: int | None) -> dict[str, Any]:
     }
 
 
-def _mind(record: BrainRecord, cognitive: Sequence[str], most: int | None) -> dict[str, Any]:
-    """Of each kept step its utilities and the active behavior; the last switches before each."""
-    stride = 1 if most is None else max(1, math.ceil(len(record) / most))
-    thin, time = slice(None, None, stride), record.time[::stride]
-    switches = [switch for switch in record.switches if switch.on in record.names.behaviors]
-    if stride > 1:  # switches between kept steps are left out
-        last = np.searchsorted([switch.time for switch in switches], time, side="right") - 1
-        switches = [switches[index] for index in np.unique(last)]
+def _mind(record: BrainRecord) -> dict[str, Any]:
+    """Of each step its utilities and the active behavior; the switches."""
+    names = record.names
     return {
-        "time": _array(time),
-        "motor": _small(record.motor[thin]),
-        "behaviors": [_array(record.utility_of(name)[thin]) for name in record.names.behaviors],
-        "cognitive": [_array(record.utility_of(name)[thin]) for name in cognitive],
-        "switches": [[round(switch.time, 3), switch.on, switch.reason] for switch in switches],
+        "time": _array(record.time),
+        "motor": _small(record.motor),
+        "behaviors": [_array(record.utility_of(name)) for name in names.behaviors],
+        "cognitive": [_array(record.utility_of(name)) for name in names.cognitive[: scene.COGNITIVE_AT_MOST]],
+        "switches": [
+            [round(switch.time, 3), switch.on, switch.reason]
+            for switch in record.switches
+            if switch.on in names.behaviors
+        ],
     }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from boebot.arenas.arena import Floats
     from boebot.record.brain_record import BrainRecord
+    from boebot.record.overview import Overview
     from boebot.record.run import Run
     from boebot.record.truth import Pose
 
@@ -57,6 +58,10 @@ PANEL_IN, PANEL_BELOW_IN = 1.5, 0.5  # of the panel below the field, and for the
 ENTRY_IN, LETTER_IN = 0.5, 0.062  # of the legend: handle and gaps, one letter
 POINTS_AT_ONCE = 500  # of a line: the dashes of a long one at once take 100 MB
 PARTING = "   ·   "
+TOUCH: dict[str, Any] = {
+    "ls": "", "marker": "o", "mfc": style.FLOOR, "mec": style.TOUCH, "mew": 1.6, "ms": 5.5, "zorder": 9
+}  # fmt: skip
+CONTACT: dict[str, Any] = {"ls": "", "marker": "x", "color": style.CONTACT, "mew": 1.9, "ms": 7, "zorder": 9.5}
 PIXELS_PER_INCH = 96  # of a page
 
 Shown = tuple[int, "Run", scene.View]
@@ -87,7 +92,7 @@ def _draw_one(result: Run) -> Sheet:
         axes.plot(view.estimate.x[thin], view.estimate.y[thin], color=style.ESTIMATE, lw=1.1, ls=(0, (4, 2)), zorder=6)
         paint(axes, scene.ghost_items(result.robot), pose=view.estimate.at(-1))
     draw_layers(axes, view)
-    _draw_marks(axes, view)
+    _draw_marks(axes, result.overview)
     for index, colour in ((0, style.START), (-1, style.END)):
         turret = float(view.turret[index])
         draw_swept(axes, view.swept, index, colour)
@@ -120,22 +125,11 @@ def _draw_behaviors(axes: Axes, path: Pose, time: Floats, record: BrainRecord) -
             axes.plot(x[0], y[0], "o", ms=5.5, color=colour, mec=style.FLOOR, mew=0.6, zorder=8)
 
 
-def _draw_marks(axes: Axes, view: scene.View) -> None:
+def _draw_marks(axes: Axes, few: Overview) -> None:
     """Where a whisker was pressed (circles) and where the body touched something (crosses)."""
-    if len(view.touches):
-        axes.scatter(
-            view.touches[:, 0], view.touches[:, 1], s=30, marker="o", fc=style.FLOOR, ec=style.TOUCH, lw=1.6, zorder=9
-        )
-    if len(view.true_contacts):
-        axes.scatter(
-            view.true_contacts[:, 0],
-            view.true_contacts[:, 1],
-            s=46,
-            marker="x",
-            color=style.CONTACT,
-            lw=1.9,
-            zorder=9.5,
-        )
+    for places, look in ((few.touch_places, TOUCH), (few.contact_places, CONTACT)):
+        if len(places):
+            axes.plot(*places.T, **look)
 
 
 def _title(result: Run, view: scene.View) -> str:
@@ -166,18 +160,16 @@ def _legend(result: Run, view: scene.View) -> list[Artist]:
         entries.append(Line2D([], [], color=style.ESTIMATE, lw=1.2, ls=(0, (4, 2)), label="path by odometry"))
     for label, colour in (("start", style.START), ("end", style.END)):
         entries.append(Line2D([], [], ls="", marker="o", mfc=style.BODY, mec=colour, mew=1.8, ms=8, label=label))
-    return entries + _legend_marks([view]) + layer_entries(view) + legend_entries(view.plan)
+    return entries + _legend_marks([result]) + layer_entries(view) + legend_entries(view.plan)
 
 
-def _legend_marks(views: Sequence[scene.View]) -> list[Artist]:
+def _legend_marks(runs: Sequence[Run]) -> list[Artist]:
     """Entries of touches and contacts, where there are any."""
     entries: list[Artist] = []
-    if any(len(view.touches) for view in views):
-        entries.append(
-            Line2D([], [], ls="", marker="o", mfc=style.FLOOR, mec=style.TOUCH, mew=1.6, ms=6, label="whisker touch")
-        )
-    if any(len(view.true_contacts) for view in views):
-        entries.append(Line2D([], [], ls="", marker="x", color=style.CONTACT, mew=1.9, ms=7, label="true contact"))
+    if any(len(run.overview.touch_places) for run in runs):
+        entries.append(Line2D([], [], label="whisker touch", **TOUCH))
+    if any(len(run.overview.contact_places) for run in runs):
+        entries.append(Line2D([], [], label="true contact", **CONTACT))
     return entries
 
 
@@ -253,7 +245,7 @@ def _draw_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
         axes.plot(view.path.x, view.path.y, color=colour, lw=1.9, ls=style.dashes(number), zorder=7)
         axes.plot(view.path.x[0], view.path.y[0], "o", mfc=style.PAPER, mec=colour, mew=1.8, ms=6, zorder=8)
         draw_layers(axes, view, colour)
-        _draw_marks(axes, view)
+        _draw_marks(axes, robot.overview)
         draw_swept(axes, view.swept, -1, colour)
         draw_robot(axes, robot.robot, view.pose(-1), colour, plan=plan, turret=float(view.turret[-1]))
         axes.annotate(
@@ -285,7 +277,7 @@ def _legend_together(shown: list[Shown]) -> list[Artist]:
         for n, robot, _ in shown
     ]
     entries.append(Line2D([], [], ls="", marker="o", mfc=style.PAPER, mec=style.INK, mew=1.6, ms=6, label="start"))
-    return entries + _legend_marks([view for _, _, view in shown]) + legend_entries(shown[0][2].plan)
+    return entries + _legend_marks([robot for _, robot, _ in shown]) + legend_entries(shown[0][2].plan)
 
 
 # ---- the sheet of both -----------------------------------------------------------------------------------------------

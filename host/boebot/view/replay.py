@@ -9,17 +9,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boebot.record.interventions import STREAM, in_words
 from boebot.view import page_data, scene, style
 
 if TYPE_CHECKING:
     from boebot.record.run import Run
 
-STEPS_AT_MOST = 6_000  # of a brain of processes
 SWEPT_AT_MOST = 1_000_000  # numbers of two bytes, of all sweeps of all robots: 2.7 MB of the page
 
 
@@ -70,19 +67,8 @@ def content(results: Sequence[Run]) -> dict[str, Any]:
 
 def run_data(result: Run, view: scene.View, number: int = 1, room: int | None = None) -> dict[str, Any]:
     """What the page shows of one robot, with its whole run. `number`: of the robot, from 1; `room`: of its sweeps."""
-    cognitive = () if view.brain is None else scene.shown_cognitive(view.brain)
-    table, way = result.table(), result.way_in_words()
-    about = page_data.robot_data(result, view, number, table=table, way=way, cognitive=cognitive)
-    deeds = [(time_s, "intervention", in_words(data)) for time_s, data in result.record.rows(STREAM)]
-    rows = page_data.rows_data(
-        view,
-        events=sorted(page_data.events(view.columns, result.whiskers) + deeds, key=itemgetter(0)),
-        pins=page_data.pins(result.record.block("pins"), result.robot, result.clock_offset),
-        cognitive=cognitive,
-        steps_at_most=STEPS_AT_MOST,
-        sweeps_room=room,
-    )
-    return about | {"rows": rows}
+    about = page_data.robot_data(result, view, number, table=result.table(), way=result.way_in_words())
+    return about | {"rows": page_data.rows_data(result, view, view.columns, result.record, sweeps_room=room)}
 
 
 # ---- the page's text -------------------------------------------------------------------------------------------------

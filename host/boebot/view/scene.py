@@ -75,10 +75,6 @@ class View:
     brain: BrainRecord | None = None
     """Steps and switches of a brain of processes; None: a brain of another kind, or no step yet."""
     plan: FloorPlan = field(default_factory=FloorPlan)
-    true_contacts: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    """Where the body came to touch something, shape (n, 2)."""
-    touches: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    """Where the robot was when a whisker was pressed, shape (n, 2)."""
 
     @property
     def known(self) -> bool:
@@ -133,8 +129,6 @@ def view(result: Run) -> View:
         layers=few.layers,
         brain=brain if brain is not None and len(brain) else None,
         plan=result.plan if result.has_truth else FloorPlan(),
-        true_contacts=few.contact_places,
-        touches=few.touch_places,
     )
 
 

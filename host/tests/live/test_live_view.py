@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import http.client
 import json
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -119,6 +121,10 @@ def get(run: Run, path: str, **headers: str) -> tuple[int, str, Any]:
     return response.status, response.read().decode(), response.headers
 
 
+def times_of(rows: dict[str, Any]) -> list[float]:
+    return list(np.frombuffer(base64.b64decode(rows["time"]), "<f4"))
+
+
 def test_page_is_for_who_has_its_address(endless: Run) -> None:
     status, body, headers = get(endless, f"/?{endless.url.query}")
     assert status == 200 and "<canvas" in body and headers["Cache-Control"] == "no-store"
@@ -170,7 +176,7 @@ def test_rubbish_floods_and_old_pages_are_let_go_and_the_run_goes_on(endless: Ru
         page = Page(stream)
         with contextlib.suppress(ConnectionClosed):
             for _ in range(10_000):
-                page.say(type="visible", visible=True)
+                page.say(type="resume")
         assert let_go(stream)
     with endless.stream() as stream:
         page = Page(stream)
@@ -287,7 +293,10 @@ def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> Non
         chunk = page.until("chunk", where=lambda chunk: chunk["printed"] and chunk["runs"][0]["layers"])
         assert chunk["printed"].startswith("hello")
         assert [one["name"] for one in chunk["runs"][0]["shown"]["numbers"]] == ["x"]
-        assert page.until("chunk", where=lambda chunk: chunk["state"]["time"] > 1.0)["runs"][1]["time"] == ""
+        ended = page.until("chunk", where=lambda chunk: chunk["state"]["time"] > 1.0)["runs"][1]
+        assert times_of(ended) == pytest.approx([0.55], abs=0.06), "the newest once more"
+        last = page.until("chunk", where=lambda chunk: times_of(chunk["runs"][0])[-1] > 1.99)
+        assert last["state"]["time"] == pytest.approx(2.0, abs=0.05), "up to the end"
         page.until("end")
         whole = short.read_text()
         short.write_text("def main(robot:\n")  # a run that cannot begin: another one may be asked for

@@ -229,7 +229,7 @@ class Slid:
     def refuse(self, number: int, error: BoebotError) -> None:
         raise error
 
-    def look(self, time_s: float) -> None:
+    def look(self, time_s: float, *, is_over: bool = False) -> None:
         pass
 
 

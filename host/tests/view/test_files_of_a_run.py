@@ -179,7 +179,7 @@ def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
     signs = dict(zip([sign["device"] for sign in data["signs"]], data["rows"]["signs"], strict=True))
     pressed = np.frombuffer(base64.b64decode(signs["whisker_left"]), np.uint8)
     assert np.array_equal(pressed != 0, result.series.flag("whisker_left", "pressed"))
-    assert len(data["rows"]["true_contacts"]) == 1 and data["known"]
+    assert [kind for _, kind, _ in data["rows"]["events"]].count("contact") == 1 and data["known"]
 
 
 def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:

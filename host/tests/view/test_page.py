@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 import boebot
 from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
 from boebot.devices.drawing import circle
+from boebot.record import overview
 from boebot.result import RunResult
 from boebot.view import replay, scene, style
 
@@ -91,7 +93,8 @@ def test_slow_devices_are_read_at_the_cursor(result: RunResult, shown: list[dict
         index = int(np.searchsorted(result.series.time, time + 1e-9) - 1)
         table = {name: (value, age) for name, value, age in moment["readings"]}
         assert set(table) == {
-            "battery", "light left", "light right", "compass", "analog infrared", "turret", "buzzer", "supply",
+            "servo left", "servo right", "ping", "battery", "light left", "light right", "compass", "analog infrared",
+            "turret", "buzzer", "supply",
         }  # fmt: skip
         battery, age = series.number("battery", "voltage")[index], series.number("battery", "age")[index]
         assert table["battery"] == (f"{battery:.2f} V", f"{age * 1000:.0f} ms")
@@ -109,7 +112,7 @@ def test_page_hides_what_the_robot_has_not(shown: list[dict[str, Any]], tmp_path
     arsim = boebot.run(lambda robot: robot.drive(0.5, 0.5), robot="arsim", seconds=1)
     (moment,) = moments(arsim, tmp_path, 0.5)
     assert [device for device, _ in moment["lamps"]] == ["infrared left", "infrared right"]
-    assert "pingRow" in moment["hidden"] and "estimateRow" not in moment["hidden"]
+    assert "estimateRow" not in moment["hidden"]
     assert [row[0] for row in moment["readings"]] == ["infrared left", "infrared right", "compass"]
     assert moment["texts"]["clock"] == "0.50 / 1.00 s"
 
@@ -183,7 +186,8 @@ def test_page_says_which_behavior_is_active_and_why(
     most: int, composed_run: RunResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At steps that the page keeps, also where it keeps one in three."""
-    monkeypatch.setattr(replay, "STEPS_AT_MOST", most)
+    monkeypatch.setattr(overview, "STEPS", most)
+    composed_run = dataclasses.replace(composed_run)
     record = composed_run.brain_record
     assert record is not None and len(record) == 120
     every = 1 if most > 120 else 3

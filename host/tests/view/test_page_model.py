@@ -36,20 +36,20 @@ def packed(values: list[float], form: str = "<f4") -> str:
 
 
 LISTS = ("readings", "signs", "swept")
-ABOUT: dict[str, Any] = {name: [] for name in LISTS} | {"has_estimate": False, "mind": None, "robot": {"devices": []}}
+ABOUT: dict[str, Any] = {name: [] for name in LISTS} | {"has_estimate": False, "mind": None, "robot": {}}
 
 
 def rows(time: list[float], x: list[float] | None = None, **more: Any) -> dict[str, Any]:
     """Of a robot that has next to nothing, and drives along x."""
     none = packed([0.0] * len(time))
     made = {
-        **dict.fromkeys(("turret", "left", "right", "ping"), none),
+        **dict.fromkeys(("turret", "left", "right"), none),
         "time": packed(time),
         "path": [packed(time if x is None else x), none, none],
         "flags": packed([0] * len(time), "u1"),
         "shown": {"time": packed([]), "numbers": [], "texts": []},
-        **{name: [] for name in ("readings", "signs", "layers", "swept", "true_contacts", "touches", "events", "pins")},
-        **dict.fromkeys(("estimate", "pulses", "load", "mind")),
+        **{name: [] for name in ("readings", "signs", "layers", "swept", "events", "pins")},
+        **dict.fromkeys(("estimate", "mind")),
     }
     return made | more
 
@@ -80,13 +80,12 @@ def test_whole_run_is_one_chunk() -> None:
 
 
 def test_what_is_new_in_a_later_chunk_is_unknown_before() -> None:
-    """Shown numbers and texts, pulses, load, pins."""
+    """Shown numbers and texts, pins."""
     first = rows(
         [0.0, 0.1], shown={"time": packed([0.0]), "numbers": [{"name": "a", "values": packed([1.5])}], "texts": []}
     )
     second = rows(
         [0.2, 0.3],
-        load=packed([0.25, 0.5]),
         shown={
             "time": packed([0.2, 0.3]),
             "numbers": [
@@ -97,15 +96,12 @@ def test_what_is_new_in_a_later_chunk_is_unknown_before() -> None:
         pins=[{"name": "13", "time": packed([0.21, 0.22], "<f8"), "level": packed([1, 0], "u1")}],
     )
     third = rows([0.4])
-    ask = ("it.numbers.map(one => [one.name, [...one.values.values]])", "it.texts[0].values", "it.load.values")
-    numbers, texts, load, edges, names = answers(
-        ABOUT, [first, second, third], *ask, "it.pins[0].time.values", "it.names"
-    )
+    ask = ("it.numbers.map(one => [one.name, [...one.values.values]])", "it.texts[0].values")
+    numbers, texts, edges, names = answers(ABOUT, [first, second, third], *ask, "it.pins[0].time.values", "it.names")
     assert numbers == [["a", [1.5, 2, 3]], ["b", [None, 4, 5]]]
     assert texts == ["", "yes", "no"]
-    assert load == [None, None, 0.25, 0.5, None], "one for each tick"
     assert edges == [0.21, 0.22], "as exact as they came"
-    assert names == 5, "as many new names, and the load: panels and lanes are made anew"
+    assert names == 4, "as many new names: panels and lanes are made anew"
 
 
 def test_events_are_in_the_order_of_time_with_the_switches_among_them() -> None:

@@ -20,7 +20,7 @@ const colourOf = (name, own) => (name === "robot" ? own : (colours[name] ?? read
 // One item, in the frame that c draws in. `own`: the colour of its robot; `one`, `i`: the robot and the tick whose signs
 // and measurements it shows; without them it is as without any.
 function paint(c, item, own, one, i) {
-  const reach = item.reach_by ? (one?.[item.reach_by]?.values[i] ?? 0) : 1;
+  const reach = item.reach_by ? one?.reading(item.reach_by)?.values.values[i] : 1;
   if (!(reach > 0) || (item.when && !one?.isOn(item.when, i))) return;
   const points = item.points,
     [u, v] = points[0];
@@ -91,9 +91,7 @@ function writeWords(c, { points, text, side }) {
 }
 
 // ---- grid and numbers ----
-const GRID_STEPS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500];
-const gridStep = () =>
-  GRID_STEPS.find(step => $("stage").width / scale / step <= 16 && step * scale >= 44 * ratio) || 1000;
+const gridStep = () => Math.max(0.1, stepOf(Math.max($("stage").width / 16, 44 * ratio) / scale));
 function drawGrid(c) {
   const { width, height } = $("floor"),
     step = gridStep();
@@ -306,13 +304,12 @@ function trace(c, times, columns, to) {
 }
 // So far, and faint the whole ones; where the body touched something, where a whisker did.
 function drawTrails(c) {
-  const isWhole = $("whole").checked;
   for (const one of runs) {
     if (!one.time.length) continue;
     c.strokeStyle = readable(one.colour);
     c.lineWidth = 2 * ratio;
     c.globalAlpha = 0.15;
-    if (isWhole) trace(c, one.time.values, one.path, one.last);
+    trace(c, one.time.values, one.path, one.last);
     c.globalAlpha = 0.85;
     trace(c, one.time.values, one.path, tickOf(one));
   }
@@ -323,20 +320,22 @@ function drawTrails(c) {
     trace(c, run.time.values, run.estimate, tickOf(run));
     c.setLineDash([]);
   }
-  if (isWhole) drawMarks(c);
+  drawMarks(c);
   c.globalAlpha = 1;
 }
 function drawMarks(c) {
+  const places = kind =>
+    run.events.filter(event => event.kind === kind).map(event => poseAt(run.time.values, run.path, event.time));
   c.strokeStyle = colours.touch;
   c.lineWidth = 1.4 * ratio;
-  for (const [x, y] of run.touches) {
+  for (const [x, y] of places("touch")) {
     c.beginPath();
     c.arc(X(x), Y(y), 3.5 * ratio, 0, 7);
     c.stroke();
   }
   c.strokeStyle = colours.contact;
   c.lineWidth = 2 * ratio;
-  for (const [x, y] of run.contacts) {
+  for (const [x, y] of places("contact")) {
     const r = 4 * ratio;
     c.beginPath();
     for (const side of [-1, 1]) {

@@ -32,6 +32,12 @@ const short = v => (Number.isNaN(v) ? "–" : minus(String(Number(v.toPrecision(
 const asPose = p =>
   minus(p[0].toFixed(2)) + ", " + minus(p[1].toFixed(2)) + " m, " + minus(((p[2] * 180) / Math.PI).toFixed(0)) + "°";
 
+// The least of 1, 2, 5, 10, 20, 50... that is not smaller: from line to line of a scale.
+function stepOf(least) {
+  const ten = 10 ** Math.floor(Math.log10(least));
+  return [1, 2, 5, 10].map(k => k * ten).find(step => step >= least) ?? 10 * ten;
+}
+
 // ---- the palette of style.py, light or dark, from the CSS variables ----
 const COLOURS = (
   "paper floor ink faint grid rule accent alert edge solid dull low paint-dark paint-bright rough " +

@@ -170,12 +170,9 @@ function drawBlocks(c, box, { times, colour, at, tall }) {
   }
 }
 const inGutter = name => (name.length > 14 ? name.slice(0, 13) + "…" : name);
-const TIME_STEPS = [1, 2, 5]
-  .flatMap(k => [-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5].map(e => k * 10 ** e))
-  .sort((a, b) => a - b);
 function drawAxis(c) {
   const { from, to, right, width, px } = timeField(),
-    step = TIME_STEPS.find(one => (one / (to - from)) * width >= 62 * ratio) || 1e6,
+    step = stepOf((62 * ratio * (to - from)) / width),
     digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   font(c, 11);
   c.textBaseline = "middle";
@@ -248,13 +245,14 @@ function makeLanes() {
     ],
     at: t => "left " + signed(run.left.values[tickAt(t)]) + ", right " + signed(run.right.values[tickAt(t)]),
   });
-  if (run.has("ping"))
+  const ping = run.reading("ping");
+  if (ping)
     lanes.push(
-      numberLane("Ping", ticks, i => (run.ping.values[i] > 0 ? run.ping.values[i] : NaN), {
+      numberLane(ping.name, ticks, i => ping.values.values[i], {
         colour: colours.end,
-        range: () => [0, Math.max(0.1, extent(0, run.ping.length, i => run.ping.values[i])[1])],
+        range: () => [0, Math.max(0.1, extent(0, ping.values.length, i => ping.values.values[i])[1])],
         scale: ([, far]) => [[far / 2, far.toFixed(1) + " m"]],
-        at: t => pingText(tickAt(t)),
+        at: t => readingText(ping, tickAt(t)),
       }),
     );
   for (const group of new Set(run.signs.map(groupOf)))
@@ -265,15 +263,6 @@ function makeLanes() {
       ),
     );
   if (run.known) lanes.push(flagLane("true contact", [{ device: "contact", colour: "contact" }]));
-  if (run.load)
-    lanes.push(
-      numberLane("load of tick", ticks, i => Math.min(1, run.load.values[i]), {
-        colour: colours.end,
-        range: () => [0, 1],
-        scale: () => [[1, "100 %"]],
-        at: t => (100 * run.load.values[tickAt(t)]).toFixed(0) + " %",
-      }),
-    );
   for (const one of run.numbers.slice(0, CURVES))
     lanes.push(
       numberLane(one.name, () => run.shownTime.values, i => one.values.values[i], {

@@ -1,7 +1,7 @@
 // The live view: gets a run that goes on from the server that the page came from, shows its newest moment, or an earlier
 // one, and asks for what the run's `can` allows. What it does not allow is not on the page.
 
-const FORMAT = 10; // of the data, as in page_data.py
+const FORMAT = 11; // of the data, as in page_data.py
 const RETRY_S = [1, 1, 2, 4, 8]; // from one attempt to connect to the next one
 let socket = null;
 let attempts = 0; // to connect again
@@ -22,7 +22,6 @@ function connect() {
   socket.onopen = () => {
     attempts = 0;
     send({ type: "hello", format: FORMAT });
-    send({ type: "visible", visible: !document.hidden });
   };
   socket.onmessage = event => {
     const message = JSON.parse(event.data);
@@ -197,7 +196,6 @@ function makeControls() {
   });
   hide("newest", false);
   hide("play", true);
-  hide("wholeLabel", true);
   hide("speedLabel", !can.has("speed"));
   if (can.has("speed")) makeSpeeds();
 }
@@ -214,10 +212,7 @@ function listenToControls() {
   $("restartDialog").querySelector("form").onsubmit = restart;
   $("newest").onclick = () => setNewest(true);
   $("move").onclick = pickUp;
-  document.addEventListener("visibilitychange", () => {
-    letGo();
-    send({ type: "visible", visible: !document.hidden });
-  });
+  document.addEventListener("visibilitychange", letGo);
 }
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 function makeSpeeds() {
@@ -328,7 +323,7 @@ function tellLink() {
     "sessions lost": link?.sessions_lost,
     resets: link?.resets,
     ...Object.fromEntries(Object.entries(link?.transport ?? {}).map(([name, value]) => [name.replaceAll("_", " "), value])),
-    "load of the tick": percent(robotState().load ?? run.load?.last),
+    "load of the tick": percent(robotState().load),
   };
   const known = Object.entries(values).filter(([, value]) => value != null);
   if (linkTold === String(known)) return;

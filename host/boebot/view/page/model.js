@@ -77,9 +77,6 @@ class Run {
     this.turret = new Column();
     this.left = new Column();
     this.right = new Column();
-    this.ping = new Column();
-    this.pulses = null;
-    this.load = null;
     this.flags = new Column(Uint8Array);
     this.signs = about.signs.map(sign => ({ ...sign, values: new Column(Uint8Array) })); // of devices that are on or off
     this.readings = about.readings.map(one => ({ ...one, values: new Column(), ages: new Column() }));
@@ -101,13 +98,11 @@ class Run {
       motor: new Column(Uint8Array),
       switches: [],
     };
-    this.contacts = [];
-    this.touches = [];
     this.events = [];
     this.pins = [];
     this.placed = null; // where it has been put while time stands still
     this.kinds = 0; // of events
-    this.names = 0; // how many numbers, texts, layers and pins have come: a new one asks for new panels
+    this.names = 0; // how many numbers, texts, layers, pins and kinds of events have come: a new one asks for new panels
     if (rows) this.append(rows);
   }
   get last() {
@@ -116,8 +111,8 @@ class Run {
   get duration() {
     return this.time.length ? this.time.last : 0;
   }
-  has(device) {
-    return this.robot.devices.includes(device);
+  reading(device) {
+    return this.readings.find(one => one.name === device);
   }
   // Whether a sign, or "contact", is on at a tick.
   isOn(name, i) {
@@ -126,18 +121,11 @@ class Run {
   }
 
   append(rows) {
-    for (const name of ["time", "turret", "left", "right", "ping"]) this[name].append(floats(rows[name]));
+    for (const name of ["time", "turret", "left", "right"]) this[name].append(floats(rows[name]));
     this.flags.append(bytes(rows.flags));
     rows.signs.forEach((values, k) => this.signs[k].values.append(bytes(values)));
     appendEach(this.path, rows.path);
     if (this.estimate && rows.estimate) appendEach(this.estimate, rows.estimate);
-    if (rows.pulses) this.pulses ??= [new Column(), new Column()];
-    this.pulses?.forEach((column, k) => this.appendKnown(column, rows.pulses?.[k]));
-    if (rows.load && !this.load) {
-      this.load = new Column();
-      this.names++; // it has a lane
-    }
-    if (this.load) this.appendKnown(this.load, rows.load);
     rows.readings.forEach((one, k) => {
       this.readings[k].values.append(floats(one.values));
       this.readings[k].ages.append(floats(one.ages));
@@ -146,16 +134,8 @@ class Run {
     rows.layers.forEach(layer => this.appendLayer(layer));
     rows.swept.forEach((one, k) => appendSweeps(this.swept[k], one));
     if (this.mind && rows.mind) this.appendMind(rows.mind);
-    this.contacts.push(...rows.true_contacts);
-    this.touches.push(...rows.touches);
     this.appendEvents(rows.events);
-    (rows.pins || []).forEach(pin => this.appendPin(pin));
-  }
-  // What is not known in every chunk, when all else is there already.
-  appendKnown(column, text) {
-    const values = text ? floats(text) : [];
-    column.fill(this.time.length - values.length);
-    column.append(values);
+    rows.pins.forEach(pin => this.appendPin(pin));
   }
   appendShown(shown) {
     const before = this.shownTime.length,

@@ -17,8 +17,7 @@ function makePanels() {
   cells.lamps = run.signs.map(({ device }) => element("div", { className: "lamp", textContent: device.replace("_", " ") }));
   cells.lamps.forEach(lamp => lamp.setAttribute("role", "img"));
   $("lamps").replaceChildren(...cells.lamps);
-  hide("pingRow", !run.has("ping"));
-  hide("sensors", !run.signs.length && !run.has("ping"));
+  hide("sensors", !run.signs.length);
   hide("mind", !run.mind);
   makeUtilities();
   makeFigures();
@@ -113,7 +112,7 @@ function makeLegend() {
   if (run.estimate) entries.push(["╍", colours.estimate, "odometry"]);
   const kinds = new Set(run.events.map(event => event.kind));
   if (run.known) kinds.add("contact");
-  if (run.has("whisker_left") || run.has("whisker_right")) kinds.add("touch");
+  if (run.signs.some(sign => groupOf(sign) === "whisker")) kinds.add("touch");
   for (const one of run.mind?.behaviors ?? []) entries.push(["■", one.colour, one.name]);
   if (run.mind?.cognitive.length) entries.push(["━", colours.faint, "cognitive process"]);
   for (const [kind, [mark, colour, words]] of Object.entries(EVENTS))
@@ -132,7 +131,6 @@ function bar({ style }, value) {
   style.left = (value < 0 ? 50 + 50 * Math.max(-1, value) : 50) + "%";
   style.width = Math.min(50, Math.abs(50 * value)) + "%";
 }
-const pingText = i => (run.ping.values[i] > 0 ? run.ping.values[i].toFixed(2) + " m" : "no echo");
 const stateText = bits =>
   bits & FALLBACK
     ? "driven by the board's own brain"
@@ -147,14 +145,10 @@ function tellMoment() {
     place = placeOf(run);
   say("clock", now.toFixed(2) + " / " + run.duration.toFixed(2) + " s");
   if (run.mind) tellMind();
-  [
-    ["left", run.left, 0],
-    ["right", run.right, 1],
-  ].forEach(([name, column, k]) => {
-    const pulse = run.pulses ? run.pulses[k].values[i] : NaN;
-    bar($(name + "Bar"), column.values[i]);
-    say(name + "Text", signed(column.values[i]) + (pulse > 0 ? "   " + pulse.toFixed(0) + " µs" : ""));
-  });
+  for (const name of ["left", "right"]) {
+    bar($(name + "Bar"), run[name].values[i]);
+    say(name + "Text", signed(run[name].values[i]));
+  }
   say("state", stateText(bits));
   run.signs.forEach(({ values, colour }, k) => {
     const lamp = cells.lamps[k],
@@ -163,8 +157,12 @@ function tellMoment() {
     lamp.style.background = on ? colourOf(colour) : "";
     lamp.ariaLabel = lamp.textContent + (on ? ": on" : ": off");
   });
-  say("ping", pingText(i));
-  run.readings.forEach((reading, k) => tellReading(reading, cells.readings[k], i));
+  run.readings.forEach((reading, k) => {
+    const [valueCell, ageCell] = cells.readings[k],
+      age = reading.ages.values[i];
+    valueCell.textContent = readingText(reading, i);
+    ageCell.textContent = Number.isNaN(age) ? "" : (age * 1000).toFixed(0) + " ms";
+  });
   [...run.numbers, ...run.texts].forEach((one, k) => {
     if (cells.shown[k]) cells.shown[k].textContent = shownText(one, now);
   });
@@ -175,11 +173,9 @@ function tellMoment() {
     say("error", Math.hypot(ghost[0] - place[0], ghost[1] - place[1]).toFixed(2) + " m");
   }
 }
-function tellReading(reading, [valueCell, ageCell], i) {
-  const value = reading.values.values[i],
-    age = reading.ages.values[i];
-  valueCell.textContent = Number.isNaN(value) ? "–" : minus(value.toFixed(reading.digits)) + " " + reading.unit;
-  ageCell.textContent = Number.isNaN(age) ? "" : (age * 1000).toFixed(0) + " ms";
+function readingText({ values, digits, unit }, i) {
+  const value = values.values[i];
+  return Number.isNaN(value) ? "–" : minus(value.toFixed(digits)) + " " + unit;
 }
 function tellMind() {
   const { mind } = run;
@@ -235,7 +231,6 @@ function hoverTracks(event) {
   );
   requestDraw();
 }
-const NEAR = 9; // pixels
 function hoverArena(event) {
   const x = backX(event.offsetX * ratio),
     y = backY(event.offsetY * ratio),
@@ -243,8 +238,6 @@ function hoverArena(event) {
   runs.forEach((one, i) => {
     if (one.time.length) lines.push(...aboutRobot(one, i, x, y));
   });
-  if (!lines.length) lines.push(...aboutPath(x, y));
-  for (const { points, text } of plan.remarks) if (within(points, x, y)) lines.push(text);
   lines.push(minus(x.toFixed(2)) + ", " + minus(y.toFixed(2)) + " m");
   tip(event, lines.join("\n"));
 }
@@ -252,27 +245,6 @@ function aboutRobot(one, i, x, y) {
   const place = placeOf(one);
   if (Math.hypot(place[0] - x, place[1] - y) > one.robot.radius) return [];
   return [(runs.length > 1 ? "robot " + (i + 1) + ": " : "") + one.brain, "at " + asPose(place)];
-}
-// When the robot was there.
-function aboutPath(x, y) {
-  const i = nearestTick(run, x, y);
-  if (i < 0) return [];
-  return ["here at " + run.time.values[i].toFixed(2) + " s"];
-}
-// Of the path so far, or of the whole one where that is shown; -1: none is near.
-function nearestTick(one, x, y) {
-  const [xs, ys] = one.path.map(column => column.values),
-    end = $("whole").checked ? one.last : tickOf(one);
-  let best = ((NEAR * ratio) / scale) ** 2,
-    found = -1;
-  for (let i = 0; i <= end; i++) {
-    const far = (xs[i] - x) ** 2 + (ys[i] - y) ** 2;
-    if (far < best) {
-      best = far;
-      found = i;
-    }
-  }
-  return found;
 }
 function within(points, x, y) {
   let inside = false;

@@ -121,7 +121,6 @@ function onKey(e) {
 function listenToTime() {
   $("play").onclick = () => setPlaying(!playing);
   $("slider").oninput = () => seek(run.time.values[$("slider").value]);
-  $("whole").onchange = () => draw();
   $("before").onclick = () => goToEvent(false);
   $("after").onclick = () => goToEvent(true);
   $("robot").onchange = e => chooseRobot(Number(e.target.value) - 1);
