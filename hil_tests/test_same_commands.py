@@ -5,8 +5,14 @@ from __future__ import annotations
 import pytest
 
 import boebot
-from boebot.record.compare import command_difference, telemetry_difference
-from boebot_course.experiments.same_commands import BRAINS, along_walls, disagreements, judge_walls
+from boebot_course.experiments.same_commands import (
+    BRAINS,
+    along_walls,
+    command_difference,
+    disagreements,
+    judge_walls,
+    telemetry_difference,
+)
 
 pytestmark = pytest.mark.emulated
 

@@ -44,6 +44,9 @@ def main() -> NoReturn:
         code = _interrupted("interrupted", error)  # an import that Ctrl-C cut may end as any other error
     if _is_interrupted(code) and any(not one.daemon for one in set(threading.enumerate()) - others):
         interrupts.leave(interrupts.exit_code())  # a brain's thread may never end
+    if _is_interrupted(code):
+        for number in SIGNALS:  # Python's end takes a while, in which one more would kill it
+            signal.signal(number, signal.SIG_IGN)
     exec("")  # where Ctrl-C fell into an exec of a text, as classes are made by, CPython would end by the signal itself
     sys.exit(code if isinstance(code, int) else 0)
 

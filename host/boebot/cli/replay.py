@@ -14,7 +14,7 @@ import typer
 
 from boebot.cli import ending, options, output, streams
 from boebot.errors import BoebotError
-from boebot.guests import RECORDS, ReadRecord, guests
+from boebot.guests import RECORDS, Guest, ReadRecord, guests
 from boebot.record.reading import CutError
 from boebot.record.run import Run
 from boebot.result import read_run, robots_of
@@ -68,7 +68,7 @@ def replay(
     json: Annotated[bool, typer.Option("--json", help="With --again: print JSON in place of a sentence.")] = False,
 ) -> None:
     """Run a brain on what was sensed in a run, and name the first command that differs; or repeat the run."""
-    _check(context, repeats, brain)
+    _check(context, run, repeats, brain)
     try:
         if repeats:
             _repeat(run, json, trust)
@@ -79,10 +79,15 @@ def replay(
         raise typer.Exit(EXIT_DIFFERS if isinstance(error, CutError) else EXIT_USAGE) from None
 
 
-def _check(context: typer.Context, repeats: bool, brain: str | None) -> None:
+def _foreign(run: Path) -> Guest | None:
+    """Who reads the file, where others than boebot have made it."""
+    return None if run.is_dir() else guests(RECORDS).get(run.suffix[1:].lower())
+
+
+def _check(context: typer.Context, run: Path, repeats: bool, brain: str | None) -> None:
     """Raises a usage error where options of one way stand beside those of the other."""
     if not repeats and brain is None:
-        raise typer.BadParameter("expected --brain BRAIN, or --again", context)
+        raise typer.BadParameter(f"expected --brain BRAIN{', or --again' if _foreign(run) is None else ''}", context)
     others = ("brain", "robot", "kind", "node", "seed") if repeats else ("trust", "json")
     for name in others:
         if context.params[name] not in (None, False):
@@ -94,8 +99,7 @@ def _check(context: typer.Context, repeats: bool, brain: str | None) -> None:
 
 
 def _replay(run: Path, brain: str, robot: int | None, kind: str | None, node: str | None, seed: int | None) -> None:
-    foreign = None if run.is_dir() else guests(RECORDS).get(run.suffix[1:].lower())
-    if foreign is not None:
+    if (foreign := _foreign(run)) is not None:
         if robot is not None:
             raise BoebotError(f"{run} is no record of boebot's; expected --node in place of --robot")
         read: ReadRecord = foreign.load()

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,17 +17,36 @@ from boebot.boards import is_live
 from boebot.brain import Brain
 from boebot.brain.composition import composed
 from boebot.errors import BoebotError, as_utf8
-from boebot.record.compare import EXPECTED, RowDifference, record_difference
+from boebot.record.blocks import Row
 from boebot.record.reading import CutError, attachments_of
 from boebot.record.recording import BEGIN
-from boebot.record.run import why
+from boebot.record.run import Run, why
 from boebot.result import RunResult, read_run
 from boebot.running.hands import Repeated
 from boebot.running.loop import Progress, execute
+from boebot.running.replayed import EXPECTED
 from boebot.running.sources import arena_file, brain_files, write_copies
 from boebot.running.tasks import Member, Request
 
 BEYOND_S = 1.0  # by which the repetition of a record that is cut is longer than it
+_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "waits", "shifts")
+"""Streams whose times are of the transport's clock, or near it."""
+
+
+@dataclass(frozen=True)
+class RowDifference:
+    """Where the records of two runs differ first."""
+
+    stream: str
+    time: float
+    """of the run, in s"""
+    row: int
+    """of the stream, from 0"""
+    what: str
+    """what differs there, in words: of the first record, and of the second"""
+
+    def __str__(self) -> str:
+        return f"stream {self.stream}, {self.time:.4f} s, row {self.row}: {self.what}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,3 +265,33 @@ def _comparable_s(result: RunResult) -> float:
 
 def _end(result: RunResult) -> str:
     return "complete" if result.error is None else why(result.error)
+
+
+def record_difference(one: Run, other: Run, *, is_cut: bool = False, until_s: float = math.inf) -> RowDifference | None:
+    """The first row, in time, that two records do not have in common, bit for bit. `is_cut`: the first record is; what
+    the second one has beyond its end is no difference. `until_s`: of the run; rows from then on do not count."""
+    found = []
+    for stream in sorted(one.record.streams() | other.record.streams()):
+        offset_s = one.clock_offset if stream in _OTHER_CLOCKS else 0.0
+        rows = zip_longest(one.record.each_row(stream), other.record.each_row(stream))
+        for index, (a, b) in enumerate(rows):
+            if a is None and is_cut:
+                break
+            if a != b:
+                time_s = min(row[0] for row in (a, b) if row is not None) - offset_s
+                if time_s >= until_s:
+                    break
+                found.append(RowDifference(stream, time_s, index, _in_words(a, b)))
+                break
+    return min(found, key=lambda difference: difference.time, default=None)
+
+
+def _in_words(one: Row | None, other: Row | None) -> str:
+    if one is None or other is None:
+        return f"only the {'second' if one is None else 'first'} has it"
+    if one[0] != other[0]:
+        return f"its time is {one[0]!r} s and {other[0]!r} s"
+    if len(one[1]) != len(other[1]):
+        return f"it has {len(one[1])} B and {len(other[1])} B"
+    index = next(index for index, (a, b) in enumerate(zip(one[1], other[1], strict=True)) if a != b)
+    return f"its byte {index} is 0x{one[1][index]:02X} and 0x{other[1][index]:02X}"

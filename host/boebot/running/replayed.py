@@ -13,12 +13,14 @@ from boebot.devices.latest import Latest
 from boebot.devices.readings import Readings
 from boebot.errors import BoebotError, BrainError
 from boebot.record.columns import BoardColumns
-from boebot.record.compare import EXPECTED
 from boebot.record.interventions import Hand, interventions
 from boebot.record.run import Run
 from boebot.robot import Command, Observation, Robot
 from boebot.running.brain_parameters import in_force, parameters
 from boebot.running.hands import carry_out
+
+EXPECTED = "expected one with a step of its brain at least"
+"""Of a run that is to be compared: that nothing differs from nothing says nothing."""
 
 
 def replayed(result: Run, brain: object) -> list[Command]:

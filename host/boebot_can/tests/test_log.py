@@ -132,7 +132,8 @@ def test_identity_goes_by_iso_tp_with_its_flow_control(run: RunResult, logs: dic
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs and reports leave no pictures and pages: those take their time, and other tests look at them."""
-    monkeypatch.setattr("boebot.view._draw", lambda folder, files: ([], []))
+    monkeypatch.setattr("boebot.view._write_picture", lambda robots, path, error: path.touch())
+    monkeypatch.setattr("boebot.view._write_page", lambda robots, path: path.touch())
 
 
 def together(folder: Path, *robots: str) -> str:
@@ -241,6 +242,8 @@ def test_first_command_that_differs_is_named(capsys: pytest.CaptureFixture[str],
     result = library.run(brain, seconds=0.5)
     log = str(save_log(result, tmp_path / "can.asc"))
     assert boebot(capsys, "replay", log, "--brain", str(brain)) == (0, "all 10 commands are the same\n", "")
+    code, _, err = boebot(capsys, "replay", log)
+    assert code == 2 and "expected --brain BRAIN" in err and "--again" not in err
     code, out, err = boebot(capsys, "replay", log, "--brain", str(other))
     index, _, left, _ = result.record.steps[6]
     tick, left = Telemetry.unpack(result.record.telemetry[index]).tick, round(left, 4)

@@ -14,6 +14,7 @@ it back, so that the whole of two runs can be compared, and it has no chance, so
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -22,8 +23,11 @@ import boebot
 from boebot.behaviors import Avoid, Wander, Withdraw
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
-from boebot.record.compare import Difference, command_difference, telemetry_difference
+from boebot.errors import BoebotError
+from boebot.link.messages import Telemetry
+from boebot.record.columns import BoardColumns
 from boebot.result import RunResult
+from boebot.robot import Command
 from boebot.running.replayed import replayed
 from boebot_course.experiment import Measured, Outcome, exactly, experiment
 from boebot_course.experiments import wall
@@ -32,6 +36,61 @@ from boebot_course.variants import arena_file
 SECONDS = 20.0
 WALLS_SECONDS = 60.0
 LOOKED_AT = ("infrared", "whiskers")  # what turns both brains aside
+
+
+NOT_SEEN = frozenset(("setpoint_sequence",))
+"""Fields of telemetry that say what the host itself sent, and that no device shows to a brain."""
+
+
+class Difference(NamedTuple):
+    """Where two runs differ first."""
+
+    step: int
+    """of the brain, from 0"""
+    tick: int
+    """of the control ticks since the run began, in the first run"""
+    what: str
+    """"tick", a field of telemetry, or "command\""""
+    first: object
+    """there, in the first run"""
+    second: object
+    """and in the second"""
+
+    def __str__(self) -> str:
+        return f"step {self.step} (tick {self.tick}): {self.what} is {self.first} and {self.second}"
+
+
+def telemetry_difference(one: RunResult, other: RunResult, fields: tuple[str, ...] = ()) -> Difference | None:
+    """The first step at which the brains did not see the same: another tick, or other telemetry.
+
+    Args:
+        one, other: runs on boards.
+        fields: of telemetry, that count, with "tick"; (): all that a brain can see.
+
+    Raises:
+        BoebotError: a run without a board, which has no telemetry.
+    """
+    rows = [_seen(run) for run in (one, other)]
+    for step, (a, b) in enumerate(zip(*rows, strict=False)):
+        for name in a._fields:
+            if (name in fields or (not fields and name not in NOT_SEEN)) and getattr(a, name) != getattr(b, name):
+                return Difference(step, int(one.series.steps[step]), name, getattr(a, name), getattr(b, name))
+    return None
+
+
+def command_difference(one: RunResult, other: RunResult) -> Difference | None:
+    """The first step at which the brains did not command the same."""
+    for step, (a, b) in enumerate(zip(one.record.steps, other.record.steps, strict=False)):
+        if a[1:] != b[1:]:
+            return Difference(step, a[0], "command", Command(*a[1:]), Command(*b[1:]))
+    return None
+
+
+def _seen(run: RunResult) -> list[Telemetry]:
+    if run.layout is not None:
+        raise BoebotError(f"robot {run.robot.name!r} has no board, and no telemetry to compare")
+    assert isinstance(run.series, BoardColumns)
+    return [run.series.telemetry(index) for index in run.series.steps.tolist()]
 
 
 def composed() -> Brain:

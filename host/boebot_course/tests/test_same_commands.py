@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 import boebot
-from boebot.record.compare import command_difference, telemetry_difference
 from boebot.running.replayed import replayed
-from boebot_course.experiments.same_commands import composed, disagreements
+from boebot_course.experiments.same_commands import command_difference, composed, disagreements, telemetry_difference
 
 
 def test_runs_that_are_the_same_have_no_difference_and_others_say_where() -> None:

@@ -100,6 +100,23 @@ def test_the_first_one_leaves_a_whole_record_of_several_robots_too(tmp_path: Pat
     assert (tmp_path / "out" / "run.png").is_file() and (tmp_path / "out" / "robot-2" / "summary.json").is_file()
 
 
+ENDS_SLOWLY = """import os, time
+class Slow:
+    def __del__(self, wait=time.sleep, write=os.write):
+        write(2, b"going\\n")
+        wait(2)
+slow = Slow()
+"""
+
+
+def test_a_second_one_while_python_ends_changes_no_exit_code(tmp_path: Path) -> None:
+    process = begun(tmp_path, ENDS_SLOWLY + HEEDS)
+    process.send_signal(signal.SIGINT)
+    assert process.stderr is not None
+    assert [process.stderr.readline() for _ in range(2)] == ["boebot: interrupted\n", "going\n"]
+    assert end(process, [signal.SIGINT])[0] == 130
+
+
 def test_a_brain_that_has_caught_it_ends_with_its_step(tmp_path: Path) -> None:
     code, _, err = end(begun(tmp_path, GOES_ON), [signal.SIGINT])
     assert (code, err) == (130, "boebot: interrupted\n")
