@@ -320,6 +320,10 @@ def checked(table: dict[str, Any], place: str) -> Schema:
         _, _, _, least, greatest = INTEGERS[parameter.type]
         if not least <= parameter.min < parameter.max <= greatest:
             raise ValueError(f"parameter {parameter.name}: {parameter.min} to {parameter.max} is no range of its type")
+        if not (parameter.min < 0 if parameter.type == "i16" else parameter.min < 2**15):
+            raise ValueError(f"parameter {parameter.name}: the firmware tells the types apart by the minimum's sign")
+        if parameter.default is not None and not parameter.min <= parameter.default <= parameter.max:
+            raise ValueError(f"parameter {parameter.name}: its default is not within its range")
     return schema
 
 

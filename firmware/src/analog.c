@@ -8,7 +8,6 @@
 #include "tasks.h"
 
 #define SETTLE_CYCLES (200u * HAL_CYCLES_PER_US) /* bandgap 70 us, and the sampling capacitor (24.6, 28.8) */
-#define AGE_NEVER 255u
 #define FIRST_ANALOG_PIN 14u
 
 #ifdef PIN_BATTERY
@@ -93,8 +92,8 @@ static void grow_older(uint8_t device) {
   if (!is_on(device)) {
     ages[device] = AGE_NEVER;
     results[device] = 0;
-  } else if (ages[device] < AGE_NEVER) {
-    ages[device]++;
+  } else {
+    clock_grow_older(&ages[device]);
   }
 }
 

@@ -27,8 +27,7 @@ static void connect(bool connected) {
   }
   is_connected = connected;
   if (connected) {
-    HAL_PIN_LOW(BUZZER);
-    HAL_PIN_OUTPUT(BUZZER);
+    HAL_PIN_OUTPUT_LOW(BUZZER);
   } else {
     HAL_PIN_PULL_UP(BUZZER);
   }

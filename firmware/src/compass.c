@@ -3,6 +3,7 @@
 
 #include <stdbool.h>
 
+#include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"
 #include "parameters.h"
@@ -10,7 +11,6 @@
 #include "two_wire.h"
 
 #define ADDRESS 0x1Eu
-#define AGE_NEVER 255u
 #define PERIOD 4u       /* ticks */
 #define CLOCK_PULSES 9u /* a byte and its acknowledgement: no device holds the data line longer */
 
@@ -109,8 +109,7 @@ static void free_bus(void) {
       own.state = WAITING;
       return;
     }
-    HAL_PIN_LOW(COMPASS_SCL);
-    HAL_PIN_OUTPUT(COMPASS_SCL);
+    HAL_PIN_OUTPUT_LOW(COMPASS_SCL);
   } else {
     HAL_PIN_PULL_UP(COMPASS_SCL);
   }
@@ -126,9 +125,7 @@ static void switch_off(void) {
 
 /* Once per tick. */
 void compass_task(void) {
-  if (own.reading.age < AGE_NEVER) {
-    own.reading.age++;
-  }
+  clock_grow_older(&own.reading.age);
   if (own.wait > 0) {
     own.wait--;
   }

@@ -15,7 +15,6 @@
 /* Half a period in cycles: 37.91, 39.02, 40.00, 41.03, 42.11 kHz. */
 #define BANDS 5u
 static const uint8_t half_periods[BANDS] = {211, 205, 200, 195, 190};
-#define AGE_NEVER 255u
 
 typedef struct {
   /* Shared with the interrupts; single bytes. */
@@ -117,12 +116,8 @@ void infrared_task(void) {
     own.started = false;
     take(seen());
   }
-  if (own.age < AGE_NEVER) {
-    own.age++;
-  }
-  if (own.zone_age < AGE_NEVER) {
-    own.zone_age++;
-  }
+  clock_grow_older(&own.age);
+  clock_grow_older(&own.zone_age);
   if (own.wait > 0) {
     own.wait--;
   }

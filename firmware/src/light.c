@@ -26,8 +26,6 @@ _Static_assert(
     (COLLECT - RELEASE) * (uint32_t)HAL_SLOT_CYCLES >= (LIGHT_LONGEST + 1000u) * (uint32_t)HAL_CYCLES_PER_US,
     "the longest decay ends before the slot that collects, if the release is at most 1 ms late; else slot 7 collects");
 
-#define AGE_NEVER 255u
-
 static enum { IDLE, CHARGING, DECAYING } state;
 static uint32_t released[SIDES];      /* clock_now() */
 static volatile uint32_t edge[SIDES]; /* the same of the fall */
@@ -91,12 +89,10 @@ void port_d_on_change(uint16_t time) {
 
 static void charge(void) {
 #ifdef PIN_LIGHT_LEFT
-  HAL_PIN_HIGH(LIGHT_LEFT);
-  HAL_PIN_OUTPUT(LIGHT_LEFT);
+  HAL_PIN_OUTPUT_HIGH(LIGHT_LEFT);
 #endif
 #ifdef PIN_LIGHT_RIGHT
-  HAL_PIN_HIGH(LIGHT_RIGHT);
-  HAL_PIN_OUTPUT(LIGHT_RIGHT);
+  HAL_PIN_OUTPUT_HIGH(LIGHT_RIGHT);
 #endif
   has_fallen[LEFT] = has_fallen[RIGHT] = false;
   state = CHARGING;
@@ -160,8 +156,8 @@ static void collect(void) {
 /* In every slot. */
 void light_task(void) {
   const uint8_t slot = clock_frame_slot();
-  if (clock_tick_begins() && age < AGE_NEVER) {
-    age++;
+  if (clock_tick_begins()) {
+    clock_grow_older(&age);
   }
   if (!parameters_device_in_use(DEVICES_LIGHT)) {
     if (state != IDLE) {

@@ -16,7 +16,6 @@ enum { SENSOR_LEFT, SENSOR_MIDDLE, SENSOR_RIGHT, SENSORS };
 enum { CHARGE = 7, RELEASE = 0, COLLECT = 6 }; /* slots of a servo frame */
 
 #define LONGEST MSG_LINE_TELEMETRY_LINE_LEFT_MAX /* us */
-#define AGE_NEVER 255u
 
 static enum { IDLE, CHARGING, DECAYING } state;
 static uint32_t released;                /* clock_now() */
@@ -44,12 +43,9 @@ void line_start(void) {
 }
 
 static void charge(void) {
-  HAL_PIN_HIGH(LINE_LEFT);
-  HAL_PIN_OUTPUT(LINE_LEFT);
-  HAL_PIN_HIGH(LINE_MIDDLE);
-  HAL_PIN_OUTPUT(LINE_MIDDLE);
-  HAL_PIN_HIGH(LINE_RIGHT);
-  HAL_PIN_OUTPUT(LINE_RIGHT);
+  HAL_PIN_OUTPUT_HIGH(LINE_LEFT);
+  HAL_PIN_OUTPUT_HIGH(LINE_MIDDLE);
+  HAL_PIN_OUTPUT_HIGH(LINE_RIGHT);
   has_fallen[SENSOR_LEFT] = has_fallen[SENSOR_MIDDLE] = has_fallen[SENSOR_RIGHT] = false;
   state = CHARGING;
 }
@@ -100,8 +96,8 @@ static void collect(void) {
 /* In every slot. A line that is still high may fall until the longest decay is over. */
 void line_task(void) {
   const uint8_t slot = clock_frame_slot();
-  if (clock_tick_begins() && age < AGE_NEVER) {
-    age++;
+  if (clock_tick_begins()) {
+    clock_grow_older(&age);
   }
   const bool is_over = state == DECAYING && clock_now() - released >= LONGEST * (uint32_t)HAL_CYCLES_PER_US;
   if (!parameters_device_in_use(DEVICES_LINE)) {

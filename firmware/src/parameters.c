@@ -25,23 +25,6 @@ HAL_TABLE uint16_t initials[PARAMETER_COUNT] = {PARAMETER_LIST(INITIAL)};
 HAL_TABLE uint16_t baud_rates[] = {96, 192, 384, 576, 1152, 2500, 5000, 10000};
 #define BAUD_RATES (sizeof baud_rates / sizeof *baud_rates)
 
-#define LIMIT_MIN_u16 0
-#define LIMIT_MIN_MAX_u16 INT16_MAX
-#define LIMIT_MAX_u16 UINT16_MAX
-#define LIMIT_MIN_i16 INT16_MIN
-#define LIMIT_MIN_MAX_i16 (-1)
-#define LIMIT_MAX_i16 INT16_MAX
-#define WITHIN(name, type, minimum, maximum, initial)                                                                 \
-  _Static_assert((initial) >= (minimum) && (initial) <= (maximum), "default of " #name);                              \
-  _Static_assert((minimum) >= LIMIT_MIN_##type && (minimum) <= LIMIT_MIN_MAX_##type && (maximum) <= LIMIT_MAX_##type, \
-                 "type of " #name);
-PARAMETER_LIST(WITHIN)
-#undef WITHIN
-#define HAS_PINS(name, first) \
-  _Static_assert((DEFAULT_##name & ~(DEVICES_BUILT >> (first))) == 0, "the robot switches on a device without pins");
-DEVICES_LIST(HAS_PINS)
-#undef HAS_PINS
-
 static uint16_t values[PARAMETER_COUNT];
 static bool has_host_come; /* since the start */
 

@@ -11,8 +11,7 @@
 #include "tasks.h"
 
 #define GIVE_UP_TICKS 2u /* 20 ms after the trigger: the sensor ends its pulse 19.3 ms after it at the latest */
-#define AGE_NEVER 255u
-#define AGE_UNIT 256u /* cycles; a tick has TICK_UNITS of them, so that 16 bits are divided */
+#define AGE_UNIT 256u    /* cycles; a tick has TICK_UNITS of them, so that 16 bits are divided */
 #define TICK_UNITS ((uint16_t)(HAL_SLOT_CYCLES * (uint32_t)CLOCK_SLOTS_PER_TICK / AGE_UNIT))
 /* The sensor raises the line 750 us after the trigger (its manual gives no tolerance). An edge more than 2 % sooner, or more
  * than twice as late, is noise: a board that hears noise for an echo is worse than one that hears none. */
@@ -52,15 +51,28 @@ static void pull_up(void) {
 }
 
 static void hold_low(void) {
-  HAL_PIN_LOW(PING);
-  HAL_PIN_OUTPUT(PING);
+  HAL_PIN_OUTPUT_LOW(PING);
   is_held_low = true;
+}
+
+/* The sensor wants a pulse of 2 us at least; interrupts may make it longer. */
+static void begin_pulse(void) {
+  HAL_PIN_OUTPUT_LOW(PING);
+  HAL_PIN_HIGH(PING);
+  hal_wait(5u * HAL_CYCLES_PER_US);
+}
+
+static void end_pulse(void) {
+  HAL_PIN_LOW(PING);
+  HAL_PIN_INPUT(PING);
 }
 
 static bool is_low(void) { return HAL_PIN_READ(PING) == 0; }
 #else /* a map without a Ping, which cannot be switched on */
 static void pull_up(void) {}
 static void hold_low(void) {}
+static void begin_pulse(void) {}
+static void end_pulse(void) {}
 static bool is_low(void) { return false; }
 #endif
 
@@ -126,9 +138,7 @@ void ping_echo_task(void) {
   if (state >= ENDED) {
     take();
   }
-  if (age < AGE_NEVER) {
-    age++;
-  }
+  clock_grow_older(&age);
   if (!parameters_device_in_use(DEVICES_PING)) {
     status = PING_STATUS_OFF;
     echo = 0;
@@ -157,9 +167,9 @@ static void trigger(void) {
   since_trigger = 0;
   noise_left = NOISE_MAX;
   is_held_low = false;
-  hal_ping_raise();
+  begin_pulse();
   HAL_ATOMIC { /* the sensor counts from the pulse's end, and so does HOLD_OFF: no interrupt in between */
-    hal_ping_release();
+    end_pulse();
     triggered_cycles = clock_now();
     triggered = (uint16_t)triggered_cycles;
     trigger_slot = clock_slot;

@@ -30,8 +30,7 @@ void servo_start(void) {
 
 void servo_connect_turret(bool connected) {
   if (connected) {
-    HAL_PIN_LOW(TURRET);
-    HAL_PIN_OUTPUT(TURRET);
+    HAL_PIN_OUTPUT_LOW(TURRET);
   } else {
     HAL_PIN_PULL_UP(TURRET);
   }

@@ -30,6 +30,12 @@
 #include "hal/native/hal_native.h"
 #endif
 
+/* ---- pins ---- */
+
+/* HAL_PIN_...(name), of a pin of pins.h: HIGH, LOW, TOGGLE; OUTPUT, INPUT (without pull-up), PULL_UP; READ. */
+#define HAL_PIN_OUTPUT_LOW(name) (HAL_PIN_LOW(name), HAL_PIN_OUTPUT(name))
+#define HAL_PIN_OUTPUT_HIGH(name) (HAL_PIN_HIGH(name), HAL_PIN_OUTPUT(name))
+
 /* ---- start and reset ---- */
 
 /* Starts time and slots: the first slot begins at HAL_SLOT_CYCLES. Interrupts are on from here. */
@@ -60,6 +66,7 @@ uint32_t hal_image_hash(void);
 /* bool hal_sleeps(void): whether the chip can sleep; where it cannot, the main loop goes round without.
  * void hal_sleep(void): with interrupts off: sleeps, lets one that waits run, and returns with interrupts off again.
  * uint16_t hal_time(void): the count. In an interrupt or HAL_ATOMIC.
+ * void hal_wait(uint16_t cycles): waits, a constant; interrupts come on top.
  * void hal_slot_arm(uint16_t time): when the next slot begins.
  * void hal_edge_arm(uint16_t time): servo_on_edge() comes HAL_EDGE_LEAD cycles before `time`.
  * void hal_edge_disarm(void): it comes no more.
@@ -117,11 +124,6 @@ bool hal_burst_seen(uint8_t side);
 enum { HAL_TONE_BY_8 = 2, HAL_TONE_BY_64, HAL_TONE_BY_256, HAL_TONE_BY_1024 };
 void hal_tone_start(uint8_t clock, uint8_t count);
 void hal_tone_stop(void);
-
-/* The trigger's pulse on the pin named PING, if there is one: raise returns 5 us after the rise, release ends the pulse and
- * leaves the pin an input; hal_capture_start() comes next. */
-void hal_ping_raise(void);
-void hal_ping_release(void);
 
 /* The analog converter: selects channel 0..5 (A0..A5) or the chip's bandgap, converts (104 us, the first time 200); the last
  * complete result is voltage * 1024 / supply, rounded down, at most 1023. No channel is selected while it is busy. */

@@ -46,6 +46,8 @@ static inline void hal_table_copy(void *to, const void *from, uint8_t size) { me
 /* The two halves of the count share a latch, so that nobody may come in between. */
 HAL_INLINE uint16_t hal_time(void) { return TCNT1; }
 
+#define hal_wait(cycles) __builtin_avr_delay_cycles(cycles)
+
 HAL_INLINE void hal_slot_arm(uint16_t time) { OCR1B = time; }
 
 /* In QEMU no SLEEP ends; there SMCR keeps nothing that is written to it. */

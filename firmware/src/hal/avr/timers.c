@@ -1,4 +1,4 @@
-/* timers.c: Timer1, which is the board's time, and the Ping's trigger. */
+/* timers.c: Timer1, which is the board's time. */
 #include "hal/hal.h"
 
 #if F_CPU != 16000000UL
@@ -16,21 +16,4 @@ void hal_start_timers(void) {
   TIMSK1 = _BV(OCIE1B);
   TCCR1B = _BV(CS10);
   sei();
-}
-
-/* The sensor wants 2 us at least; interrupts may make the pulse longer. */
-void hal_ping_raise(void) {
-#ifdef PIN_PING
-  HAL_PIN_LOW(PING);
-  HAL_PIN_OUTPUT(PING);
-  HAL_PIN_HIGH(PING);
-  __builtin_avr_delay_cycles(5u * HAL_CYCLES_PER_US);
-#endif
-}
-
-void hal_ping_release(void) {
-#ifdef PIN_PING
-  HAL_PIN_LOW(PING);
-  HAL_PIN_INPUT(PING);
-#endif
 }

@@ -15,6 +15,8 @@ void hal_start_timers(void) {
   native_next[EVENT_SLOT] = epoch + HAL_SLOT_CYCLES;
 }
 
+void hal_wait(uint16_t cycles) { native->now += cycles; }
+
 /* The cycle at which the count will be `time` next. */
 static uint64_t cycle_of(uint16_t time) {
   const uint16_t ahead = (uint16_t)(time - hal_time());

@@ -1,9 +1,8 @@
-/* devices_native.c: what the chip does for devices: IR carrier, Ping trigger and capture, tone, analog converter. */
+/* devices_native.c: what the chip does for devices: IR carrier, tone, analog converter. */
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 #include "hal/native/events.h"
 
-#define PING_TRIGGER_CYCLES (5u * HAL_CYCLES_PER_US)
 #define CONVERSION_CYCLES (104u * HAL_CYCLES_PER_US) /* 13 cycles of 125 kHz */
 #define NOMINAL_VOLTS 5.0
 #define BAND_GAP_VOLTS 1.1
@@ -41,24 +40,6 @@ void native_carrier_toggle(void) {
     receiver_high[carrier_side] =
         carrier_side == LEFT ? HAL_PIN_READ(INFRARED_LEFT_RECEIVER) : HAL_PIN_READ(INFRARED_RIGHT_RECEIVER);
   }
-}
-
-/* ---- Ping ---- */
-
-void hal_ping_raise(void) {
-#ifdef PIN_PING
-  HAL_PIN_LOW(PING);
-  HAL_PIN_OUTPUT(PING);
-  HAL_PIN_HIGH(PING);
-  native->now += PING_TRIGGER_CYCLES;
-#endif
-}
-
-void hal_ping_release(void) {
-#ifdef PIN_PING
-  HAL_PIN_LOW(PING);
-  HAL_PIN_INPUT(PING);
-#endif
 }
 
 /* ---- buzzer ---- */

@@ -33,6 +33,7 @@ void hal_native_toggle(uint8_t pin);
 #define HAL_PIN_READ(name) ((uint8_t)((unsigned)name##_PINR >> name##_BIT & 1u))
 
 uint16_t hal_time(void);
+void hal_wait(uint16_t cycles);
 void hal_slot_arm(uint16_t time);
 void hal_edge_arm(uint16_t time);
 void hal_edge_disarm(void);
