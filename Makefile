@@ -77,7 +77,7 @@ soak: experiments
 	@failed=0; for seed in $(SEEDS); do echo "Experiments at seed $$seed"; \
 	  $(VENV)/bin/boebot experiment --all --seed $$seed --out build/experiments/seed-$$seed || failed=1; done; exit $$failed
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
-	@$(PYTHON_VENV) -m tools.other_emulators
+	@$(PYTHON_VENV) -m tools.qemu
 	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
 	@PYTHONMALLOC=malloc tools/test_sanitized.sh all
 	@tools/pio test -e native_quad
@@ -175,7 +175,7 @@ check-generated:
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
-ready-bench: ready-test build/avr8js/.done build/mcap-core/.done
+ready-bench: ready-test build/mcap-core/.done
 ready-soak: ready-bench build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
@@ -226,10 +226,6 @@ build/wheelhouse/.done: $(DECLARED) | $(VENV)/.done-test
 
 build/simavr/.done: tools/fetch_simavr.py build/.done-system-run
 	@$$(tools/find_python.sh) tools/fetch_simavr.py
-	@touch $@
-
-build/avr8js/.done: tools/fetch_avr8js.py tools/tests/calibration/avr8js.py $(VENV)/.done-bench
-	@$(PYTHON_VENV) -m tools.fetch_avr8js
 	@touch $@
 
 # Another program's reader of records (host/tests/record/test_blocks.py), with the hashes of its lock file.

@@ -20,7 +20,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from sim_bridge.serve import serve
 from tools.tests.calibration import __main__ as command
-from tools.tests.calibration import avr8js, board, emulator, table
+from tools.tests.calibration import board, emulator, table
 from tools.tests.calibration.emulator import Measured
 from tools.tests.calibration.program import ROWS, image, name
 from tools.tests.calibration.talk import Talk, at_pin
@@ -124,42 +124,19 @@ def test_talk_cut_anywhere_is_understood_and_says_what_it_awaits() -> None:
 
 
 def test_page_is_what_the_command_writes() -> None:
-    """But for the avr8js's column, which only the bench can measure, and for phases that the data sheet leaves open."""
+    """But for phases that the data sheet leaves open."""
     text = PAGE.read_text(encoding="utf-8")
     _, _, *found = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
     there = {row[0]: row for row in found}
-    assert f"of {len(ROWS)} rows: emulator {len(ROWS)}, " in text and len(there) == len(found)
+    assert f"of {len(ROWS)} rows: emulator {len(ROWS)}." in text and len(there) == len(found)
     for index, row in enumerate(ROWS):
         if row.group == "Instructions" and row.what not in there:
             continue
         what, unit, expected, where, emulated, *_ = table.cells(table.Calibration(measured()), index)
-        *said, ours, theirs = there.pop(what)
+        *said, ours = there.pop(what)
         assert said == [what, f"{expected} {unit}", where]
         assert ours == emulated or (isinstance(row.expected, tuple) and row.is_right(int(ours)))
-        assert re.fullmatch(r"–|-?\d+(, at the pin (–|-?\d+))?(: wrong)?", theirs), "no column of avr8js"
     assert not there
-
-
-# ---- avr8js ----
-
-
-def test_avr8js_that_is_missing_is_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(avr8js, "FOLDER", tmp_path / "nothing")
-    assert avr8js.measure() is None
-    assert table.cells(table.Calibration(measured()), 0)[5:] == ["not installed", "not connected"]
-
-
-@pytest.mark.skipif(not avr8js.is_installed(), reason="avr8js comes with make bench")
-def test_avr8js_agrees_on_instructions() -> None:
-    """All but CBI, which takes 1 cycle there."""
-    theirs = avr8js.measure()
-    assert theirs is not None
-    differing = [
-        row.what
-        for row, right in zip(ROWS, table.right_rows(theirs), strict=True)
-        if row.group == "Instructions" and not right
-    ]
-    assert differing == ["CBI A,b"]
 
 
 # ---- a board on a port ----
@@ -202,13 +179,10 @@ def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return recorded
 
 
-def test_board_on_a_port(
-    tmp_path: Path, avrdude: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_board_on_a_port(tmp_path: Path, avrdude: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Flashing is replaced; the rest is real: a port, an emulated Shield-Bot behind it, its answers."""
     elf = tmp_path / "calibration.elf"
     elf.write_bytes(image())
-    monkeypatch.setattr(avr8js, "FOLDER", tmp_path / "nothing")
     with served(elf) as port:
         assert command.main(["--port", port]) == 0
     arguments, program = json.loads(avrdude.read_text(encoding="utf-8"))

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +18,11 @@ import boebot
 from boebot.record.reading import attachments_of
 from boebot.record.record_file import RecordReader
 from boebot.record.run_folder import RECORD
-from tools.tests.calibration.avr8js import find_tool
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = ROOT / "build" / "mcap-core"  # from package-lock.json in mcap_core
 READER = Path(__file__).parents[1] / "mcap_core" / "read_record.cjs"
-NODE = find_tool("node")
+NODE = shutil.which("node", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}")
 pytestmark = pytest.mark.skipif(
     NODE is None or not (PACKAGES / "node_modules").is_dir(), reason="@mcap/core comes with make bench"
 )

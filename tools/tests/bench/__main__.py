@@ -25,17 +25,7 @@ from tools.tests.bench.figures import FIGURES, Figure
 
 RESULT = Path("build/bench.json")
 MODULES = (
-    "codec",
-    "round_trip",
-    "speed",
-    "record",
-    "live",
-    "can_bus",
-    "world",
-    "navigation",
-    "precision",
-    "calibration",
-    "timing",
+    *("codec", "round_trip", "speed", "record", "live", "can_bus", "world", "navigation", "precision", "timing"),
     "setup_time",
 )
 

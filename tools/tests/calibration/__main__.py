@@ -14,7 +14,7 @@ from rich.console import Console
 
 from boebot.errors import BoebotError
 from tools.printed import reprint
-from tools.tests.calibration import avr8js, board, emulator, table
+from tools.tests.calibration import board, emulator, table
 
 
 def measured(port: str | None, flash: bool) -> table.Calibration:
@@ -27,10 +27,7 @@ def measured(port: str | None, flash: bool) -> table.Calibration:
                 board.flash(port)
             real = board.listen(port, lambda awaited: status.update(f"{port}: {awaited}"))
         status.update("emulator")
-        ours = emulator.measure()
-        status.update("avr8js")
-        theirs = avr8js.measure()
-    return table.Calibration(ours, theirs, real)
+        return table.Calibration(emulator.measure(), real)
 
 
 def main(arguments: list[str]) -> int:

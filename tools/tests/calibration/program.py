@@ -45,26 +45,17 @@ def image() -> bytes:
         return elf.read_bytes()
 
 
-def flash_bytes() -> bytes:
-    """What lies in flash from address 0 on.
+def flash_hex() -> str:
+    """What lies in flash, as an Intel hex file.
 
     Raises:
         BoardError: avr-objcopy is missing or fails.
     """
-    return _converted("binary")
-
-
-def flash_hex() -> str:
-    """The same as an Intel hex file. Raises as `flash_bytes`."""
-    return _converted("ihex").decode("ascii")
-
-
-def _converted(to: str) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         elf, converted = Path(folder, "calibration.elf"), Path(folder, "calibration.out")
         elf.write_bytes(image())
-        _run(["avr-objcopy", "-O", to, str(elf), str(converted)], "takes the program out of its ELF file")
-        return converted.read_bytes()
+        _run(["avr-objcopy", "-O", "ihex", str(elf), str(converted)], "takes the program out of its ELF file")
+        return converted.read_text(encoding="ascii")
 
 
 def _run(command: list[str], purpose: str) -> None:

@@ -1,4 +1,4 @@
-"""The calibration's table: what the data sheet says beside what each emulator and the board measured."""
+"""The calibration's table: what the data sheet says beside what the emulator and the board measured."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from tools.tests.calibration.emulator import Measured
 from tools.tests.calibration.program import ROWS
 from tools.tests.calibration.rows import Row
 
-COLUMNS = ("what", "unit", "data sheet", "where", "emulator", "avr8js", "board")
-NOT_CONNECTED, NOT_INSTALLED, NOT_REACHED = "not connected", "not installed", "–"
-PAGE_COLUMNS = ("what", "data sheet", "where", "emulator", "avr8js")
+COLUMNS = ("what", "unit", "data sheet", "where", "emulator", "board")
+NOT_CONNECTED, NOT_REACHED = "not connected", "–"
+PAGE_COLUMNS = ("what", "data sheet", "where", "emulator")
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was measured. `avr8js` and `board` are None where there was none."""
+    """What was measured; `board` is None where there was none."""
 
     emulator: Measured
-    avr8js: Measured | None = None
     board: list[int | None] | None = None
 
 
@@ -54,7 +53,7 @@ def wrong_rows(result: Calibration) -> list[str]:
 
 
 def _both(row: Row, by_program: int | None, by_pin: int | None) -> str:
-    """One emulator's cell."""
+    """The emulator's cell."""
     if by_program is None:
         return NOT_REACHED
     text = str(by_program)
@@ -74,20 +73,15 @@ def _of_board(row: Row, value: int | None) -> str:
 def cells(result: Calibration, index: int) -> list[str]:
     """One row's text by COLUMNS."""
     row = ROWS[index]
-
-    def measured(by: Measured | None) -> str:
-        return NOT_INSTALLED if by is None else _both(row, by.by_program[index], by.by_pin[index])
-
-    emulator = measured(result.emulator) + (f"; known: {row.difference}" if row.difference else "")
+    emulator = _both(row, result.emulator.by_program[index], result.emulator.by_pin[index])
+    emulator += f"; known: {row.difference}" if row.difference else ""
     board = NOT_CONNECTED if result.board is None else _of_board(row, result.board[index])
-    return [row.what, row.unit, row.expected_text, row.source, emulator, measured(result.avr8js), board]
+    return [row.what, row.unit, row.expected_text, row.source, emulator, board]
 
 
 def summary(result: Calibration) -> str:
     """How many rows are right."""
     parts = [f"emulator {sum(right_rows(result.emulator))}"]
-    if result.avr8js is not None:
-        parts.append(f"avr8js {sum(right_rows(result.avr8js))}")
     if result.board is not None:
         judged = [(row, value) for row, value in zip(ROWS, result.board, strict=True) if not row.board_only_shown]
         right = sum(value is not None and row.is_right(value) for row, value in judged)
@@ -109,10 +103,10 @@ def table(result: Calibration) -> Table:
 
 
 def printed(result: Calibration) -> str:
-    """What stands on the documentation's page: the emulators; of instructions only what is wrong somewhere."""
+    """What stands on the documentation's page: the emulator; of instructions only what is wrong somewhere."""
     rows = []
     for index, row in enumerate(ROWS):
-        what, unit, expected, where, *measured = cells(result, index)[:-1]
-        if row.group != "Instructions" or any(cell.endswith(": wrong") for cell in measured):
-            rows.append([what, f"{expected} {unit}", where, *measured])
+        what, unit, expected, where, measured = cells(result, index)[:-1]
+        if row.group != "Instructions" or measured.endswith(": wrong"):
+            rows.append([what, f"{expected} {unit}", where, measured])
     return f"{summary(result)}\n\n{markdown(PAGE_COLUMNS, rows)}"

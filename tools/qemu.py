@@ -1,8 +1,8 @@
-"""The firmware's images in emulators of other authors: each says hello and answers `identify`, and no more is asked.
+"""The firmware's images in QEMU, an emulator of other authors: each says hello and answers `identify`, and no more is
+asked.
 
-`python -m tools.other_emulators [IMAGE.elf ...]`; `make soak` does it with all images. QEMU 7.2 (Debian:
-qemu-system-misc) has no Timer2, pin changes, EEPROM, converter or watchdog, and its SLEEP never ends; avr8js has no
-input capture.
+`python -m tools.qemu [IMAGE.elf ...]`; `make soak` does it with all images. QEMU 7.2 (Debian: qemu-system-misc) has no
+Timer2, pin changes, EEPROM, converter or watchdog, and its SLEEP never ends.
 """
 
 from __future__ import annotations
@@ -19,9 +19,7 @@ from pathlib import Path
 from avr_timing.closed_pipe import exit_as
 from boebot.link import frame, messages
 from tools.avr_program import IMAGES, ROOT
-from tools.tests.calibration.avr8js import FOLDER, find_tool
 
-AVR8JS = Path(__file__).with_name("avr8js_serial.js")
 QEMU = ["qemu-system-avr", "-M", "uno", "-nographic", "-monitor", "none", "-serial", "stdio", "-bios"]
 WAIT_S = 30.0
 HELLOS = 2  # before it is asked: the first comes at the start, the next one from the main loop
@@ -31,22 +29,16 @@ class SilentError(Exception):
     """The image did not say what it should; the text says what was heard."""
 
 
-def command(emulator: str, elf: Path, binary: Path) -> list[str]:
-    """Runs the image with its serial line at the command's input and output."""
-    if emulator == "qemu":
-        return [*QEMU, str(elf)]
-    return [find_tool("node") or "node", str(AVR8JS), str(FOLDER), str(binary)]
-
-
-def identity(line: list[str]) -> messages.Identity:
-    """What the image says of itself.
+def identity(elf: Path) -> messages.Identity:
+    """What an image says of itself; its serial line is the emulator's input and output.
 
     Raises:
         SilentError: no hello, or no identity.
-        OSError: the emulator is not there.
+        OSError: QEMU is not there.
     """
     decoder, hellos = frame.Decoder(), 0
-    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+    command = [*QEMU, str(elf)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         assert process.stdin is not None and process.stdout is not None
         try:
             end = time.monotonic() + WAIT_S
@@ -66,7 +58,7 @@ def identity(line: list[str]) -> messages.Identity:
     raise SilentError(f"no identity within {WAIT_S:g} s, after {hellos} hellos")
 
 
-def check(emulator: str, elf: Path) -> str:
+def check(elf: Path) -> str:
     """One line about the answer.
 
     Raises:
@@ -76,7 +68,7 @@ def check(emulator: str, elf: Path) -> str:
         binary = Path(folder, "image.bin")
         subprocess.run(["avr-objcopy", "-O", "binary", str(elf), str(binary)], check=True)
         begun = time.monotonic()
-        answer = identity(command(emulator, elf, binary))
+        answer = identity(elf)
         size, crc = binary.stat().st_size, zlib.crc32(binary.read_bytes())
     if (answer.image_size, answer.image_hash) != (size, crc):
         raise SilentError(f"it says {answer.image_size} B, {answer.image_hash:08x}; the image has {size} B, {crc:08x}")
@@ -85,25 +77,17 @@ def check(emulator: str, elf: Path) -> str:
 
 
 def main() -> int:
-    """Asks each image in each emulator."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tools.other_emulators", description=(__doc__ or "").splitlines()[0]
-    )
-    parser.add_argument(
-        "images",
-        nargs="*",
-        type=Path,
-        default=[ROOT / "build" / "images" / f"{name}.elf" for name in IMAGES],
-        metavar="IMAGE.elf",
-    )
+    """Asks each image."""
+    built = [ROOT / "build" / "images" / f"{name}.elf" for name in IMAGES]
+    parser = argparse.ArgumentParser(prog="python -m tools.qemu", description=(__doc__ or "").split(":")[0])
+    parser.add_argument("images", nargs="*", type=Path, default=built, metavar="IMAGE.elf")
     failed = 0
     for elf in parser.parse_args().images:
-        for emulator in ("qemu", "avr8js"):
-            try:
-                said = check(emulator, elf)
-            except (SilentError, OSError, subprocess.CalledProcessError) as error:
-                said, failed = f"FAILED: {error}", 1
-            print(f"{elf.name} in {emulator}: {said}")
+        try:
+            said = check(elf)
+        except (SilentError, OSError, subprocess.CalledProcessError) as error:
+            said, failed = f"FAILED: {error}", 1
+        print(f"{elf.name} in QEMU: {said}")
     return failed
 
 
