@@ -14,12 +14,11 @@ import json
 import os
 import resource
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
-
-from avr_timing.closed_pipe import exit_as
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRMWARE = ROOT / "firmware" / "src"
@@ -194,4 +193,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    exit_as(main)
+    sys.exit(main())

@@ -3,8 +3,7 @@
     python -m tools.live_pictures
 
 Writes docs/images/live.gif, in which the pointer drags the robot once, and docs/images/live-*.png. It needs Chromium
-and playwright (the extra `browser`). The film's comment says what was done to the run and what came of it, so that a
-simulated run with the same interventions shows whether the film is still one of this kit (docs/tests/test_docs.py).
+and playwright (the extra `browser`).
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from __future__ import annotations
 import base64
 import contextlib
 import io
-import json
 import os
 import re
 import shutil
@@ -26,13 +24,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from PIL import Image
-
-from boebot.record.interventions import STREAM
-from boebot.record.record import Record
-from boebot.result import RunResult, read_run
-from boebot.running.hands import Repeated
-from boebot.running.loop import execute
-from boebot.running.tasks import Request
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -55,7 +46,6 @@ LONGEST_S = 60.0  # of waiting
 SEVERAL = re.compile(r"^```python\n(# two\.py:.*?)^```$", re.MULTILINE | re.DOTALL)
 """The README's brain of several behaviors."""
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")  # where no browser is to open by itself
-FIGURES = ("true_distance_m", "true_contacts", "touched", "behavior_switches", "wander_share", "odometry_error_m")
 
 _POINTER = """() => {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
@@ -74,33 +64,6 @@ _POINTER = """() => {
 _AT = """([x, y]) => { const box = $("stage").getBoundingClientRect();
   return [box.x + X(x) / ratio, box.y + Y(y) / ratio]; }"""
 """Where a place of the arena (m) is on the page (pixels)."""
-
-
-# ---- whether the film is one of this kit ----
-
-
-def comment(result: RunResult) -> str:
-    """What was done to the run that is filmed, and what came of it."""
-    deeds = [(time_s, data.decode()) for time_s, data in result.record.rows(STREAM)]
-    return json.dumps({"interventions": deeds, "figures": figures(result)})
-
-
-def figures(result: RunResult) -> dict[str, Any]:
-    """Those that do not depend on the wall clock."""
-    table = result.table()
-    return {name: table[name] for name in FIGURES}
-
-
-def repeated(said: str) -> dict[str, Any]:
-    """The figures of the run now, with the interventions that a comment names."""
-    done = Record()
-    for time_s, deed in json.loads(said)["interventions"]:
-        done.append(STREAM, time_s, deed.encode())
-    request = Request.single("demo", robot=ROBOT, arena=ARENA, seed=SEED, seconds=FILMED_S)
-    return figures(execute(request, onlooker=Repeated([done])))
-
-
-# ---- filming ----
 
 
 @contextlib.contextmanager
@@ -187,7 +150,7 @@ def film(page: Page) -> Film:
     return [(stamp, Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")) for stamp, data in taken]
 
 
-def write_film(taken: Film, path: Path, said: str) -> None:
+def write_film(taken: Film, path: Path) -> None:
     """As an animated picture, at even intervals, that begins anew at its end."""
     first, last = taken[0][0], taken[-1][0]
     chosen = [
@@ -196,9 +159,7 @@ def write_film(taken: Film, path: Path, said: str) -> None:
     ]
     palette = palette_of([chosen[0], chosen[len(chosen) // 2], chosen[-1]])
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in chosen]
-    frames[0].save(
-        path, save_all=True, append_images=frames[1:], duration=int(1000 * EACH_S), loop=0, comment=said, optimize=True
-    )
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=int(1000 * EACH_S), loop=0, optimize=True)
 
 
 def palette_of(pictures: list[Image.Image]) -> Image.Image:
@@ -250,12 +211,7 @@ def main() -> None:
             taken = film(page)
             until(page, "ended !== null")
             page.close()
-        result = read_run(FOLDER / "live")
-        assert isinstance(result, RunResult)
-        said = comment(result)
-        if repeated(said) != json.loads(said)["figures"]:
-            raise SystemExit("live_pictures.py: the run with the same interventions is another one")
-        write_film(taken, IMAGES / "live.gif", said)
+        write_film(taken, IMAGES / "live.gif")
         stills(browser)
 
 

@@ -11,12 +11,12 @@ import argparse
 import os
 import select
 import subprocess
+import sys
 import tempfile
 import time
 import zlib
 from pathlib import Path
 
-from avr_timing.closed_pipe import exit_as
 from boebot.link import frame, messages
 from tools.avr_program import IMAGES, ROOT
 
@@ -92,4 +92,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    exit_as(main)
+    sys.exit(main())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,6 @@ from pathlib import Path
 from avr_timing.bounds.stack import Stack
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.bounds.worst_path import worst_path
-from avr_timing.closed_pipe import exit_as
 from avr_timing.flow.graph import program_of
 from avr_timing.program import Program
 from boebot.errors import AnalysisError
@@ -52,7 +52,7 @@ def _show_bounds(image: Image, program: Program, asked: dict[str, int]) -> bool:
     print(f"{'cycles':>10} {'stack':>6}  function")
     for name, entry in entries.items():
         cycles, no_cycles = _text(lambda entry: worst.of(entry).cycles, entry)
-        depth, no_depth = _text(lambda entry: stack.of(entry).bytes, entry)
+        depth, no_depth = _text(stack.of, entry)
         reasons = "; ".join(dict.fromkeys(reason for reason in (no_cycles, no_depth) if reason))
         judged = judged and not (asked and reasons)
         print(f"{cycles:>10} {depth:>6}  {name}{reasons and f': {reasons}'}")
@@ -77,4 +77,6 @@ def _show_paths(program: Program, asked: dict[str, int]) -> None:
 
 
 if __name__ == "__main__":
-    exit_as(main)
+    if sys.platform != "win32":
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # what is behind a pipe may not read to the end
+    sys.exit(main())

@@ -43,7 +43,7 @@ class Edge:
 class Block:
     """Instructions that run one after another. A call ends a block; its only edge leads behind the call.
 
-    A block without edges leaves the function: by return, or by a jump into another one (`calls` names it then, a tail
+    A block without edges leaves the function: by return, or by a jump into another one (`callee` is it then, a tail
     call), or never (an endless loop has an edge to itself and so is none of these). `last_cycles` is what its last
     instruction takes then.
     """
@@ -51,7 +51,7 @@ class Block:
     start: int
     instructions: tuple[Instruction, ...]
     edges: tuple[Edge, ...]
-    calls: tuple[int, ...] = ()  # entries of the functions that its last instruction may call; mostly one
+    callee: int | None = None  # entry of the function that its last instruction calls
     last_cycles: int = 0  # of the last instruction, where there are no edges
 
     @property
@@ -110,7 +110,7 @@ class Program:
         found, work = {entry}, [entry]
         while work:
             blocks = self.functions[work.pop()].blocks.values()
-            new = {callee for block in blocks for callee in block.calls} - found
+            new = {block.callee for block in blocks if block.callee is not None} - found
             found |= new
             work += new
         return found
@@ -123,9 +123,7 @@ class Program:
 
     def clobbered(self, block: Block) -> frozenset[int] | None:
         """Registers that what a block calls may change; None: all that a callee need not keep."""
-        found = [self.functions[entry].clobbers for entry in block.calls]
-        known = [one for one in found if one is not None]
-        return frozenset[int]().union(*known) if known and len(known) == len(found) else None
+        return None if block.callee is None else self.functions[block.callee].clobbers
 
     def where(self, address: int) -> str:
         """A place for people: `0x1A2C (safety.c:57)`, or `0x1A2C (in __divsf3)` where no line is known."""

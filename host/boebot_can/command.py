@@ -115,19 +115,9 @@ def dbc(
         Path | None, typer.Argument(metavar="FILE", help="Where to write it; without it: standard output.")
     ] = None,
     node: Annotated[int, typer.Option("--node", metavar="N", min=1, max=7, help="The board's number on the bus.")] = 1,
-    check: Annotated[
-        Path | None, typer.Option("--check", metavar="FILE", help="Write nothing; say whether this file fits.")
-    ] = None,
     json: options.Json = False,
 ) -> None:
-    """Write the CAN database of a robot's messages, for CAN tools; or check one."""
-    if check is not None:
-        frames = database.check(check)
-        if json:
-            output.print_json({"file": str(check), "frames": frames})
-        else:
-            output.line(f"{check} fits this version: {frames} frames")
-        return
+    """Write the CAN database of a robot's messages, for CAN tools."""
     text = database.of_node(node)
     if out is None:
         output.line(text.rstrip("\n"))

@@ -7,7 +7,7 @@ from typing import Any
 
 from boebot.errors import BoardError
 
-_PACKAGES = {"can": "python-can", "isotp": "can-isotp", "cantools.database": "cantools"}
+_PACKAGES = {"can": "python-can", "isotp": "can-isotp"}
 
 
 def import_extra(module: str) -> Any:
@@ -19,7 +19,7 @@ def import_extra(module: str) -> Any:
     try:
         return import_module(module)
     except ImportError as error:
-        if error.name is not None and error.name.partition(".")[0] == module.partition(".")[0]:
+        if error.name is not None and error.name.partition(".")[0] == module:
             raise BoardError(
                 f"CAN needs the package {_PACKAGES[module]}, which is not installed; "
                 "expected: pip install 'boebot[can]'"

@@ -311,7 +311,7 @@ def _memory(firmware: Firmware, found: Costs, measured: Measurement | None) -> M
             stack.of(firmware.task_entry(name))
         except (AnalysisError, TimingError):
             unknown.append(name)
-    deepest = Stack(firmware.program, [firmware.task_entry(name) for name in unknown]).image().bytes
+    deepest = Stack(firmware.program, [firmware.task_entry(name) for name in unknown]).image()
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     most = max(deepest, seen) if unknown and seen is not None else deepest
     return Memory(firmware.image.ram_bytes, most, seen, firmware.image.flash_bytes, tuple(unknown))

@@ -272,7 +272,7 @@ def _main_loop(firmware: Firmware, elsewhere: Mapping[int, int], called: int) ->
     given = WorstCase(firmware.program, elsewhere)
     known = given.inside(main)
     function = known.function
-    loops = [loop for loop in loops_of(function) if any(called in function.blocks[node].calls for node in loop.nodes)]
+    loops = [loop for loop in loops_of(function) if any(called == function.blocks[node].callee for node in loop.nodes)]
     return sum(_once(loop, given, known) for loop in loops)
 
 

@@ -61,17 +61,11 @@ class Measurement:
     load: float  # share of cycles in which instructions ran, 0..1
     worst_tick: int = 0  # most cycles of tasks and interrupts in one control tick
     scenarios: tuple[str, ...] = field(default_factory=tuple)
-    functions: dict[str, Spans] = field(default_factory=dict)  # others that were watched, as the link's poll
     busiest_tick: int = 0  # most cycles in one control tick in which any instruction ran
-    late_slots: int = 0  # whose tasks ended when the next slot had begun
     between_polls: int = 0  # most cycles from one poll of the link to the next without sleep
     tick: tuple[Moment, ...] = ()  # a whole one, in the order in which its spans began
     losses: dict[str, int] = field(default_factory=dict)  # what should have come and did not, counted by kind
     by_scenario: dict[str, Measurement] = field(default_factory=dict)  # where there were several
-
-    def row(self, name: str) -> Spans:
-        """The spans of a task, an interrupt or another function. KeyError if there is none of that name."""
-        return {**self.functions, **self.interrupts, **self.tasks}[name]
 
 
 def merged(measurements: Iterable[Measurement]) -> Measurement:
@@ -98,9 +92,7 @@ def merged(measurements: Iterable[Measurement]) -> Measurement:
         load=sum(run.load * run.seconds for run in runs) / seconds,
         worst_tick=max(run.worst_tick for run in runs),
         scenarios=names,
-        functions=_together([run.functions for run in runs]),
         busiest_tick=max(run.busiest_tick for run in runs),
-        late_slots=sum(run.late_slots for run in runs),
         between_polls=max(run.between_polls for run in runs),
         tick=next((run.tick for run in runs if run.tick), ()),
         losses={name: sum(run.losses.get(name, 0) for run in runs) for run in runs for name in run.losses},
@@ -154,13 +146,11 @@ def as_json(measurement: Measurement) -> dict[str, Any]:
     return {
         "tasks": rows(measurement.tasks),
         "interrupts": rows(measurement.interrupts),
-        "functions": rows(measurement.functions),
         "scenarios": list(measurement.scenarios),
         "seconds": measurement.seconds,
         "load_share": measurement.load,
         "worst_tick_cycles": measurement.worst_tick,
         "busiest_tick_cycles": measurement.busiest_tick,
-        "late_slots": measurement.late_slots,
         "between_polls_cycles": measurement.between_polls,
         "lowest_stack_address": measurement.lowest_stack,
         "losses": measurement.losses,

@@ -38,7 +38,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from avr_timing.closed_pipe import exit_as
 from tools.house import ROOT, sources
 from tools.tests.mutations import KINDS, mutation
 
@@ -263,4 +262,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    exit_as(main)
+    sys.exit(main())

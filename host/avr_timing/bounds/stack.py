@@ -24,27 +24,6 @@ VECTORS = range(1, 26)  # as in __vector_N; each at byte address 4 N
 
 
 @dataclass(frozen=True, slots=True)
-class Depth:
-    """Bytes below the return address, and the chain of calls that needs them."""
-
-    bytes: int
-    chain: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ImageDepth:
-    """Of a whole image: `main` with its own return address, and interrupts, outermost first, each with its."""
-
-    main: Depth
-    interrupts: tuple[Depth, ...]
-
-    @property
-    def bytes(self) -> int:
-        """Of all."""
-        return ADDRESS + self.main.bytes + sum(ADDRESS + each.bytes for each in self.interrupts)
-
-
-@dataclass(frozen=True, slots=True)
 class _State:
     depth: int
     known: State
@@ -58,11 +37,11 @@ class Stack:
         """`left_out`: entries of functions that count as if they needed nothing but their return address."""
         self.program = program
         self._left_out = left_out
-        self._depths: dict[tuple[int, Context], Depth] = {}
+        self._depths: dict[tuple[int, Context], int] = {}
         self._under_way: list[int] = []
 
-    def of(self, function: str | int) -> Depth:
-        """The worst-case depth of a function, by name or entry, without its own return address.
+    def of(self, function: str | int) -> int:
+        """The worst-case depth of a function in bytes, by name or entry, without its own return address.
 
         Raises:
             AnalysisError: no such function; recursion; a depth that is not the same on all ways or depends on data.
@@ -70,44 +49,44 @@ class Stack:
         entry = self.program.entry(function)
         return self.bound(entry, root(self.program.functions[entry]))
 
-    def bound(self, entry: int, context: Context) -> Depth:
+    def bound(self, entry: int, context: Context) -> int:
         """Of a function that is entered with these registers: ways that they close do not count (wcet.py)."""
-        key, function = (entry, context), self.program.functions[entry]
+        key = (entry, context)
         if entry in self._left_out:
-            return Depth(0, (function.name,))
+            return 0
         if entry in self.program.unproven:
             raise AnalysisError(self.program.unproven[entry])
         if key not in self._depths:
             with self.program.entered(entry, self._under_way):
-                self._depths[key] = self._depth(known(function, context))
+                self._depths[key] = self._depth(known(self.program.functions[entry], context))
         return self._depths[key]
 
-    def image(self) -> ImageDepth:
-        """Of the whole image: `main`, and the worst nesting of interrupts on top of it.
+    def image(self) -> int:
+        """Of the whole image: `main` with its return address, and the worst nesting of interrupts on top of it, each
+        with its.
 
         An interrupt that switches interrupts on again is taken to keep itself off meanwhile: each such one is there at
         most once, and on top of them one that does not.
         """
-        nesting, others = list[Depth](), list[Depth]()
+        depths, deepest = [self.of("main")], 0
         for vector in (4 * number for number in VECTORS if 4 * number in self.program.functions):
             code = self.program.instructions(self.program.below(vector))
-            lets_others_in = any(instruction.mnemonic == "sei" for instruction in code)
-            (nesting if lets_others_in else others).append(self.of(vector))
-        nesting.sort(key=lambda depth: -depth.bytes)
-        others.sort(key=lambda depth: -depth.bytes)
-        return ImageDepth(self.of("main"), (*nesting, *others[:1]))
+            if any(instruction.mnemonic == "sei" for instruction in code):
+                depths.append(self.of(vector))
+            else:
+                deepest = max(deepest, ADDRESS + self.of(vector))
+        return deepest + sum(ADDRESS + depth for depth in depths)
 
-    def _depth(self, inside: Known) -> Depth:
+    def _depth(self, inside: Known) -> int:
         function = inside.function
         begin = _State(0, State({ZERO: 0}))
         states = {function.entry: begin}
         work = [function.entry]
-        deepest = Depth(0, (function.name,))
+        deepest = 0
         while work:
             block = function.blocks[work.pop()]
             state, found = self._run(block, states[block.start], inside)
-            if found.bytes > deepest.bytes:
-                deepest = found
+            deepest = max(deepest, found)
             for edge in block.edges:
                 before = states.get(edge.to)
                 if before is not None and (before.depth, before.high) != (state.depth, state.high):
@@ -121,23 +100,20 @@ class Stack:
                     work.append(edge.to)
         return deepest
 
-    def _run(self, block: Block, state: _State, inside: Known) -> tuple[_State, Depth]:
+    def _run(self, block: Block, state: _State, inside: Known) -> tuple[_State, int]:
         """The state at the end of a block, and the greatest depth within it."""
-        function = inside.function
-        deepest = Depth(state.depth, (function.name,))
+        name, deepest = inside.function.name, state.depth
         for instruction in block.instructions:
             state = self._step(instruction, state)
-            if state.depth > deepest.bytes:
-                deepest = Depth(state.depth, (function.name,))
+            deepest = max(deepest, state.depth)
         last = block.instructions[-1]
         own = ADDRESS if is_call(last) else 0
-        for callee in block.calls:
-            called = self.bound(callee, inside.handed(block))
-            if state.depth + own + called.bytes > deepest.bytes:
-                deepest = Depth(state.depth + own + called.bytes, (function.name, *called.chain))
+        if block.callee is not None:
+            called = self.bound(block.callee, inside.handed(block))
+            deepest = max(deepest, state.depth + own + called)
         if not (block.edges or is_call(last)) and state.depth != 0:  # a callee of a tail call would return into it, too
             raise AnalysisError(
-                f"{function.name} returns at {self.program.where(last.address)} with {state.depth} bytes on the stack; "
+                f"{name} returns at {self.program.where(last.address)} with {state.depth} bytes on the stack; "
                 "expected none"
             )
         return state, deepest

@@ -34,11 +34,10 @@ class Visit:
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Cycles that a function takes at most; the path, in the order of first visits; and how much of it is whose."""
+    """Cycles that a function takes at most, and the path, in the order of first visits."""
 
     cycles: int
     path: tuple[Visit, ...]
-    callees: dict[int, int]  # entry of a function that this one calls -> its share of the cycles
 
 
 class WorstCase:
@@ -67,7 +66,7 @@ class WorstCase:
         """The same by entry; `context`: registers that hold constants there, else those of any call."""
         function = self.program.functions[entry]
         if entry in self._given:
-            return Bound(self._given[entry], (), {})
+            return Bound(self._given[entry], ())
         if entry in self.program.unproven:
             raise AnalysisError(self.program.unproven[entry])
         key = (entry, root(function) if context is None else context)
@@ -103,18 +102,15 @@ class WorstCase:
 
     def ways(self, block: Block, inside: Known) -> list[Way[int]]:
         """The ways out of a block, with what is called at its end."""
-        callee, callee_cycles = None, 0
-        for entry in block.calls:
-            cycles = self.callee(entry, block, inside).cycles
-            if callee is None or cycles > callee_cycles:
-                callee, callee_cycles = entry, cycles
-        own = block.body_cycles + callee_cycles
+        own = block.body_cycles
+        if block.callee is not None:
+            own += self.callee(block.callee, block, inside).cycles
         if not block.edges:
-            return [Way(block.start, None, own + block.last_cycles, callee, callee_cycles)]
+            return [Way(block.start, None, own + block.last_cycles)]
         edges: dict[int, int] = {}
         for edge in block.edges:
             edges[edge.to] = max(edges.get(edge.to, 0), edge.cycles)
-        return [Way(block.start, to, own + cycles, callee, callee_cycles) for to, cycles in edges.items()]
+        return [Way(block.start, to, own + cycles) for to, cycles in edges.items()]
 
     def callee(self, entry: int, block: Block, inside: Known) -> Bound:
         """Of what a block calls, with the constants that it hands over."""
@@ -131,11 +127,7 @@ class WorstCase:
 def _told(walk: Walk[int]) -> Bound:
     times: dict[int, int] = {}
     cycles: dict[int, int] = {}
-    callees: dict[int, int] = {}
     for way, count in walk.ways():
         times[way.node] = times.get(way.node, 0) + (0 if way.waits else count)
         cycles[way.node] = cycles.get(way.node, 0) + count * way.cycles
-        if way.callee is not None:
-            callees[way.callee] = callees.get(way.callee, 0) + count * way.callee_cycles
-    path = tuple(Visit(block, times[block], cycles[block]) for block in times)
-    return Bound(walk.cycles, path, callees)
+    return Bound(walk.cycles, tuple(Visit(block, times[block], cycles[block]) for block in times))

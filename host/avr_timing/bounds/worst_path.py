@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from avr_timing.bounds.loop_bounds import marks_of
 from avr_timing.bounds.wcet import Visit, WorstCase
-from avr_timing.flow.constants import Context, Known, known, root
+from avr_timing.flow.constants import Context, known, root
 from avr_timing.program import Block
 
 
@@ -79,7 +79,7 @@ class _Lines:
         found: dict[_Place, _Share] = {}
         for visit in self.worst.bound(entry, context).path:
             block = inside.function.blocks[visit.block]
-            callee, callee_cycles = self._callee(block, inside)
+            callee_cycles = 0 if block.callee is None else self.worst.callee(block.callee, block, inside).cycles
             ran: set[_Place] = set()
             for address, cycles in _instructions(block, visit, visit.cycles - visit.times * callee_cycles):
                 place = (function.name, self.program.lines.get(address))
@@ -91,15 +91,10 @@ class _Lines:
             first = found[function.name, self.program.lines.get(block.instructions[0].address)]
             for mark in marks.get(visit.block, ()):
                 first.passes[mark.loop] = first.passes.get(mark.loop, 0) + visit.times
-            if callee is not None:
-                for place, share in self.of(callee, inside.handed(block)).items():
+            if block.callee is not None:
+                for place, share in self.of(block.callee, inside.handed(block)).items():
                     found.setdefault(place, _Share()).add(share, visit.times)
         return found
-
-    def _callee(self, block: Block, inside: Known) -> tuple[int | None, int]:
-        """What the block calls at its end, and its cycles."""
-        way = self.worst.ways(block, inside)[0]
-        return way.callee, way.callee_cycles
 
 
 def _instructions(block: Block, visit: Visit, cycles: int) -> Iterator[tuple[int, int]]:

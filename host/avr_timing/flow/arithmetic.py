@@ -1,4 +1,4 @@
-"""Arithmetic of one byte, after the AVR instruction set manual: of numbers, and (but for `overflow`) of arrays."""
+"""Arithmetic of one byte, after the AVR instruction set manual."""
 
 from __future__ import annotations
 

@@ -150,7 +150,7 @@ def _through(block: Block, state: State) -> tuple[list[Edge], State]:
     for instruction in block.instructions[:-1]:
         state = step(instruction, state)
     last = block.instructions[-1]
-    return [edge for edge in block.edges if _may_take(last, edge, state)], step(last, state)
+    return [edge for edge in block.edges if may_take(last, edge, state)], step(last, state)
 
 
 def _told_by(block: Block, edge: Edge, state: State) -> State:
@@ -182,7 +182,7 @@ def _arrive(states: dict[int, State], place: int, state: State) -> bool:
     return states[place] != old
 
 
-def _may_take(last: Instruction, edge: Edge, state: State) -> bool:
+def may_take(last: Instruction, edge: Edge, state: State) -> bool:
     """Whether what is known allows that way out of a block."""
     behind = last.address + last.size
     if last.mnemonic in CONDITIONS and last.operands[-1] != behind:

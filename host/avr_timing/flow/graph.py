@@ -8,8 +8,8 @@ instructions say, so nothing depends on the compiler:
 * `rcall .+0` makes room for two bytes on the stack and is no call: an instruction like others, which ends no block.
 * Behind a call of a function that never returns nothing is followed: the block of such a call has no edge.
 * What writes registers, the stack pointer or SREG by their data addresses is refused.
-* Where `ijmp` and `icall` lead is found by `jumps`. A function for which it is not found (Program.unproven) has no
-  bound: what is known of it is followed, as if its `icall` returned and its `ijmp` left it.
+* Where the `ijmp` of a `switch` leads is found by `jumps`. A function with another one or with an `icall` has no bound
+  (Program.unproven): it is followed as if its `icall` returned and its `ijmp` left it.
 * Neither has a function with an instruction that is refused, or that leads out of the code, and it is followed up to
   there, as if it returned there; one whose calls go too deep has none either. All others are judged.
 
@@ -64,7 +64,7 @@ def program_of(image: Image) -> Program:
 def _check_depths(program: Program) -> None:
     """Refuses functions below which calls go too deep; what calls itself counts once."""
     callees = {
-        entry: sorted({callee for block in function.blocks.values() for callee in block.calls})
+        entry: sorted({block.callee for block in function.blocks.values() if block.callee is not None})
         for entry, function in program.functions.items()
     }
     depths: dict[int, int] = {}
@@ -122,7 +122,7 @@ class _Flow:
 
     instruction: Instruction
     edges: list[Edge]
-    calls: list[int] = field(default_factory=list)
+    callee: int | None = None
     ends: bool = True
 
 
@@ -132,7 +132,7 @@ class _Draft:
 
     entry: int
     flows: dict[int, _Flow] = field(default_factory=dict)
-    computed: dict[int, frozenset[int]] = field(default_factory=dict)  # targets so far of each ijmp and icall
+    computed: dict[int, frozenset[int]] = field(default_factory=dict)  # targets so far of each ijmp
 
 
 class _Explorer:
@@ -221,26 +221,26 @@ class _Explorer:
             size = self._decode(draft, behind).size
             return _Flow(instruction, [Edge(behind, 1), Edge(behind + size, 1 + size // 2)])
         if name in JUMPS:
-            return self._jump(draft, instruction, [instruction.operands[0]])
+            target = instruction.operands[0]
+            if target in self.entries and target != draft.entry:
+                return _Flow(instruction, [], target)
+            return _Flow(instruction, [Edge(target, instruction.cycles)])
         if name in CALLS and not (name == "rcall" and instruction.operands[0] == behind):
-            return _Flow(instruction, [], [instruction.operands[0]])
+            return _Flow(instruction, [], instruction.operands[0])
         if name in RETURNS:
             return _Flow(instruction, [])
-        if name in ("ijmp", "icall"):
+        if name == "ijmp":
             draft.computed[address] = frozenset()
             return _Flow(instruction, [])
+        if name == "icall":
+            self._leads_anywhere(draft, instruction, "it is a pointer")
+            return _Flow(instruction, [Edge(behind, instruction.cycles)])
         if name == "spm":
             raise self._refusal(address, "`spm` writes the flash, which takes no fixed time")
         if name == "sts" and (instruction.operands[0] < REGISTERS or instruction.operands[0] in CORE):
             what = CORE.get(instruction.operands[0], f"register r{instruction.operands[0]}")
             raise self._refusal(address, f"`sts` writes {what}, which cannot be followed; expected `out` or `mov`")
         return _Flow(instruction, [Edge(behind, instruction.cycles)], ends=False)
-
-    def _jump(self, draft: _Draft, instruction: Instruction, targets: list[int]) -> _Flow:
-        """A jump: out of the function where all its targets are functions, else within."""
-        if all(target in self.entries and target != draft.entry for target in targets):
-            return _Flow(instruction, [], targets)
-        return _Flow(instruction, [Edge(target, instruction.cycles) for target in targets])
 
     def _leave(self, draft: _Draft, flow: _Flow) -> None:
         """Goes on where an instruction leads."""
@@ -250,13 +250,13 @@ class _Explorer:
         for edge in flow.edges:
             self._check(address, edge.to)
             self.work.append((draft, edge.to))
-        for callee in flow.calls:
-            self._check(address, callee)
-            self._begin(callee)
-            if callee in self.returning:
+        if flow.callee is not None:
+            self._check(address, flow.callee)
+            self._begin(flow.callee)
+            if flow.callee in self.returning:
                 self._come_back(draft, address)
             else:
-                self.waiting[callee].append((draft, address))
+                self.waiting[flow.callee].append((draft, address))
 
     def _returns(self, entry: int) -> None:
         """A function is known to return: what called it goes on."""
@@ -267,7 +267,7 @@ class _Explorer:
                 continue
             self.returning.add(callee)
             for draft, address in self.waiting.pop(callee, ()):
-                if draft.flows[address].instruction.mnemonic in (*JUMPS, "ijmp"):
+                if draft.flows[address].instruction.mnemonic in JUMPS:
                     pending.append(draft.entry)
                 else:
                     self._come_back(draft, address)
@@ -275,7 +275,7 @@ class _Explorer:
     def _come_back(self, draft: _Draft, address: int) -> None:
         """A call returns: its function goes on behind it; a tail call's returns itself."""
         flow = draft.flows[address]
-        if flow.instruction.mnemonic in (*JUMPS, "ijmp"):
+        if flow.instruction.mnemonic in JUMPS:
             self._returns(draft.entry)
         elif not flow.edges:
             behind = address + flow.instruction.size
@@ -283,40 +283,26 @@ class _Explorer:
             self.work.append((draft, behind))
 
     def _compute(self, draft: _Draft, address: int) -> None:
-        """Finds where an `ijmp` or `icall` leads, and goes on there where that is new."""
-        flow = draft.flows[address]
+        """Finds where an `ijmp` leads, and goes on there where that is new."""
+        instruction = draft.flows[address].instruction
         try:
             targets = targets_of(self.image.code, self._way_to(draft, address))
             if wild := [target for target in targets if not self._is_code(target)]:
                 raise NotProvenError(f"one way leads out of the code, to 0x{wild[0]:04X}")
         except NotProvenError as error:
-            self._leads_anywhere(draft, flow, str(error))
-            return
-        if targets == draft.computed[address]:
-            return
-        draft.computed[address] = targets
-        known = _Flow(flow.instruction, [], sorted(targets))
-        if flow.instruction.mnemonic == "ijmp":
-            known = self._jump(draft, flow.instruction, sorted(targets))
-        draft.flows[address] = known
-        self._leave(draft, known)
-
-    def _give_up(self, draft: _Draft, address: int, why: AnalysisError) -> None:
-        """Ends a function in front of an instruction that is refused, and notes it."""
-        self.unproven.setdefault(draft.entry, str(why))
-        draft.flows[address] = _Flow(_refused(address), [])
-        self._returns(draft.entry)
-
-    def _leads_anywhere(self, draft: _Draft, flow: _Flow, why: str) -> None:
-        """Goes on behind a computed call of which it is not known where it leads, and notes it."""
-        name, address = flow.instruction.mnemonic, flow.instruction.address
-        text = f"where `{name}` leads cannot be proven: {why}; expected a call by name, or a table with a limited index"
-        self.unproven[draft.entry] = str(self._refusal(address, text))
-        del draft.computed[address]
-        if name == "ijmp":
+            self._leads_anywhere(draft, instruction, str(error))
+            del draft.computed[address]
             self._returns(draft.entry)
-        else:
-            self._come_back(draft, address)
+            return
+        if targets != draft.computed[address]:
+            draft.computed[address] = targets
+            draft.flows[address] = _Flow(instruction, [Edge(to, instruction.cycles) for to in sorted(targets)])
+            self._leave(draft, draft.flows[address])
+
+    def _leads_anywhere(self, draft: _Draft, instruction: Instruction, why: str) -> None:
+        """Notes that it is not known where a computed jump or call leads."""
+        text = f"where `{instruction.mnemonic}` leads cannot be proven: {why}; expected a call by name"
+        self.unproven[draft.entry] = str(self._refusal(instruction.address, f"{text}, or a table with a limited index"))
 
     def _way_to(self, draft: _Draft, address: int) -> list[Step]:
         """The instructions that always run before the one at `address`, as far back as there is only one way."""
@@ -335,6 +321,12 @@ class _Explorer:
             seen.add(previous)
             at = previous
         return way[::-1]
+
+    def _give_up(self, draft: _Draft, address: int, why: AnalysisError) -> None:
+        """Ends a function in front of an instruction that is refused, and notes it."""
+        self.unproven.setdefault(draft.entry, str(why))
+        draft.flows[address] = _Flow(_refused(address), [])
+        self._returns(draft.entry)
 
     def _decode(self, draft: _Draft, address: int) -> Instruction:
         instruction = decode(self.image.code, address)
@@ -377,5 +369,5 @@ def _blocks(draft: _Draft) -> dict[int, Block]:
             flow = draft.flows[flow.edges[0].to]
             instructions.append(flow.instruction)
         last_cycles = 0 if flow.edges else flow.instruction.cycles
-        blocks[start] = Block(start, tuple(instructions), tuple(flow.edges), tuple(flow.calls), last_cycles)
+        blocks[start] = Block(start, tuple(instructions), tuple(flow.edges), flow.callee, last_cycles)
     return blocks

@@ -26,9 +26,7 @@ class Way(Generic[N]):
 
     node: N
     to: N | None  # None: out of the graph
-    cycles: int  # with callee
-    callee: int | None = None  # entry of the function that is called at its end
-    callee_cycles: int = 0
+    cycles: int  # with what is called at its end
     waits: bool = False  # stands for the time that a loop waits, and runs nothing by itself
 
 

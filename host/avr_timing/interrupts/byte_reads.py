@@ -215,14 +215,14 @@ class ByteReads:
         edges: list[tuple[int | None, int]] = [(edge.to, edge.cycles) for edge in block.edges]
         edges = edges or [(None, block.last_cycles)]
         for to, cycles in edges:
-            if not block.calls:
-                found.append((self._returned(calls) if to is None else (function, calls, to, 0), cycles, to))
-            for callee in block.calls:
-                if self._contains(callee):
-                    found.append(((callee, (*calls, (function, to)), callee, 0), cycles, None))
-                    continue
-                own = cycles + self.worst_case.callee(callee, block, self.worst_case.inside(function)).cycles
-                found.append((self._returned(calls) if to is None else (function, calls, to, 0), own, None))
+            callee = block.callee
+            if callee is not None and self._contains(callee):
+                found.append(((callee, (*calls, (function, to)), callee, 0), cycles, None))
+                continue
+            if callee is not None:
+                cycles += self.worst_case.callee(callee, block, self.worst_case.inside(function)).cycles
+            behind = self._returned(calls) if to is None else (function, calls, to, 0)
+            found.append((behind, cycles, to if callee is None else None))
         return found
 
     def _returned(self, calls: _Calls) -> _Place | None:

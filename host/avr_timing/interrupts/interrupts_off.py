@@ -262,7 +262,7 @@ class InterruptsOff:
                 "expected `sei` right in front of it, else nothing wakes the CPU"
             )
         clobbered = None
-        if block.calls and number + 1 == len(block.instructions):
+        if block.callee is not None and number + 1 == len(block.instructions):
             clobbered = self.program.clobbered(block)
         states = after(instruction, state, clobbered)
         found: list[Node] = []
@@ -271,7 +271,9 @@ class InterruptsOff:
                 found.append((start, number + 1, following))
                 self._go(flow, node, found[-1], instruction.cycles + _stops(instruction), instruction.address)
             return found
-        for callee, edge_cycles, to in _leaving(block):
+        callee = block.callee
+        ways: list[tuple[int, int | None]] = [(edge.cycles, edge.to) for edge in block.edges]
+        for edge_cycles, to in ways or [(block.last_cycles, None)]:
             edge_cycles += _stops(instruction)
             for following in states:
                 if callee is not None:
@@ -368,11 +370,3 @@ def _returned(flow: Flow, node: Node) -> Iterable[int]:
 def _is_about_flag(instruction: Instruction) -> bool:
     name = instruction.mnemonic
     return name in ("cli", "sei", "reti", "sleep", REFUSED) or (name == "out" and instruction.operands[0] == SREG)
-
-
-def _leaving(block: Block) -> list[tuple[int | None, int, int | None]]:
-    """Ways out of a block: callee or None, cycles of its last instruction, block behind or None."""
-    callees: list[int | None] = [*block.calls] if block.calls else [None]
-    if not block.edges:
-        return [(callee, block.last_cycles, None) for callee in callees]
-    return [(callee, edge.cycles, edge.to) for callee in callees for edge in block.edges]

@@ -16,7 +16,6 @@ from test_emulated import HEAD, measured
 PROGRAM = """
 #include <stdint.h>
 #include <string.h>
-#include <avr/pgmspace.h>
 __asm__(".macro bounded row, passes\\n\\\\row:\\n.pushsection .boebot.loops, \\"\\", @progbits\\n"
         ".long \\\\row, \\\\passes, 0xFFFFFFFF\\n.popsection\\n.endm");
 #define BOUNDED(n) __asm__ volatile("bounded .Lrow%=, %0" ::"n"(n))
@@ -24,16 +23,16 @@ volatile uint8_t x;
 volatile uint16_t y;
 struct block {{ uint8_t bytes[30]; }} from, to;
 uint8_t area[40];
-static void one(void) {{ x = 1; }}
-static void two(void) {{ y = 2; x = 3; }}
-static void (*const table[])(void) __attribute__((section(".progmem.data"))) = {{one, two}};
 uint16_t f(uint16_t a, uint16_t b, uint16_t c) {{
   {body}
 }}
 """
-SWITCH = "switch (a) { " + " ".join(f"case {n}: x = {n * 7};{' y = 1;' * n} break;" for n in range(8)) + " } return b;"
+SWITCH = (
+    "switch ((uint8_t)a) { "
+    + " ".join(f"case {n}: x = {n * 7};{' y = 1;' * n} break;" for n in range(8))
+    + " } return b;"
+)
 BITS = "for (uint8_t i = 0; i < (uint8_t)b; i++) { BOUNDED(10); if (a & 1) { y = c; y = b; } a >>= 1; } return a;"
-POINTERS = "uint8_t i = a; if (i < 2) { ((void (*)(void))pgm_read_word(&table[i]))(); } return b;"
 
 
 def words(*numbers: int) -> list[int]:
@@ -48,7 +47,6 @@ CASES: dict[str, tuple[str, list[list[int]]]] = {
     "nested": ("for (uint8_t i = 0; i < 5; i++) for (uint8_t k = 0; k < 7; k++) x = k; return b;", [words(1)]),
     "bounded": (BITS, [words(0x3FF, 10, 5), words(0, 10, 5)]),
     "switch": (SWITCH, [words(n) for n in range(9)]),
-    "pointers": (POINTERS, [words(n) for n in range(3)]),
     "shift": ("return a >> (b & 15);", [words(0xFFFF, n) for n in range(16)]),
     "division": ("return a / b;", [words(0xFFFF, 1)]),
     "copy": ("to = from; return a;", [words(1)]),

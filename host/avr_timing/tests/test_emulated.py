@@ -266,7 +266,7 @@ def test_stack_goes_as_deep_as_bounded_with_nested_interrupts(tmp_path: Path) ->
     board.run(CYCLES)
     memory = board.read_memory(0x800, 0x100)
     lowest = next(address for address, byte in enumerate(memory, 0x800) if byte != PAINT)
-    assert 0x900 - lowest == Stack(load_program(image)).image().bytes
+    assert 0x900 - lowest == Stack(load_program(image)).image()
 
 
 # Interrupts off for a while, once a round of 8 + the stretch: each interrupt stores how late it is.

@@ -22,7 +22,7 @@ def test_a_branch_takes_one_cycle_or_two(tmp_path: Path) -> None:
     assert first.edges == (Edge(second.start, 1), Edge(last.start, 2))
     assert first.body_cycles == 1
     assert second.edges == (Edge(last.start, 1),)
-    assert (last.edges, last.calls, last.last_cycles) == ((), (), 4)
+    assert (last.edges, last.callee, last.last_cycles) == ((), None, 4)
 
 
 @pytest.mark.parametrize("skip", ["sbrc r24, 0", "sbrs r24, 0", "sbic 5, 1", "sbis 5, 1", "cpse r24, r25"])
@@ -37,7 +37,7 @@ def test_a_call_ends_its_block(tmp_path: Path) -> None:
     program = assembled(tmp_path, "main: call leaf\n rcall leaf\n ret\n leaf: ret")
     main = function(program, "main")
     first, second = main.blocks[main.entry], main.blocks[main.entry + 4]
-    assert first.calls == second.calls == (program.by_name["leaf"],)
+    assert first.callee == second.callee == program.by_name["leaf"]
     assert first.edges == (Edge(main.entry + 4, 4),)
     assert second.edges == (Edge(main.entry + 6, 3),)
 
@@ -46,7 +46,7 @@ def test_a_call_of_the_next_instruction_makes_room_on_the_stack(tmp_path: Path) 
     main = function(assembled(tmp_path, "main: rcall .+0\n pop r0\n pop r0\n ret"), "main")
     (only,) = main.blocks.values()
     assert [i.mnemonic for i in only.instructions] == ["rcall", "pop", "pop", "ret"]
-    assert (only.calls, only.body_cycles) == ((), 3 + 2 + 2)
+    assert (only.callee, only.body_cycles) == (None, 3 + 2 + 2)
 
 
 @pytest.mark.parametrize(("jump", "cycles"), [("jmp", 3), ("rjmp", 2)])
@@ -54,7 +54,7 @@ def test_a_jump_to_a_function_is_a_tail_call(tmp_path: Path, jump: str, cycles: 
     source = f"main: {jump} other\n .type other, @function\n other: ret"
     program = assembled(tmp_path, source)
     (only,) = function(program, "main").blocks.values()
-    assert (only.edges, only.calls, only.last_cycles) == ((), (program.by_name["other"],), cycles)
+    assert (only.edges, only.callee, only.last_cycles) == ((), program.by_name["other"], cycles)
 
 
 def test_a_jump_into_the_middle_of_a_function_stays_in_its_own(tmp_path: Path) -> None:
@@ -75,16 +75,16 @@ def test_nothing_is_behind_a_call_that_never_returns(tmp_path: Path) -> None:
     # What is behind these calls is no code: the compiler does not write any there.
     source = "main: sbrc r24, 0\n rjmp 1f\n call direct\n .word 0xffff\n 1: call forever\n .word 0xffff\n"
     program = assembled(tmp_path, source + "direct: jmp forever\n forever: rjmp forever")
-    last = [b for b in function(program, "main").blocks.values() if b.calls]
+    last = [b for b in function(program, "main").blocks.values() if b.callee is not None]
     assert [(b.edges, b.last_cycles) for b in last] == [((), 4), ((), 4)]
-    assert {c for b in last for c in b.calls} == {program.by_name[name] for name in ("direct", "forever")}
+    assert {b.callee for b in last} == {program.by_name[name] for name in ("direct", "forever")}
 
 
 def test_a_recursive_function_returns_where_one_way_does(tmp_path: Path) -> None:
     source = "main: rcall down\n ret\n down: dec r24\n breq 1f\n rcall down\n nop\n 1: ret"
     program = assembled(tmp_path, source)
     down = function(program, "down")
-    assert down.blocks[down.entry + 4].calls == (down.entry,)
+    assert down.blocks[down.entry + 4].callee == down.entry
     assert down.blocks[down.entry + 6].instructions[0].mnemonic == "nop"
     assert function(program, "main").blocks[program.by_name["main"] + 2].last_cycles == 4
 
@@ -95,7 +95,7 @@ def test_only_vectors_in_use_are_followed(tmp_path: Path) -> None:
     vectors = {entry: f for entry, f in program.functions.items() if 0 < entry < 104}
     assert list(vectors) == [18 * 4]
     (only,) = vectors[18 * 4].blocks.values()
-    assert (only.calls, only.last_cycles) == ((program.by_name["__vector_18"],), 3)
+    assert (only.callee, only.last_cycles) == (program.by_name["__vector_18"], 3)
     assert vectors[18 * 4].name == "__vectors+0x48"
 
 
@@ -162,7 +162,7 @@ def test_the_images_are_followed_whole(name: str) -> None:
         assert f.entry in f.blocks
         for b in f.blocks.values():
             assert all(edge.to in f.blocks for edge in b.edges)
-            assert all(callee in program.functions for callee in b.calls)
+            assert b.callee is None or b.callee in program.functions
             followed.update((i.address, i) for i in b.instructions)
     # Every call and jump that objdump sees in what was followed is there.
     for address, instruction in followed.items():

@@ -164,11 +164,6 @@ def test_path_says_how_often_each_block_runs(tmp_path: Path) -> None:
     assert sum(visit.cycles for visit in bound.path) == bound.cycles
 
 
-def test_callees_have_their_share(tmp_path: Path) -> None:
-    program = assembled(tmp_path, LOOP + WHILE.replace("nop", "rcall f") + "\n f: nop\n ret")
-    assert WorstCase(program).of("main").callees == {program.by_name["f"]: 5 * (1 + 4)}
-
-
 # 60 passes at most; how many, r20 says.
 SHARED = "f: bounded 60\n nop\n dec r20\n brne f\n ret\n"
 PASSES = {n: 4 * n - 1 + 4 for n in (3, 5, 60)}  # a pass 1 + 1 + 2, the last one 1 less; ret

@@ -63,13 +63,8 @@ def _rows(kind: str) -> list[Row]:
 def _print(rows: Sequence[Row]) -> None:
     if "neutral" in rows[0]:
         rows = [_in_short(row) for row in rows]
-    titles = [title for title in rows[0] if title != "source"]  # of an experiment; it is long
-    cells = ([_cell(row[title]) for title in titles] for row in rows)
-    output.print_columns(["" if title == "slow" else title for title in titles], cells, whole=1)
-
-
-def _cell(value: Any) -> str:
-    return ("slow" if value else "") if isinstance(value, bool) else str(value)
+    titles = [title for title in ("name", "value", "title", "on") if title in rows[0]]  # more is in --json
+    output.print_columns(titles, ([row[title] for title in titles] for row in rows), whole=1)
 
 
 def _robots() -> list[Row]:

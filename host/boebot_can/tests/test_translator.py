@@ -253,24 +253,10 @@ def test_without_its_packages_one_sentence_says_so(
     )
 
 
-def test_database_of_a_node_and_of_another_version(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_database_of_a_node(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = tmp_path / "robot.dbc"
     assert boebot(capsys, "can", "dbc", str(made), "--node", "3")[0] == 0
-    code, out, _ = boebot(capsys, "can", "dbc", "--check", str(made))
-    assert code == 0 and "fits this version" in out
     loaded: Any = cantools.database.load_file(made, strict=True)
     assert {message.frame_id >> 5 & 7 for message in loaded.messages} == {3}
     assert loaded.get_message_by_name("setpoint_signal").frame_id == 0x160
-    other = tmp_path / "other.dbc"
-    other.write_text(made.read_text().replace(f"0x{messages.SCHEMA_HASH:08X}", "0x12345678"))
-    code, _, err = boebot(capsys, "can", "dbc", "--check", str(other))
-    assert code == 1 and err == (
-        f"boebot: {other} is of another version of the protocol: its SchemaHash is 0x12345678, expected "
-        f"0x{messages.SCHEMA_HASH:08X}; write it anew with `boebot can dbc`\n"
-    )
-    other.write_text(made.read_text().replace("SG_ ping_echo : 16|16@1+ (1,0)", "SG_ ping_echo : 16|16@1+ (2,0)"))
-    code, _, err = boebot(capsys, "can", "dbc", "--check", str(other))
-    assert code == 1 and "lays out telemetry_5 in another way" in err
-    made.write_text("no database")
-    code, _, err = boebot(capsys, "can", "dbc", "--check", str(made))
-    assert code == 1 and err.startswith(f"boebot: {made} is no CAN database: ") and err.count("\n") == 1
+    assert loaded.dbc.attributes["SchemaHash"].value == f"0x{messages.SCHEMA_HASH:08X}"

@@ -25,10 +25,6 @@ from sim_bridge.boards import avr
 from sim_bridge.boards.board import watchdog_resets
 
 SCENARIOS = ("figures", "overload", "faults", "everything")
-HANG = "hang"  # the load of the figures for HANGS_AFTER, then a task never returns; what comes then is the watchdog's
-HANGS_AFTER = 5 * TICK_CYCLES
-WATCHDOG = 6  # vector (data sheet, table 12-6)
-RESETS_WITHIN = 20 * TICK_CYCLES  # of the hang: the watchdog's 125 ms and the 16 ms after its interrupt
 DRAIN_TICKS = 3  # after a run, for what is under way
 
 Progress = Callable[[float], None]
@@ -93,47 +89,6 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
         )
 
 
-def hang(image: Path, robot: RobotDescription, seed: int) -> Run:
-    """A run in which a task hangs, so that the watchdog's interrupt comes, and its reset: the spans up to the hang, and
-    of what came then only the watchdog's.
-
-    The image is as it is until then; the hang is an instruction of the first task that turns into a jump to itself.
-
-    Raises:
-        BoardError: its watchdog does not reset it; and see `run`.
-    """
-    what = watched(image)
-    if not what.entries or WATCHDOG not in what.vectors:
-        raise BoardError(f"{image.name} has no {'watchdog interrupt' if what.entries else 'task'}; expected one")
-    board = avr.create(image)
-    board.record(what.watch)
-    with Bench(image, board.access()) as bench:
-        line = prepare(bench, robot, "figures")
-        loaded_from, before = bench.now, bench.access.counters()
-        load(bench, line, robot, "figures", numbers_of(seed), HANGS_AFTER)
-        bench.run(HANGS_AFTER)
-        hung_at, lowest_stack, after = bench.now, board.lowest_stack, bench.access.counters()
-        board.hang_at(what.entries[0])
-        while bench.access.counters()["resets"] == after["resets"]:
-            if bench.now > hung_at + RESETS_WITHIN:
-                raise BoardError(f"{image.name} hangs in {what.names[0]}, and its watchdog does not reset it")
-            bench.run(TICK_CYCLES)
-        spans = board.spans()
-        return Run(
-            what=what,
-            scenario=HANG,
-            seed=seed,
-            spans=spans[(spans["begin"] < hung_at) | (spans["id"] == WATCHDOG)],
-            cycles=hung_at - loaded_from,
-            executed=after["executed_cycles"] - before["executed_cycles"],
-            lowest_stack=lowest_stack,
-            loaded_from=loaded_from,
-            lost={"bytes": after["overruns"]},
-            sent=after["bytes_in"] - before["bytes_in"],
-            received=after["bytes_out"] - before["bytes_out"],
-        )
-
-
 def _lost(line: Line, wheels: list[list[PulseTrain]], scenario: str, after: dict[str, int]) -> dict[str, int]:
     """Of "everything", which damages frames, turns parameters of the encoders and holds the bus, only what no host and
     no pin may bring about."""
@@ -150,14 +105,13 @@ def measure(image: Path, robot: RobotDescription, scenario: str, seconds: float,
 
 
 def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | None = None) -> Measurement:
-    """All scenarios of the robot that an image was built for, `seconds` of the board's time each, and, where it has a
-    watchdog that warns by an interrupt, a hang.
+    """All scenarios of the robot that an image was built for, `seconds` of the board's time each.
 
     Args:
         progress: called with the share that is done, 0 to 1.
 
     Raises:
-        BoardError, AnalysisError, RobotError: see `run`, `hang` and `robot_of`.
+        BoardError, AnalysisError, RobotError: see `run` and `robot_of`.
     """
     robot = robot_of(elf)
     found = []
@@ -166,7 +120,4 @@ def measure_image(elf: Path, *, seconds: float, seed: int, progress: Progress | 
         found.append(measure(elf, robot, scenario, max(seconds, least), seed))
         if progress:
             progress((number + 1) / len(SCENARIOS))
-    what = watched(elf)
-    if what.entries and WATCHDOG in what.vectors:
-        found.append(hang(elf, robot, seed).measurement())
     return merged(found)

@@ -35,7 +35,6 @@ class Watched:
     entries: tuple[int, ...]
     names: tuple[str, ...]
     vectors: dict[int, str]
-    first: str | None = None  # the task that runs first in each slot
 
     @property
     def watch(self) -> Watch:
@@ -65,12 +64,7 @@ def watched(path: Path) -> Watched:
         for vector in range(1, 26)
         if vector in rows or functions.get(f"__vector_{vector}", default) != default
     }
-    return Watched(
-        entries=tuple(found.values()),
-        names=tuple(found),
-        vectors=vectors,
-        first=next((row.name for row in table.tasks if row.period == 1 and row.name in found), None),
-    )
+    return Watched(tuple(found.values()), tuple(found), vectors)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,20 +87,18 @@ class Run:
     def measurement(self) -> Measurement:
         """What the record amounts to."""
         what, spans, since = self.what, self.spans, self.loaded_from
-        found = {name: self._spans(name, FUNCTION_IDS + index) for index, name in enumerate(what.names)}
-        others = {name: found.pop(name) for name in (POLL,) if name in found}
         work, busy = _ticks(what, spans, since)
         return Measurement(
-            tasks=found,
+            tasks={
+                name: self._spans(name, FUNCTION_IDS + number) for number, name in enumerate(what.names) if name != POLL
+            },
             interrupts={name: self._spans(name, vector, since) for vector, name in what.vectors.items()},
             lowest_stack=self.lowest_stack,
             seconds=self.cycles / 16e6,
             load=self.executed / self.cycles,
             worst_tick=int(work.max(initial=0)),
             scenarios=(self.scenario,),
-            functions=others,
             busiest_tick=int(busy.max(initial=0)),
-            late_slots=_late_slots(what, spans, since),
             between_polls=_between_polls(what, spans),
             tick=_fullest_tick(what, spans, since, work),
             losses=self.lost,
@@ -133,22 +125,6 @@ def _ticks(what: Watched, spans: NDArray[Any], since: int) -> tuple[NDArray[Any]
     whole = (tick >= 0) & (tick < len(starts) - 1)
     work = np.bincount(tick[whole], weights=counted["net"][whole], minlength=len(starts) - 1)
     return work.astype(np.int64), np.diff(starts["executed"].astype(np.int64))
-
-
-def _late_slots(what: Watched, spans: NDArray[Any], since: int) -> int:
-    """Slots from `since` on whose tasks ended when the next one had begun. The n-th run of the first task is that of
-    the n-th slot."""
-    if what.first is None:
-        return 0
-    tasks = np.sort(spans[(spans["id"] >= FUNCTION_IDS) & (spans["id"] != what.poll_id)], order="begin")
-    starts = spans[spans["id"] == SLOT_VECTOR]["begin"]
-    firsts = tasks[tasks["id"] == FUNCTION_IDS + what.names.index(what.first)]["begin"]
-    count = min(len(firsts), len(starts)) - 1
-    if count < 1:
-        return 0
-    last = np.searchsorted(tasks["begin"], firsts[1 : count + 1]) - 1
-    ends = tasks["begin"][last] + tasks["gross"][last]
-    return int(np.sum((ends > starts[1 : count + 1]) & (starts[:count] >= since)))
 
 
 def _fullest_tick(what: Watched, spans: NDArray[Any], since: int, work: NDArray[Any]) -> tuple[Moment, ...]:

@@ -25,14 +25,6 @@ FIGURES = LOADS["figures"]
 TASK = "__attribute__((noinline)) void first_task(void) { NOPS(100); }"
 LONG_JUMP = "#include <setjmp.h>\nstatic jmp_buf env;"
 POINTER = "static void one(void) { PORTB = 1; }\nvoid (*volatile pointer)(void) = one;"
-TABLE = """
-__attribute__((noinline)) static void one(void) { NOPS(10); }
-__attribute__((noinline)) static void two(void) { NOPS(20); }
-#include <avr/pgmspace.h>
-static void (*const table[])(void) PROGMEM = {one, two};
-volatile unsigned char number;
-"""
-LOOKED_UP = "unsigned char i = number; if (i < 2) { ((void (*)(void))pgm_read_word(&table[i]))(); }"
 RECURSION = "volatile int v;\n__attribute__((noinline)) static int f(int n) { return n <= 1 ? 1 : n * f(n - 1) + v; }"
 PRINTED = "#include <stdio.h>\nstatic char text[9];\nvolatile int number;"
 ROOTS = "#include <math.h>\nvolatile float root;"
@@ -117,11 +109,6 @@ def ran(cycles: int, lowest_stack: int) -> Measurement:
         "first", np.array([cycles], dtype=np.uint32), np.array([cycles], dtype=np.uint32), Worst("figures", 1, 0)
     )
     return Measurement({"first": one}, {}, lowest_stack, 1.0, 0.1, scenarios=("figures",))
-
-
-def test_table_of_functions_with_a_checked_index_is_proved(tmp_path: Path) -> None:
-    found = budget.prove(program(tmp_path, TABLE, LOOKED_UP), FIGURES).costs.tasks["first"]
-    assert 20 + 4 < found < 20 + 4 + 30  # the longer callee and its return; what looks it up
 
 
 def test_stripped_image_is_refused(tmp_path: Path) -> None:

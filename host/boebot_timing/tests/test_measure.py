@@ -10,13 +10,12 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link.messages import Counters, Event, EventKind
-from boebot_timing.emulated.loads import SLOT_CYCLES, TICK_CYCLES, Bench
+from boebot_timing.emulated.loads import TICK_CYCLES, Bench
 from boebot_timing.emulated.losses import COUNTERS_TICKS, MASKED
-from boebot_timing.emulated.measure import HANG, WATCHDOG, hang, robot_of, run
+from boebot_timing.emulated.measure import robot_of, run
 from boebot_timing.emulated.scenarios import RANGES, load, numbers_of, prepare
 from boebot_timing.emulated.watched import Run
 from boebot_timing.measured import as_json, merged, statistics
-from boebot_timing.realisable import CLOCK_HZ
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image
@@ -75,26 +74,6 @@ def test_a_run_is_repeated_to_the_cycle_so_that_a_maximum_is_seen_again(figures:
     assert np.array_equal(run(IMAGE, robot_of(IMAGE), worst.scenario, SECONDS, worst.seed).spans, figures.spans)
 
 
-def test_a_hang_shows_the_watchdogs_interrupt() -> None:
-    """16,384 cycles of 128 kHz after the last kick, which was in the slot before; and nothing else of that time."""
-    found = hang(IMAGE, robot_of(IMAGE), seed=1)
-    (span,) = found.spans[found.spans["id"] == WATCHDOG]
-    hung_at = found.loaded_from + found.cycles
-    assert abs(int(span["begin"]) - hung_at - 16_384 * CLOCK_HZ // 128_000) < SLOT_CYCLES
-    assert found.spans[-1] == span and found.spans["begin"][-2] < hung_at
-    watchdog = found.measurement().row("watchdog")
-    assert watchdog.worst.scenario == HANG and watchdog.worst.cycle == span["begin"]
-    assert watchdog.largest == span["net"]
-
-
-def test_what_has_no_task_cannot_hang_in_one(tmp_path: Path) -> None:
-    source, image = tmp_path / "empty.c", tmp_path / "empty.elf"
-    source.write_text("int main(void) {}", encoding="ascii")
-    subprocess.run(["avr-gcc", "-mmcu=atmega328p", "-o", str(image), str(source)], check=True)
-    with pytest.raises(BoardError, match=r"empty.elf has no task; expected one"):
-        hang(image, robot_of(IMAGE), seed=1)
-
-
 def test_nothing_is_lost_in_the_figures(figures: Run) -> None:
     assert set(figures.lost.values()) == {0}
 
@@ -110,7 +89,6 @@ def test_an_overload_fills_the_line_and_masks_the_noise_without_a_late_tick() ->
     )
     counted = found.spans[found.spans["id"] == 4]  # pin changes of the encoders' port
     assert len(counted) < ticks * (3 * 40 + 16), "the noisy line still interrupts"
-    assert found.measurement().late_slots < ticks
 
 
 def test_faults_overflow_the_queue_of_events_and_mask_both_wheels() -> None:

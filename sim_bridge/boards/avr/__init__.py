@@ -21,8 +21,6 @@ from boebot.image.chip import assumed_chip
 from sim_bridge.boards.board import EmulatedBoard
 
 ERROR_SIZE = 200
-FLASH_SIZE = 0x8000  # bytes
-JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2
 FUNCTION_IDS = 64  # id of the first watched function; below are vectors
 
 SPAN = np.dtype(  # avr_span of avr_spans.h; cycles
@@ -82,12 +80,6 @@ class AvrBoard(EmulatedBoard):
         if not board:
             raise BoardError(f"the firmware image {path} cannot be loaded: {extension.ffi.string(error).decode()}")
         super().__init__(extension, board, "emulated ATmega328P", elf=path, assumed=assumed)
-
-    def hang_at(self, address: int) -> None:
-        """From now on the instruction at that byte address of the program jumps to itself."""
-        if not 0 <= address < FLASH_SIZE or address % 2:
-            raise ValueError(f"no instruction at 0x{address:X}; expected an even address below 0x{FLASH_SIZE:X}")
-        self.ffi.buffer(self.extension("flash", "uint8_t") + address, 2)[:] = JUMP_TO_ITSELF
 
     def one_by_one(self) -> None:
         """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""

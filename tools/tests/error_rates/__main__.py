@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from avr_timing.closed_pipe import exit_as
 from tools.printed import markdown, reprint
 from tools.tests.error_rates import library, wrong_bits
 from tools.tests.error_rates.image import Image
@@ -142,4 +142,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    exit_as(main)
+    sys.exit(main())
