@@ -129,7 +129,6 @@ static void *extension(board *self, const char *name) {
   avr_board *b = (avr_board *)self;
   if (!strcmp(name, BOARD_DATA)) return b->avr->data;
   if (!strcmp(name, BOARD_EEPROM)) return &b->eeprom.face;
-  if (!strcmp(name, AVR_BOARD_FLASH)) return b->avr->flash;
   if (!strcmp(name, BOARD_WATCHDOG_LOG)) return &b->watchdog_log;
   if (!strcmp(name, BOARD_NOTES)) return &b->notes;
   if (!strcmp(name, BOARD_FAULT_ADDRESS)) {

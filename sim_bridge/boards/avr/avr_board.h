@@ -19,8 +19,6 @@ board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t err
 void avr_board_one_by_one(board *self);
 /* python: end */
 
-/* The board's extension "flash": its program memory. */
-#define AVR_BOARD_FLASH "flash"
-#define AVR_BOARD_FLASH_SIZE 0x8000u
+#define AVR_BOARD_FLASH_SIZE 0x8000u /* bytes */
 
 #endif
