@@ -29,7 +29,6 @@ def bridge(
         str,
         typer.Argument(
             metavar="BOARD",
-            autocompletion=options.complete_boards,
             help="avr, native, or a port: /dev/ttyACM0, serial:PORT, socket://HOST:PORT.",
         ),
     ] = "native",

@@ -48,10 +48,10 @@ def listed() -> list[dict[str, Any]]:
     ]
 
 
-def _complete(incomplete: str) -> list[str]:
+def _names() -> list[str]:
     from boebot_course.experiments import all_experiments
 
-    return options.beginning(incomplete, dict.fromkeys(one.bare_name for one in all_experiments().values()))
+    return list(dict.fromkeys(one.bare_name for one in all_experiments().values()))
 
 
 def experiment(
@@ -59,7 +59,7 @@ def experiment(
         list[str] | None,
         typer.Argument(
             metavar="NAME",
-            autocompletion=_complete,
+            autocompletion=options.one_of(_names),
             help="Of an experiment, or a pattern with * and ?.",
             show_default=False,
         ),

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -109,10 +109,7 @@ def _name(kind: type[messages.Latch], value: int) -> str:
 def watch_link(url: str, robot: RobotDescription, seconds: float, as_json: bool) -> None:
     """Shows a table that stays in its place, or a JSON object every second."""
     with board_link(url, BoardRequest(robot=robot, record=False, realtime=True)) as (watched, _):
-        if as_json:
-            _watch(watched, seconds, lambda seen: output.print_json(seen, indent=None))
-        else:
-            _show_table(watched, seconds)
+        _watch(watched, seconds, (lambda seen: output.print_json(seen, indent=None)) if as_json else _show)
 
 
 def _watch(watched: Link, seconds: float, show: Callable[[dict[str, Any]], None]) -> None:
@@ -167,38 +164,15 @@ def _rounded(seconds: float | None) -> float | None:
     return None if seconds is None else round(seconds, 6)
 
 
-def _show_table(watched: Link, seconds: float) -> None:
-    from rich.live import Live
-
-    console = output.console()
-    if not console.is_terminal:
-        _watch(watched, seconds, lambda seen: console.print(_table(seen)))
-        return
-    with Live(console=console, auto_refresh=False) as live:
-        _watch(watched, seconds, lambda seen: live.update(output.Escaped(_table(seen)), refresh=True))
-
-
-def _table(seen: dict[str, Any]) -> Any:
-    from rich.columns import Columns
-    from rich.console import Group
-
-    state = output.table({name: value for name, value in seen.items() if name not in _TABLES})
-    counted = output.empty_table()
-    counted.add_column("counted", style="dim")
-    counted.add_column("host", justify="right")
-    counted.add_column("board", justify="right")
-    board = seen["board_end"] or {}
-    for name in dict.fromkeys((*seen["host"], *board)):
-        cells = [f"{end[name]:,}" if name in end else "" for end in (seen["host"], board)]
-        counted.add_row(name.replace("_", " "), *cells)
-    return Group(state, Columns([counted, _tasks(seen["task_longest_s"])], padding=(0, 4)))
-
-
-def _tasks(longest_s: Mapping[str, float | None]) -> Any:
-    """The longest time of each task, if the board takes any."""
-    tasks = output.empty_table()
-    tasks.add_column("task", style="dim")
-    tasks.add_column("longest (µs)", justify="right")
-    for name, took_s in longest_s.items():
-        tasks.add_row(name, "" if took_s is None else f"{1e6 * took_s:,.0f}")
-    return tasks if any(longest_s.values()) else ""
+def _show(seen: dict[str, Any]) -> None:
+    """As tables, which stay in their place on a terminal."""
+    if (screen := output.console()).is_terminal:
+        screen.clear()
+    output.print_table({name: value for name, value in seen.items() if name not in _TABLES})
+    ends = host, board = seen["host"], seen["board_end"] or {}
+    counted = ([name.replace("_", " "), *(f"{end.get(name, '')}" for end in ends)] for name in {**host, **board})
+    output.print_columns(("counted", "host", "board"), counted, numbers=(1, 2))
+    if any(seen["task_longest_s"].values()):  # the board takes times
+        tasks = seen["task_longest_s"].items()
+        longest = ([name, "" if took_s is None else f"{1e6 * took_s:,.0f}"] for name, took_s in tasks)
+        output.print_columns(("task", "longest (µs)"), longest, numbers=(1,))

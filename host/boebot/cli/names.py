@@ -31,7 +31,7 @@ def list_names(
         str | None,
         typer.Argument(
             metavar="WHAT",
-            autocompletion=options.one_of(*KINDS),
+            autocompletion=options.one_of(lambda: KINDS),
             help=f"One of {', '.join(KINDS)}; without it all of them.",
         ),
     ] = None,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,63 +28,25 @@ SETTINGS: dict[str, Any] = {
 Complete = Callable[[str], list[str]]
 
 
-def complete_robots(incomplete: str) -> list[str]:
-    """Bundled robots, and TOML files."""
-    from boebot.description.robots import robot_names
+def one_of(names: Callable[[], Iterable[str]], *suffixes: str) -> Complete:
+    """These names; with suffixes also files of them, and folders to go on with."""
 
-    return [*beginning(incomplete, robot_names()), *_files(incomplete, ".toml")]
+    def complete(incomplete: str) -> list[str]:
+        found = [name for name in names() if name.startswith(incomplete)]
+        if suffixes:
+            head, slash, begun = incomplete.rpartition("/")
+            for path in sorted(Path(head or slash or ".").glob(f"{begun}*")):
+                if path.is_dir() or path.suffix in suffixes:
+                    found.append(f"{head}{slash}{path.name}{'/' * path.is_dir()}")
+        return found
 
-
-def complete_arenas(incomplete: str) -> list[str]:
-    """Bundled arenas, and TOML files."""
-    from boebot.arenas import arena_names
-
-    return [*beginning(incomplete, arena_names()), *_files(incomplete, ".toml")]
-
-
-def complete_brains(incomplete: str) -> list[str]:
-    """Bundled brains, and files that may hold one."""
-    from boebot.brains import bundled
-
-    return [*beginning(incomplete, bundled()), *_files(incomplete, ".py", ".toml")]
+    return complete
 
 
-def complete_boards(incomplete: str) -> list[str]:
-    """What robots with boards run on."""
-    return [*beginning(incomplete, ("native", "avr", "direct")), *_files(incomplete)]
-
-
-def complete_imperfections(incomplete: str) -> list[str]:
-    """Names of imperfections, for a value to follow."""
-    from boebot import imperfections as table
-
-    return [f"{name}=" for name in beginning(incomplete, table.imperfections())]
-
-
-def one_of(*names: str) -> Complete:
-    """These names."""
-    return lambda incomplete: beginning(incomplete, names)
-
-
-def beginning(incomplete: str, names: Iterable[str]) -> list[str]:
-    """Those of these names."""
-    return [name for name in names if name.startswith(incomplete)]
-
-
-def _files(incomplete: str, *suffixes: str) -> list[str]:
-    """Those of these suffixes, and folders to go on with; without suffixes all of them, once a path has begun."""
-    head, slash, begun = incomplete.rpartition("/")
-    if not suffixes and not slash:
-        return []
-    found = []
-    for path in sorted(Path(head or slash or ".").glob(f"{begun}*")):
-        if path.name.startswith(".") and not begun:
-            continue
-        if path.is_dir():
-            found.append(f"{head}{slash}{path.name}/")
-        elif not suffixes or path.suffix in suffixes:
-            found.append(f"{head}{slash}{path.name}")
-    return found
+# Their modules are imported when TAB is pressed.
+complete_robots = one_of(lambda: import_module("boebot.description.robots").robot_names(), ".toml")
+complete_arenas = one_of(lambda: import_module("boebot.arenas").arena_names(), ".toml")
+complete_brains = one_of(lambda: import_module("boebot.brains").bundled(), ".py", ".toml")
 
 
 # ---- options ---------------------------------------------------------------------------------------------------------
@@ -94,7 +58,6 @@ On = Annotated[
     typer.Option(
         "--on",
         metavar="BOARD",
-        autocompletion=complete_boards,
         help=f"avr, native, or a port: {_PORTS}.",
     ),
 ]
@@ -103,7 +66,6 @@ RunOn = Annotated[
     typer.Option(
         "--on",
         metavar="BOARD",
-        autocompletion=complete_boards,
         help=f"avr, native, or a port: {_PORTS}; direct for a robot without a board. Else native, or direct.",
     ),
 ]
@@ -142,7 +104,6 @@ Imperfections = Annotated[
     typer.Option(
         "--imperfection",
         metavar="NAME=VALUE",
-        autocompletion=complete_imperfections,
         help="Give an imperfection of simulated robots another magnitude, as in servo_lag_s=80ms; again for each "
         "further one; `boebot list imperfections` names them.",
     ),
@@ -217,8 +178,10 @@ def names(text: str | None) -> tuple[str, ...]:
     return () if text is None else tuple(name.strip() for name in text.split(","))
 
 
-def live_view(*, view: bool, speed: float | None, port: int | None) -> contextlib.AbstractContextManager[Any]:
-    """The live view (boebot.live) that those options want, open; None: none.
+@contextlib.contextmanager
+def runner(*, view: bool, speed: float | None, port: int | None, waits: bool) -> Iterator[Callable[..., Any]]:
+    """What carries out a request as `boebot.running.loop.execute` does, in the live view that those options want.
+    `waits`: as of `run_viewed`.
 
     Raises:
         BoebotError: the port is taken, or options of a live view are given without one.
@@ -226,11 +189,15 @@ def live_view(*, view: bool, speed: float | None, port: int | None) -> contextli
     if not view:
         if speed is not None or port is not None:
             raise BoebotError("--speed and --view-port are of a live view; expected --view with them")
-        return contextlib.nullcontext()
-    from boebot.live.controls import usual_speed
-    from boebot.live.session import opened
+        from boebot.running.loop import execute
 
-    return opened(say_where, port=port or 0, speed=1.0 if speed is None else usual_speed(speed))
+        yield execute
+        return
+    from boebot.live.controls import usual_speed
+    from boebot.live.session import opened, run_viewed
+
+    with opened(say_where, port=port or 0, speed=1.0 if speed is None else usual_speed(speed)) as page:
+        yield functools.partial(run_viewed, page, waits=waits)
 
 
 def say_where(url: str) -> None:

@@ -43,7 +43,7 @@ def console(stderr: bool = False) -> Console:
 
     class Printable(RenderHook):
         def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
-            return [Escaped(one) for one in renderables]
+            return [_Escaped(one) for one in renderables]
 
     made = Console(stderr=stderr, highlight=False, markup=False, emoji=False)
     made.push_render_hook(Printable())
@@ -51,8 +51,8 @@ def console(stderr: bool = False) -> Console:
 
 
 @dataclass(frozen=True, slots=True)
-class Escaped:
-    """What rich prints, its text through `printable`. A `console` does so by itself, a `rich.live.Live` on it not."""
+class _Escaped:
+    """What rich prints, its text through `printable`."""
 
     inside: Any
 

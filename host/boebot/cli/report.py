@@ -34,7 +34,7 @@ def report(
         typer.Option(
             "--as",
             metavar="FORMAT",
-            autocompletion=options.one_of(*_KINDS),
+            autocompletion=options.one_of(lambda: _KINDS),
             help=f"Write the run in a format for other programs, too: {', '.join(_KINDS)}; again for each further one.",
         ),
     ] = None,

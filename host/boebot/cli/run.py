@@ -15,7 +15,6 @@ from boebot.cli import options, output, quantity, streams
 from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError
 from boebot.record import run_folder
-from boebot.running.loop import execute
 from boebot.running.tasks import Member, Request
 
 DEFAULT_ROBOT = "shieldbot"
@@ -150,14 +149,9 @@ def run(
         with contextlib.ExitStack() as shown:
             title = name if on is None else f"{name} on {on}"
             progress = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
-            page = shown.enter_context(options.live_view(view=view, speed=speed, port=view_port))
+            run_it = shown.enter_context(options.runner(view=view, speed=speed, port=view_port, waits=True))
             shown.enter_context(streams.kept(for_the_answer=json))
-            if page is None:
-                result = execute(request, progress, folder)
-            else:
-                from boebot.live.session import run_viewed
-
-                result = run_viewed(page, request, lambda wanted: execute(wanted, progress, folder, page), waits=True)
+            result = run_it(request, progress, folder)
         end(result, out, wanted)
 
 

@@ -20,7 +20,6 @@ from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError
 from boebot.record import run_folder
 from boebot.robot import Robot
-from boebot.running.loop import execute
 from boebot.running.tasks import Request
 
 HOLD_S = 0.6  # a key counts as held: terminals begin to repeat it after half a second
@@ -137,14 +136,8 @@ def teleop(
                 without=options.names(without),
                 imperfections=options.magnitudes(imperfection),
             )
-            with options.live_view(view=view, speed=None, port=view_port) as page:
-                if page is None:
-                    result = execute(request, folder=folder)
-                else:
-                    from boebot.live.session import run_viewed
-
-                    watched = functools.partial(execute, folder=folder, onlooker=page)
-                    result = run_viewed(page, request, watched, waits=False)
+            with options.runner(view=view, speed=None, port=view_port, waits=False) as run:
+                result = run(request, None, folder)
         with contextlib.suppress(OSError):  # a terminal that has gone must not cost the record
             output.line(file=screen)
         end(dataclasses.replace(result, brain="keyboard", error=None if brain.ended else result.error), out, wanted)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
@@ -147,21 +147,8 @@ def load_robot(robot: str | Path) -> RobotDescription:
     path = toml_files.find("robots", robot, RobotError)
     table = _read(path, seen=())
     description = toml_files.convert(table, RobotDescription, path.name, RobotError)
-    if description.body.outline_m and (fault := polygon_fault(description.body.outline_m, OUTLINE_CORNERS_MAXIMUM)):
-        place = f"body.outline_m{fault.partition(' ')[0].rstrip(':')}"
-        raise RobotError(f"{toml_files.where(table, path.name, place)}: body.outline_m{fault}")
-    _check_devices(description, table, path.name)
-    _check_imperfections(description, table, path.name)
-    if description.has_board:
-        if description.scheme != "kit":
-            at = f"{toml_files.where(table, path.name, 'scheme')}: scheme"
-            raise RobotError(f"{at} is {description.scheme!r}, which only a robot without a board can have")
-        _check_supply(description, path.name)
-        _check_pins(description, path.name)
-        _check_image(description, path)
-    else:
-        _check_vehicle(description, path.name)
-        _check_vehicle_devices(description, table, path.name)
+    for place, fault in _faults(description, path):
+        raise RobotError(f"{toml_files.where(table, path.name, place)}: {place}{fault}")
     return description
 
 
@@ -218,118 +205,116 @@ def _overlay(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def _check_supply(robot: RobotDescription, file: str) -> None:
-    """Refuses a board without a supply, and a pack that is fuller empty than full."""
+Faults = Iterator[tuple[str, str]]
+"""Place in the file ("": none that has a line), and the words behind it."""
+
+
+def _faults(robot: RobotDescription, path: Path) -> Faults:
+    """What its types do not say of a robot."""
+    if robot.body.outline_m and (fault := polygon_fault(robot.body.outline_m, OUTLINE_CORNERS_MAXIMUM)):
+        index = fault.partition(" ")[0].rstrip(":")
+        yield f"body.outline_m{index}", fault.removeprefix(index)
+    yield from _device_faults(robot)
+    yield from _imperfection_faults(robot)
+    if not robot.has_board:
+        yield from _vehicle_faults(robot)
+        return
+    if robot.scheme != "kit":
+        yield "scheme", f" is {robot.scheme!r}, which only a robot without a board can have"
     supply = robot.supply
     if supply is None:
-        raise RobotError(f"{file}: supply is missing; expected the table of the pack that the board runs on")
-    if not supply.full_v > supply.empty_v:
-        raise RobotError(
-            f"{file}: supply.full_v is {supply.full_v:g}; expected more than empty_v, {supply.empty_v:g} V"
-        )
+        yield "", "supply is missing; expected the table of the pack that the board runs on"
+    elif not supply.full_v > supply.empty_v:
+        yield "", f"supply.full_v is {supply.full_v:g}; expected more than empty_v, {supply.empty_v:g} V"
+    yield from _pin_faults(robot)
+    yield from _image_faults(robot, path)
 
 
-def _check_devices(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
-    """Refuses keys that do not fit each other, and names that a brain could not write."""
+def _device_faults(robot: RobotDescription) -> Faults:
+    """Keys that do not fit each other, and names that a brain could not write."""
     for name, device in robot.device.items():
         if not name.isidentifier() or name[0] == "_" or name in TAKEN:
-            at = f"{toml_files.where(table, file, f'device.{name}')}: device.{name}"
-            expected = "a name that robot.NAME can have in a brain"
-            raise RobotError(f"{at}: a device cannot have this name; expected {expected}")
+            yield f"device.{name}", ": a device cannot have this name; expected one that robot.NAME can have in a brain"
         if device.on and (fault := device.fault()):
-            key = f"device.{name}.{fault[0]}"
-            raise RobotError(f"{toml_files.where(table, file, key)}: {key}{fault[1]}")
+            yield f"device.{name}.{fault[0]}", fault[1]
 
 
-def _check_imperfections(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
-    """Refuses names and magnitudes that are none, and what other keys of the file say."""
+def _imperfection_faults(robot: RobotDescription) -> Faults:
+    """Names and magnitudes that are none, and what other keys of the file say."""
     known = imperfections()
     for name, value in robot.imperfections.items():
         if name not in known:
-            fault = f": {unknown(name)}"
+            yield f"imperfections.{name}", f": {unknown(name)}"
         elif (row := known[name]).key:
-            fault = f" is said elsewhere in a robot's file; expected {row.key} of {' or '.join(row.of)}"
-        else:
-            fault = row.fault(value)
-        if fault:
-            place = f"imperfections.{name}"
-            raise RobotError(f"{toml_files.where(table, file, place)}: {place}{fault}")
+            said = f" is said elsewhere in a robot's file; expected {row.key} of {' or '.join(row.of)}"
+            yield f"imperfections.{name}", said
+        elif fault := row.fault(value):
+            yield f"imperfections.{name}", fault
 
 
-def _check_pins(robot: RobotDescription, file: str) -> None:
-    """Refuses devices that cannot share a pin or a unit of the chip (ATmega328P data sheet), naming both."""
+def _pin_faults(robot: RobotDescription) -> Faults:
+    """Devices that cannot share a pin or a unit of the chip (ATmega328P data sheet); both are named."""
     pin_owner: dict[int, str] = {}
     unit_owner: dict[str, tuple[str, str]] = {}
     for name, device in robot.device.items():
+        kind = device.__struct_config__.tag
         if isinstance(device, VehicleDevice):
-            kind = device.__struct_config__.tag
-            raise RobotError(f"{file}: device.{name} is {kind}, which only a robot without a board can have")
+            yield "", f"device.{name} is {kind}, which only a robot without a board can have"
         if name not in device.NAMES:
-            kind, known = device.__struct_config__.tag, " or ".join(device.NAMES)
-            raise RobotError(f"{file}: device.{name} is {kind}; expected the name {known}, which the firmware knows")
+            known = " or ".join(device.NAMES)
+            yield "", f"device.{name} is {kind}; expected the name {known}, which the firmware knows"
         try:
             pins = {field: pin_number(getattr(device, field)) for field in device.PINS}
         except ValueError as error:
-            raise RobotError(f"{file}: device.{name}: {error}") from None
+            yield "", f"device.{name}: {error}"
         for field, pin in pins.items():
             allowed = device.ONLY_PINS.get(field)
             if allowed is not None and pin not in allowed:
                 expected = ", ".join(pin_name(number) for number in allowed)
-                raise RobotError(
-                    f"{file}: device.{name}.{field} is pin {pin_name(pin)}, which cannot do that; expected {expected}"
-                )
+                yield "", f"device.{name}.{field} is pin {pin_name(pin)}, which cannot do that; expected {expected}"
             if pin in pin_owner:
-                raise RobotError(f"{file}: {pin_owner[pin]} and {name} cannot share pin {pin_name(pin)}")
+                yield "", f"{pin_owner[pin]} and {name} cannot share pin {pin_name(pin)}"
             pin_owner[pin] = name
         for unit, group in device.NEEDS.items():
             owner, owner_group = unit_owner.setdefault(unit, (name, group))
             if owner != name and (group == "" or group != owner_group):
-                raise RobotError(f"{file}: {owner} and {name} cannot share {unit}")
+                yield "", f"{owner} and {name} cannot share {unit}"
 
 
-def _check_vehicle(robot: RobotDescription, file: str) -> None:
-    """Refuses pins, a supply and a drive that is none."""
+def _vehicle_faults(robot: RobotDescription) -> Faults:
+    """Without a board: pins, a supply, a drive that is none, a second battery (its devices empty one energy)."""
     if robot.supply is not None:
-        raise RobotError(
-            f"{file}: supply is given, but a robot without a board has none; its devices say their voltages"
-        )
+        yield "", "supply is given, but a robot without a board has none; its devices say their voltages"
     if robot.pin_map:
-        raise RobotError(f"{file}: pin_map is {robot.pin_map!r}, but a robot without a board has no pins")
+        yield "", f"pin_map is {robot.pin_map!r}, but a robot without a board has no pins"
     if robot.unit is not None:
-        raise RobotError(f"{file}: unit is {robot.unit}, but nothing of a robot without a board is drawn by it")
+        yield "", f"unit is {robot.unit}, but nothing of a robot without a board is drawn by it"
     for name, device in robot.device.items():
         if not isinstance(device, VehicleDevice):
             kind = device.__struct_config__.tag
-            raise RobotError(f"{file}: device.{name} is {kind}, which needs a board's pins, but board is {NO_BOARD!r}")
-        if not device.plugged:
-            raise RobotError(f"{file}: device.{name}.plugged is false, but a robot without a board has no plugs")
+            yield "", f"device.{name} is {kind}, which needs a board's pins, but board is {NO_BOARD!r}"
+        elif not device.plugged:
+            yield "", f"device.{name}.plugged is false, but a robot without a board has no plugs"
     for name in ("motor_left", "motor_right"):
         if not (robot.has(name) and isinstance(robot.device[name], Motor)):
-            raise RobotError(
-                f"{file}: device.{name} is missing or off; a robot without a board needs a dc_motor or regulated_motor"
-            )
+            needs = "a robot without a board needs a dc_motor or regulated_motor"
+            yield "", f"device.{name} is missing or off; {needs}"
     left, right = (robot.device[name].__struct_config__.tag for name in ("motor_left", "motor_right"))
     if left != right:
-        raise RobotError(f"{file}: device.motor_right is {right}, device.motor_left {left}; expected the same type")
-
-
-def _check_vehicle_devices(robot: RobotDescription, table: dict[str, Any], file: str) -> None:
-    """Refuses a second battery: a robot has one energy, which its devices empty."""
+        yield "", f"device.motor_right is {right}, device.motor_left {left}; expected the same type"
     batteries = [name for name, device in robot.device.items() if isinstance(device, Energy) and device.on]
     if len(batteries) > 1:
-        place = f"device.{batteries[1]}"
-        raise RobotError(f"{toml_files.where(table, file, place)}: {place} is a second energy; expected one")
+        yield f"device.{batteries[1]}", " is a second energy; expected one"
 
 
 _ALWAYS = ("servo_left", "servo_right", "uart")  # in every firmware image
 
 
-def _check_image(robot: RobotDescription, path: Path) -> None:
-    """Refuses what the firmware of the robot's pin map cannot do: other pins or devices than it was built with."""
-    file = path.name
+def _image_faults(robot: RobotDescription, path: Path) -> Faults:
+    """What the firmware of the robot's pin map cannot do: other pins or devices than it was built with."""
     for name in _ALWAYS:
         if not robot.has(name):
-            raise RobotError(f"{file}: device.{name} is missing or off; every robot needs it")
+            yield "", f"device.{name} is missing or off; every robot needs it"
     owner = resources.folder("robots") / f"{robot.pin_map}.toml"
     if not owner.is_file() or owner.samefile(path):
         return  # the robot has its own pin map, and so its own image
@@ -338,9 +323,10 @@ def _check_image(robot: RobotDescription, path: Path) -> None:
         built = image.device.get(name)
         if type(built) is not type(device) or (built is not None and built.pins() != device.pins()):
             there = "not there" if built is None else f"{built.__struct_config__.tag} on {_pins_text(built)}"
-            raise RobotError(
-                f"{file}: device.{name} is {device.__struct_config__.tag} on {_pins_text(device)}, but in the firmware "
-                f"for pin map {robot.pin_map!r} it is {there}; expected the same, or a pin_map of the robot's own"
+            yield (
+                "",
+                f"device.{name} is {device.__struct_config__.tag} on {_pins_text(device)}, but in the firmware "
+                f"for pin map {robot.pin_map!r} it is {there}; expected the same, or a pin_map of the robot's own",
             )
 
 

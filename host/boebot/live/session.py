@@ -12,7 +12,9 @@ from boebot.errors import BoebotError
 from boebot.imperfections import switched_off
 from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
+from boebot.record.run_folder import RunFolder
 from boebot.result import Result
+from boebot.running.loop import Progress, execute
 from boebot.running.tasks import Request
 from boebot.view.display import browse, published
 
@@ -41,18 +43,20 @@ def show(url: str, say: Callable[[str], None]) -> None:
         browse(url)
 
 
-def run_viewed(view: LiveView, request: Request, run: Callable[[Request], Any], *, waits: bool) -> Any:
+def run_viewed(
+    view: LiveView, request: Request, progress: Progress | None, folder: RunFolder | None, *, waits: bool
+) -> Any:
     """Runs what is requested, and again as often as a page asks for it; returns what came of the last run.
 
     Args:
-        run: carries out a request, with the view as its onlooker.
+        progress, folder: as of `boebot.running.loop.execute`.
         waits: at a run's end as long as a page is open, which may ask for another one.
     """
     result: Result | None = None
     while True:
         try:
             with Heard(view):
-                result = run(request)
+                result = execute(request, progress, folder, view)
         except BoebotError as error:
             if result is None:
                 raise

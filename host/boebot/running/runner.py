@@ -154,4 +154,4 @@ def _viewed(request: Request, progress: Progress | None, folder: RunFolder | Non
     from boebot.live.session import opened, run_viewed
 
     with opened(lambda url: print(f"watch it: {url}", file=sys.stderr, flush=True)) as page:
-        return run_viewed(page, request, lambda wanted: execute(wanted, progress, folder, page), waits=False)
+        return run_viewed(page, request, progress, folder, waits=False)

@@ -8,7 +8,6 @@ import sys
 import unicodedata
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -33,13 +32,6 @@ def test_printable_text_has_no_control_characters(text: str) -> None:
         assert shown == text
 
 
-def live(table: Any) -> None:
-    from rich.live import Live
-
-    with Live(console=output.console(), auto_refresh=False) as shown:
-        shown.update(output.Escaped(table), refresh=True)
-
-
 @pytest.mark.parametrize(
     "show",
     [
@@ -48,7 +40,6 @@ def live(table: Any) -> None:
         lambda text: output.print_json({text: text}),
         lambda text: output.print_columns(("a", "b"), [(f"{text} [bold]not mark-up[/]", "1")]),
         lambda text: output.console().print(text, output.table({text: 1})),
-        lambda text: live(output.table({text: 1})),
     ],
 )
 def test_each_way_to_print_shows_them_as_escapes(

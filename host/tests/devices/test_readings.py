@@ -67,7 +67,7 @@ def test_any_declared_name_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["drive", "time", "front-left", "_seed"])
 def test_names_that_a_brain_could_not_read_are_refused(tmp_path: Path, name: str) -> None:
     text = f"[device.{name}]\ntype = 'touch_whisker'\nroot_m = [0.1, 0]\ntip_m = [0.2, 0]"
-    with pytest.raises(RobotError, match=f"device.{name}: a device cannot have this name; expected a name that robot"):
+    with pytest.raises(RobotError, match=f"device.{name}: a device cannot have this name; expected one that robot"):
         load_robot(variant(tmp_path, text))
 
 
