@@ -70,8 +70,6 @@ class Audience:
         if isinstance(what, messages.Hello):
             if page.number in self._pages:
                 return "expected hello once"
-            if what.format != page_data.FORMAT:
-                return f"this page is of another version (format {what.format}, not {page_data.FORMAT}); load it again"
             with self.changed:
                 self._pages[page.number] = page
                 self._begin_page(page)
@@ -123,7 +121,6 @@ class Audience:
         bounds, data = [*low.tolist(), *high.tolist()], page_data.plan_data(plan)
         self._run = {
             "type": "run",
-            "format": page_data.FORMAT,
             "plan": data,
             "bounds": bounds,
             "runs": runs,

@@ -27,7 +27,7 @@ from boebot.live.page_server import LOOPBACK
 from boebot.record.interventions import Deed
 from boebot.record.run import Run
 from boebot.running import interrupts
-from boebot.running.brain_parameters import bounds, meaning, sliders
+from boebot.running.brain_parameters import bounds, sliders
 from boebot.running.hands import Hands
 from boebot.running.loop import gather_rows
 
@@ -319,8 +319,7 @@ def _sliders(robot: Hands) -> list[Message]:
     made = []
     for name, value in sliders(brain).items():
         least, most = bounds(brain, name)
-        text = meaning(brain, name)
-        made.append({"name": name, "value": value, "least": least, "most": most, "text": text})
+        made.append({"name": name, "value": value, "least": least, "most": most})
     return made
 
 

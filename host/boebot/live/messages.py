@@ -18,9 +18,7 @@ class _Message(msgspec.Struct, frozen=True, tag_field="type", tag=str.lower, for
 
 
 class Hello(_Message, frozen=True):
-    """The first message. `format`: of data that the page knows."""
-
-    format: int
+    """The first message."""
 
 
 class Pause(_Message, frozen=True):

@@ -18,7 +18,6 @@ from boebot.record.truth import APART_S, Bools, Floats, Pose, Track
 
 POINTS = 20_000  # ticks at most that are drawn
 STEPS = 6_000  # of a brain of processes, at most
-PLACES = 5_000  # touches at most whose places are drawn
 ODOMETRY_S = 0.1  # from place to place of a path by odometry
 
 
@@ -51,25 +50,6 @@ class Overview:
     shown: Shown
     layers: list[Layer]
     brain: BrainRecord | None
-
-
-class _Places:
-    """Where something happened, and how often."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self._found: list[Floats] = []
-
-    def add(self, x: Floats, y: Floats) -> None:
-        """Some more."""
-        room = max(0, PLACES - self.count)
-        self._found.append(np.column_stack((x, y))[:room])
-        self.count += len(x)
-
-    @property
-    def found(self) -> Floats:
-        """The first `PLACES` of them, shape (n, 2)."""
-        return np.vstack([np.empty((0, 2)), *self._found])
 
 
 class _Walk:
@@ -108,7 +88,7 @@ class _Contacts:
     """Where the body came to touch something that it had not touched for `APART_S`."""
 
     def __init__(self) -> None:
-        self.places = _Places()
+        self.places: list[Floats] = []
         self._seen_s = -math.inf  # of the truth so far
         self._touched_s = -math.inf
 
@@ -119,7 +99,7 @@ class _Contacts:
         if len(touching):
             before = np.concatenate(([self._touched_s], track.time[touching[:-1]]))
             new = touching[track.time[touching] - before > APART_S]
-            self.places.add(track.pose.x[new], track.pose.y[new])
+            self.places.append(np.column_stack((track.pose.x[new], track.pose.y[new])))
             self._touched_s = float(track.time[touching[-1]])
         self._seen_s = max(self._seen_s, end_s)
 
@@ -160,7 +140,7 @@ def overview(result: Recorded, whiskers: list[str], names: BrainNames | None) ->
     slow = [name for name, device in result.robot.device.items() if isinstance(device, SlowDevice)]
     ticks = record.ticks
     stride = max(1, math.ceil(ticks / POINTS))
-    counts, touches, contacts = _Counts(), _Places(), _Contacts()
+    counts, touches, contacts = _Counts(), list[Floats](), _Contacts()
     true_walk, odometry_walk = _Walk(), _Walk(ODOMETRY_S)
     few: list[Columns] = []
     seen = 0
@@ -176,18 +156,20 @@ def overview(result: Recorded, whiskers: list[str], names: BrainNames | None) ->
             true_walk.add(time, pose.part(new), is_last=is_last, lifts=part.track.lifts - offset_s)
             contacts.add(part.track, offset_s, float(time[-1] + offset_s))
         pressed = counts.add(part, whiskers, slow)
-        touches.add(pose.x[pressed], pose.y[pressed])
+        touches.append(np.column_stack((pose.x[pressed], pose.y[pressed])))
         few.append(part.part(part.first + np.flatnonzero((number % stride == 0) | (number == ticks - 1))))
+    none = np.empty((0, 2))
+    contact_places = np.vstack([none, *contacts.places])
     drawn = chained(few) if few else whole(result)
     events = [(event.kind, event.value) for event in record.events]
     return Overview(
         columns=drawn,
         true_distance=None if drawn.true_pose is None or not ticks else true_walk.length,
         odometry_distance=None if drawn.odometry is None or not ticks else odometry_walk.length,
-        true_contacts=None if drawn.true_pose is None or not ticks else contacts.places.count,
+        true_contacts=None if drawn.true_pose is None or not ticks else len(contact_places),
         whisker_touches=counts.touches if whiskers and ticks else None,
-        contact_places=contacts.places.found,
-        touch_places=touches.found,
+        contact_places=contact_places,
+        touch_places=np.vstack([none, *touches]),
         overruns=counts.overruns,
         # telemetry is not heard while a session is lost, and an event not while there is none
         dead_man_stops=max(counts.dead_man, sum(kind == EventKind.DEAD_MAN for kind, _ in events)),

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import inspect
 import json
 import math
-import re
 import typing
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from boebot.brain import Process
     from boebot.brains import LoadedBrain
 
-_ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n     +\S.*)*)", re.MULTILINE)  # of "Args:" in a docstring
 _PLAIN = bool | int | float | str | tuple[Any, ...] | None  # what a parameter may be
 
 
@@ -194,16 +191,3 @@ def _takes(place: _Place, value: float) -> bool:
     except BrainError:
         return False
     return True
-
-
-def meaning(brain: LoadedBrain, name: str) -> str:
-    """Of a parameter, as the documentation of its process's class, or of `Utility`, says it; "" where it does not."""
-    place = _places(brain)[name]
-    kinds = (Utility,) if place.part else type(place.process).__mro__
-    field = place.part.partition(".")[0] or place.field
-    for kind in kinds:
-        arguments = inspect.getdoc(kind) or ""
-        for found, text in _ARGUMENT.findall(arguments.partition("Args:")[2].partition("Attributes:")[0]):
-            if found == field:
-                return " ".join(text.split())
-    return ""

@@ -4,36 +4,32 @@ topic             what is in it
 /tf               frames in `world`: `robot` by its true pose, else by odometry; `odometry`, where the odometry thinks
                   that it is, laid on the true start; `mover-1` and so on, the shapes that move
 /scene            arena, moving shapes and robots
-/pose, /odometry  the same poses by themselves; /path, /odometry_path: all of them at once, thinned
+/path, /odometry_path   all poses at once, thinned
 /laser            each sweep of a laser range finder
 /ping and so on   numbers of a device, as in run.csv; /board: numbers of the board, or of a robot without one
-/shown            numbers that the brain shows, when they change; its texts are in /log
-/sketch           its sketches: each layer is an entity of that name
+/shown            numbers that the brain shows
 /command          what the brain asked for: kind (0 stop, 1 signal, 2 speed), left, right
 /log              events of the board, switches of a brain, notices, how the run ended
 
 Times are the run's, from 0 on. Of several robots, topics and frames begin with robot-1, robot-2 and so on, but for
-`world`, movers, /tf, /scene, /sketch and /log. It is made part by part: memory does not grow with the run.
+`world`, movers, /tf, /scene and /log. It is made part by part: memory does not grow with the run.
 """
 
 from __future__ import annotations
 
 import heapq
 import itertools
-import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import msgspec
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.LaserScan_pb2 import LaserScan
 from foxglove_schemas_protobuf.Log_pb2 import Log
-from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
@@ -45,10 +41,10 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from boebot.arenas.floor_plan import floor_plan, moving_solids
 from boebot.devices.laser import Laser
 from boebot.errors import brief
-from boebot.record.brain_record import each_switch, names_in
+from boebot.record.brain_record import each_switch, names_in, shown_in
 from boebot.record.columns import Columns, columns, events
 from boebot.record.truth import lateness, shifts
-from boebot.showing import SKETCH, VALUES, Sketch
+from boebot.showing import VALUES
 from boebot.view import foxglove_scene, scene, style
 
 if TYPE_CHECKING:
@@ -74,7 +70,7 @@ def write(results: Sequence[Run], path: Path) -> None:
     colours = [style.colour(number) for number in range(1, len(results) + 1)]
     streams = [_scene(results, prefixes, colours), _movers(results[0])]
     for result, prefix in zip(results, prefixes, strict=True):
-        streams += [_ticks(result, prefix), _shown(result, prefix), _sketches(result, prefix), _log(result, prefix)]
+        streams += [_ticks(result, prefix), _log(result, prefix)]
     with path.open("wb") as file:
         _write(heapq.merge(*streams, key=_TIME), file)
 
@@ -197,6 +193,7 @@ def _movers(result: Run) -> Iterator[Entry]:
 def _ticks(result: Run, prefix: str) -> Iterator[Entry]:
     """Poses, sweeps, numbers and commands of a robot."""
     kinds: dict[str, Any] = {}
+    names = names_in(result.record.each_row(VALUES))
     start: tuple[float, float, float] | None = None
     for part in columns(result):
         if start is None:
@@ -209,7 +206,7 @@ def _ticks(result: Run, prefix: str) -> Iterator[Entry]:
             _sweeps(result, part, prefix),
             *(
                 _numbers(f"/{prefix}{name}", part.time[part.first :], table, kinds)
-                for name, table in _tables(result, part).items()
+                for name, table in _tables(result, part, names).items()
             ),
             _numbers(f"/{prefix}command", part.time[steps], commands, kinds),
             key=_TIME,
@@ -220,14 +217,9 @@ def _poses(part: Columns, estimate: Pose | None, prefix: str) -> Iterator[Entry]
     seen = part.true_pose if part.true_pose is not None else estimate
     if seen is None:
         return
-    placed = [("robot", "pose", seen)] + ([] if estimate is None else [("odometry", "odometry", estimate)])
+    placed = [("robot", seen)] + ([] if estimate is None else [("odometry", estimate)])
     for index, time_s in itertools.islice(enumerate(part.time.tolist()), part.first, None):
-        transforms = []
-        for frame, topic, path in placed:
-            x, y, heading = path.at(index)
-            transforms.append(_transform(time_s, f"{prefix}{frame}", x, y, heading))
-            pose = foxglove_scene.pose(x, y, heading)
-            yield time_s, f"/{prefix}{topic}", PoseInFrame(timestamp=_stamp(time_s), frame_id=WORLD, pose=pose)
+        transforms = [_transform(time_s, f"{prefix}{frame}", *path.at(index)) for frame, path in placed]
         yield time_s, "/tf", FrameTransforms(transforms=transforms)
 
 
@@ -254,17 +246,27 @@ def _sweeps(result: Run, part: Columns, prefix: str) -> Iterator[Entry]:
             yield part.time[index], f"/{prefix}{name}", sweep
 
 
-def _tables(result: Run, part: Columns) -> dict[str, dict[str, NDArray[Any]]]:
-    """Numbers at each new tick, by their names: of each device that has no topic of another kind, and of the board."""
+def _tables(result: Run, part: Columns, names: Mapping[str, bool]) -> dict[str, dict[str, NDArray[Any]]]:
+    """Numbers at each new tick, by their names: of each device that has no topic of another kind, of the board, and of
+    what the brain shows (`names_in`)."""
     devices = {
         name: list(part.device_columns(name).values())
         for name, device in result.robot.device.items()
         if not isinstance(device, Laser)
     }
-    return {
-        name: {"_".join(filter(None, (one.name, one.unit))): one.values[part.first :] for one in columns}
+    tables = {
+        name: {"_".join(filter(None, (one.name, one.unit))): one.values for one in columns}
         for name, columns in (devices | {"board": part.own_columns()}).items()
-        if columns
+    }
+    shown = shown_in(part.showing.rows(), names).at(part.time).numbers
+    tables["shown"] = {
+        f"{FIELD.sub('_', name)}_{place}" if FIELD.search(name) else name: values
+        for place, (name, values) in enumerate(shown.items())
+    }
+    return {
+        name: {field: values[part.first :] for field, values in table.items()}
+        for name, table in tables.items()
+        if table
     }
 
 
@@ -287,46 +289,6 @@ def _kind(name: str, fields: Iterable[str]) -> Any:
     pool = DescriptorPool()
     pool.Add(file)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(f"boebot.{name}"))
-
-
-# ---- what the brain shows ----------------------------------------------------------------------------------------
-
-
-def _shown(result: Run, prefix: str) -> Iterator[Entry]:
-    """Its numbers, a field for each; and a line where a text changes."""
-    names = names_in(result.record.each_row(VALUES))
-    numbers = [name for name, is_text in names.items() if not is_text]
-    fields = [f"{FIELD.sub('_', name)}_{place}" if FIELD.search(name) else name for place, name in enumerate(numbers)]
-    kind = _kind("shown", fields) if numbers else None
-    before: dict[str, Any] = {}
-    for time_s, data in result.record.each_row(VALUES):
-        row = msgspec.json.decode(data)
-        if kind is not None:
-            values = {field: row.get(name, math.nan) for field, name in zip(fields, numbers, strict=True)}
-            yield time_s, f"/{prefix}shown", kind(**values)
-        for name, is_text in names.items():
-            if is_text and row.get(name, "") != before.get(name, ""):
-                yield _line(time_s, Log.INFO, f"{prefix}brain", f"{name}: {row.get(name, '')}")
-        before = row
-
-
-def _sketches(result: Run, prefix: str) -> Iterator[Entry]:
-    """Each sketch of each layer, in the frame that it is in."""
-    layers: list[str] = []
-    start = result.overview.columns.true_pose
-    place = (0.0, 0.0, 0.0) if start is None or not len(start.x) else start.at(0)
-    for number, (time_s, data) in enumerate(result.record.each_row(SKETCH)):
-        if number == 0:
-            frame = FrameTransforms(transforms=[_transform(0.0, f"{prefix}start", *place)])
-            yield 0.0, "/tf", frame
-        drawn = msgspec.json.decode(data, type=Sketch)
-        if drawn.layer not in layers:
-            layers.append(drawn.layer)
-        colour = style.layer(layers.index(drawn.layer))
-        frame_id = WORLD if drawn.frame == "arena" else f"{prefix}{drawn.frame}"
-        entity = foxglove_scene.sketch(drawn, f"{prefix}{drawn.layer}", frame_id, colour)
-        entity.timestamp.CopyFrom(_stamp(time_s))
-        yield time_s, "/sketch", SceneUpdate(entities=[entity])
 
 
 # ---- what is said ----------------------------------------------------------------------------------------------------

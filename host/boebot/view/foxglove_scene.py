@@ -1,9 +1,9 @@
-"""Paints display lists as entities of Foxglove's 3D panel, with edges and upright sides (m, rad); and sketches."""
+"""Paints display lists as entities of Foxglove's 3D panel, with edges and upright sides (m, rad)."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
@@ -15,18 +15,15 @@ from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 
 from boebot.devices.drawing import SIGHTS
-from boebot.showing import UNKNOWN
-from boebot.view import painter, style
+from boebot.view import style
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from boebot.arenas.arena import Floats
     from boebot.devices.drawing import Item
-    from boebot.showing import Sketch
 
 PAINT_M = 0.001  # above the floor
-CROSS_M = 0.01  # half the arm of a cross at a point that a brain sketches
 EDGE_PX = 2.0
 
 
@@ -44,30 +41,6 @@ def items(display_list: Iterable[Item], name: str, frame: str, robot: str = styl
         ink = style.paint(item.ink or item.fill, robot)
         for level in (0.0, item.height) if item.height else (PAINT_M,):
             _add_edge(entity, corners, level, ink, is_closed=item.closed, width_m=item.wide_m)
-    return entity
-
-
-def sketch(drawn: Sketch, entity_id: str, frame: str, colour: str) -> SceneEntity:
-    """What a layer of a brain's sketches shows; cells of a grid as squares on the floor, free ones none."""
-    entity = SceneEntity(id=entity_id, frame_id=frame, frame_locked=True)
-    for line in drawn.lines:
-        _add_edge(entity, painter.pairs(line), PAINT_M, colour, is_closed=False)
-    if drawn.points:
-        points = painter.pairs(drawn.points)
-        arms = np.array(((-CROSS_M, 0.0), (CROSS_M, 0.0), (0.0, -CROSS_M), (0.0, CROSS_M)))
-        crosses = (points[:, None] + arms).reshape(-1, 2)
-        _add_edge(entity, crosses, PAINT_M, colour, kind=LinePrimitive.LINE_LIST)
-    if (grid := drawn.grid) is not None:
-        cells = np.frombuffer(grid.cells, dtype=np.uint8).reshape(grid.rows, grid.columns)
-        row, column = np.nonzero((cells > 0) & (cells != UNKNOWN))
-        corner = np.column_stack((column, row))
-        squares = (corner[:, None] + np.array(((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)))).reshape(-1, 2)
-        opacity = np.repeat(painter.rgba(grid, colour)[row, column, 3], 6)
-        entity.triangles.add(
-            pose=pose(grid.x, grid.y, 0.0),
-            points=_points(squares * grid.cell, 0.0),
-            colors=[_colour(colour, alpha) for alpha in opacity.tolist()],
-        )
     return entity
 
 
@@ -97,13 +70,12 @@ def _add_edge(
     height: float,
     colour: str,
     *,
-    is_closed: bool = True,
-    width_m: float = 0.0,
-    kind: Any = None,
+    is_closed: bool,
+    width_m: float,
 ) -> None:
-    """A line of that width; 0: as thin everywhere on the screen. `kind`: one of LinePrimitive's; None: a line."""
+    """A line of that width; 0: as thin everywhere on the screen."""
     entity.lines.add(
-        type=kind or (LinePrimitive.LINE_LOOP if is_closed else LinePrimitive.LINE_STRIP),
+        type=LinePrimitive.LINE_LOOP if is_closed else LinePrimitive.LINE_STRIP,
         pose=pose(0.0, 0.0, 0.0),
         thickness=width_m or EDGE_PX,
         scale_invariant=not width_m,

@@ -2,7 +2,6 @@
 and *rows*, what it did in some stretch of time (`rows_data`). A replay has the whole run in one stretch; a live view
 sends a stretch of a few ticks many times a second, and the page appends them.
 
-format   number of the data's form, which page and data share
 plan     display lists (boebot.devices.drawing) of what stands in the arena; `moving`: of the moving shapes in their own
          frames
 bounds   of what there is to see, from where the page fits its view
@@ -52,7 +51,6 @@ if TYPE_CHECKING:
     from boebot.record.run import Run
     from boebot.record.truth import Bools, Floats, Pose
 
-FORMAT = 11
 RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
 WHOLE = 65535  # such a number for the whole reach
 EVENTS_AT_MOST = 2_000  # of a stretch

@@ -29,12 +29,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from boebot.arenas.arena import Floats
-    from boebot.arenas.floor_plan import FloorPlan, Moving
+    from boebot.arenas.floor_plan import FloorPlan
     from boebot.description.robots import RobotDescription
     from boebot.showing import GridCells, Sketch
     from boebot.view.scene import Swept, View
 
-GHOSTS_MAXIMUM = 30  # places at which a moving shape is shown along its way
 HATCH = "////"
 LABEL_SIZE, INSIDE_SIZE = 7.5, 6.3
 SWEPT_SHADE, SWEPT_EDGE = 0.10, 0.45  # opacity of the area of a sweep, and of its outline
@@ -128,16 +127,12 @@ def quiet(axes: Axes, x: str, y: str) -> None:
 
 
 def draw_arena(axes: Axes, plan: FloorPlan) -> None:
-    """Draws all that a plan has; moving shapes where they begin, and along their way."""
+    """Draws all that a plan has; moving shapes where they begin, and their way."""
     if not plan.outlines:
         axes.set_facecolor(style.FLOOR)
     paint(axes, scene.arena_items(plan))
     for moving in plan.moving:
         axes.plot(moving.x, moving.y, color=style.MOVING, lw=1.0, ls=(0, (4, 2)), zorder=2.5)
-        for time in ghost_times(moving):
-            edge = scene.moving_item(moving.at(time)).points
-            look = {"facecolor": "none", "edgecolor": style.MOVING, "lw": 0.7, "alpha": 0.75, "zorder": 2.5}
-            axes.add_patch(Polygon(edge, closed=True, **look))
         paint(axes, [scene.moving_item(moving.at(float(moving.time[0])))])
     paint(axes, scene.moving_remarks(plan))
 
@@ -150,21 +145,6 @@ def legend_entries(plan: FloorPlan) -> list[Artist]:
         Patch(fc=style.paint(item.fill), ec=style.EDGE, lw=0.8, hatch=HATCH if item.hatch else None, label=says)
         for says, item in found.items()
     ]
-
-
-def ghost_times(moving: Moving) -> list[float]:
-    """Times (s) at which a moving shape stands where it covers little of what it has covered before."""
-    low, high = moving.solid.box
-    size = float((high - low).max())
-    reach = float(np.hypot(*moving.solid.points.T).max())  # of its corners from the point that it turns about
-    way = np.column_stack((moving.x, moving.y, moving.heading * reach))
-    shown = [0]
-    for index in range(1, len(way)):
-        if len(shown) > GHOSTS_MAXIMUM:
-            break
-        if np.linalg.norm(way[shown] - way[index], axis=1).min() > size:
-            shown.append(index)
-    return [float(moving.time[index]) for index in shown[1:]]
 
 
 def draw_robot(

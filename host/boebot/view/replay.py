@@ -53,7 +53,6 @@ def content(results: Sequence[Run]) -> dict[str, Any]:
     room = SWEPT_AT_MOST // max(1, sum(len(view.swept) for view in views))
     plan = views[0].plan
     return {
-        "format": page_data.FORMAT,
         "plan": page_data.plan_data(plan),
         "bounds": [*low.tolist(), *high.tolist()],
         "runs": [

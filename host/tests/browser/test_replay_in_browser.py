@@ -235,9 +235,6 @@ def test_values_under_the_pointer(run: tuple[RunResult, str], page: Page) -> Non
         index = int(np.searchsorted(result.series.time, told + 0.005)) - 1
         left, right = (values[index] for values in result.series.signals)
         assert page.inner_text("#tip").endswith(f"motors: left {left:+.2f}, right {right:+.2f}".replace("-", "−"))
-    page.evaluate("seek(3)")
-    page.mouse.move(*at_robot(page))
-    assert page.inner_text("#tip").startswith("wander\nat ")
     page.mouse.move(5, 5)
     assert page.is_hidden("#tip")
 

@@ -25,7 +25,6 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from boebot.result import RunResult, read_run
-from boebot.view.page_data import FORMAT
 from boebot.view.replay import content
 from command import boebot, heed_signals
 
@@ -73,7 +72,7 @@ class Page:
 
     def __init__(self, stream: ClientConnection) -> None:
         self.stream = stream
-        self.say(type="hello", format=FORMAT)
+        self.say(type="hello")
 
     def say(self, **message: Any) -> None:
         """Sends it."""
@@ -162,7 +161,7 @@ def let_go(stream: ClientConnection) -> bool:
     return False
 
 
-def test_rubbish_floods_and_old_pages_are_let_go_and_the_run_goes_on(endless: Run) -> None:
+def test_rubbish_and_floods_are_let_go_and_the_run_goes_on(endless: Run) -> None:
     for messages in (["rubbish"], [json.dumps({"type": "hello", "format": 1})], [b"\x00" * 100], ["x" * 100_000]):
         with endless.stream() as stream:
             for message in messages:

@@ -23,7 +23,7 @@ from boebot.live.outbox import EVENTS, LETTERS, Outbox
 from boebot.live.pace import Pace
 from boebot.record.interventions import Arm, Deed, Hand, Parameter, Place, Release, Stop, Tally
 from boebot.record.record import Record
-from boebot.running.brain_parameters import bounds, meaning, set_parameters, sliders
+from boebot.running.brain_parameters import bounds, set_parameters, sliders
 from boebot.running.loop import execute
 from boebot.running.tasks import Member, Request
 
@@ -211,8 +211,6 @@ def test_every_slider_of_the_bundled_brain_stays_within_what_its_process_takes()
         for one in (least, most, value):
             set_parameters(brain, {name: one})
     assert bounds(brain, "wander.utility.b") == (-1.5, 1.5)
-    assert meaning(brain, "avoid.after") == "s to turn on once both are clear."
-    assert meaning(brain, "avoid.utility.w.near") == "weights, by the name of the state variable."
 
 
 def test_first_chunk_has_all_robots_from_their_beginning(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

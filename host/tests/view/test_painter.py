@@ -28,7 +28,7 @@ from boebot.record import overview
 from boebot.result import RunResult
 from boebot.running import loop
 from boebot.view import picture, scene, style
-from boebot.view.painter import draw_arena, draw_robot, frame, ghost_times, legend_entries, paint
+from boebot.view.painter import draw_arena, draw_robot, frame, legend_entries, paint
 from peer import InProcess, Peer
 
 numbers = st.floats(-3, 3)
@@ -132,24 +132,6 @@ def test_a_moving_shape_is_turned_and_shifted(x: float, y: float, heading: float
     expected = shapely.affinity.translate(turned, share * x, share * y)
     assert np.allclose(placed.points, np.array(expected.exterior.coords)[:4], atol=1e-9)
     assert moving.pose(-1.0) == (0.0, 0.0, 0.0) and moving.pose(9.0) == pytest.approx((x, y, heading))
-
-
-def test_ghosts_of_a_shape_do_not_lie_on_each_other() -> None:
-    disc = Solid(kind="disc", points=np.zeros((1, 2)), radius=0.1)
-    time = np.linspace(0, 60, 1201)  # to and fro, ten times
-    x = np.abs((time / 3 + 1) % 2 - 1)
-    moving = Moving(solid=disc, time=time, x=x, y=np.zeros_like(x), heading=np.zeros_like(x))
-    places = sorted([0.0, *(moving.pose(at)[0] for at in ghost_times(moving))])
-    assert len(places) == 5 and np.diff(places).min() >= 0.2
-
-
-def test_ghosts_of_a_gate_show_that_it_opens() -> None:
-    """It turns by a right angle about its end, and stays where it is otherwise."""
-    gate = Solid(kind="obstacle", points=np.array([(0, -0.02), (0.5, -0.02), (0.5, 0.02), (0, 0.02)]), height=0.05)
-    time = np.linspace(0, 3, 61)
-    still = np.zeros_like(time)
-    moving = Moving(solid=gate, time=time, x=still, y=still, heading=time / 3 * math.pi / 2)
-    assert len(ghost_times(moving)) == 1
 
 
 # ---- of a run --------------------------------------------------------------------------------------------------------

@@ -16,7 +16,6 @@ from pathlib import Path
 from boebot.live.live_view import LiveView
 from boebot.running.loop import execute
 from boebot.running.tasks import Member, Request
-from boebot.view.page_data import FORMAT
 from tools.tests.bench.figures import Peer, figure, loop_s
 
 SECONDS = 400.0
@@ -33,7 +32,7 @@ def read(url: str) -> None:
     address, _, query = url.partition("/?")
     stream = f"{address.replace('http', 'ws', 1)}/stream?{query}"
     with contextlib.suppress(ConnectionClosed), connect(stream, origin=Origin(address), max_size=None) as connection:
-        connection.send(json.dumps({"type": "hello", "format": FORMAT}))
+        connection.send(json.dumps({"type": "hello"}))
         print("here", flush=True)
         while True:
             connection.recv(decode=False)

@@ -137,6 +137,14 @@ const placeOfThing = ({ kind, index }) => (kind === "robot" ? placeOf(runs[index
 const nameOf = ({ kind, index }) =>
   kind === "shape" ? "shape " + (index + 1) : runs.length > 1 ? "robot " + (index + 1) : "the robot";
 
+function within(points, x, y) {
+  let inside = false;
+  points.forEach(([ax, ay], i) => {
+    const [bx, by] = points[(i + 1) % points.length];
+    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) inside = !inside;
+  });
+  return inside;
+}
 function isAt(thing, x, y) {
   const place = placeOfThing(thing);
   if (thing.kind === "robot")

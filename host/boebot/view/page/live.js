@@ -1,10 +1,7 @@
 // The live view: gets a run that goes on from the server that the page came from, shows its newest moment, or an earlier
 // one, and asks for what the run's `can` allows. What it does not allow is not on the page.
 
-const FORMAT = 11; // of the data, as in page_data.py
-const RETRY_S = [1, 1, 2, 4, 8]; // from one attempt to connect to the next one
 let socket = null;
-let attempts = 0; // to connect again
 let live = null; // what can be done: see LiveView._live of boebot.live.live_view
 let can = new Set();
 let state = null; // how the run is now
@@ -20,8 +17,7 @@ function connect() {
   tellConnection("connecting …");
   socket = new WebSocket(address);
   socket.onopen = () => {
-    attempts = 0;
-    send({ type: "hello", format: FORMAT });
+    send({ type: "hello" });
   };
   socket.onmessage = event => {
     const message = JSON.parse(event.data);
@@ -40,12 +36,7 @@ function disconnected(event) {
     tellConnection(endedText() + " boebot has closed this view; what was shown stays here.", "ended");
     return;
   }
-  if (attempts >= RETRY_S.length) {
-    tellConnection("Connection lost: boebot does not answer. Load the page again to try once more.", "lost");
-    return;
-  }
-  tellConnection("Connection lost; trying again …", "lost");
-  setTimeout(connect, 1000 * RETRY_S[attempts++]);
+  tellConnection("Connection lost: boebot does not answer. Load the page again to try once more.", "lost");
 }
 function send(message) {
   if (socket && socket.readyState === 1) socket.send(JSON.stringify(message));
@@ -344,12 +335,8 @@ function makeParameters() {
   $("utilityParameters").replaceChildren(...sliders.filter(isUtility).map(({ whole }) => whole));
 }
 function makeSlider(parameter) {
-  const range = parameter.least != null && parameter.most != null,
-    output = element("span", { className: "value" });
-  const input = element(
-    "input",
-    range ? { type: "range", min: parameter.least, max: parameter.most, step: "any" } : { type: "number", step: "any" },
-  );
+  const output = element("span", { className: "value" }),
+    input = element("input", { type: "range", min: parameter.least, max: parameter.most, step: "any" });
   const one = { parameter, input, output, changed: -Infinity, due: null };
   input.value = parameter.value;
   input.ariaLabel = parameter.name;
@@ -360,7 +347,7 @@ function makeSlider(parameter) {
   };
   one.whole = element(
     "label",
-    { className: "parameter", title: parameter.text || "" },
+    { className: "parameter" },
     element("span", { textContent: parameter.name }),
     output,
     input,

@@ -203,7 +203,7 @@ function tellMind() {
   say("reason", reason);
 }
 
-// ---- values under the pointer, in the lanes and on the arena ----
+// ---- values under the pointer, in the lanes ----
 function tip(event, lines) {
   const it = $("tip");
   it.textContent = lines;
@@ -231,39 +231,11 @@ function hoverTracks(event) {
   );
   requestDraw();
 }
-function hoverArena(event) {
-  const x = backX(event.offsetX * ratio),
-    y = backY(event.offsetY * ratio),
-    lines = [];
-  runs.forEach((one, i) => {
-    if (one.time.length) lines.push(...aboutRobot(one, i, x, y));
-  });
-  lines.push(minus(x.toFixed(2)) + ", " + minus(y.toFixed(2)) + " m");
-  tip(event, lines.join("\n"));
-}
-function aboutRobot(one, i, x, y) {
-  const place = placeOf(one);
-  if (Math.hypot(place[0] - x, place[1] - y) > one.robot.radius) return [];
-  return [(runs.length > 1 ? "robot " + (i + 1) + ": " : "") + one.brain, "at " + asPose(place)];
-}
-function within(points, x, y) {
-  let inside = false;
-  points.forEach(([ax, ay], i) => {
-    const [bx, by] = points[(i + 1) % points.length];
-    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) inside = !inside;
-  });
-  return inside;
-}
 function listenToPointer() {
   $("cursor").addEventListener("pointermove", hoverTracks);
-  $("stage").addEventListener("pointermove", event => {
-    if (isDragging()) tip(event, ""); // it would say where the thing still is
-    else if (fingers.size < 2) hoverArena(event);
+  $("cursor").addEventListener("pointerleave", event => {
+    hoverTime = null;
+    tip(event, "");
+    requestDraw();
   });
-  for (const id of ["cursor", "stage"])
-    $(id).addEventListener("pointerleave", event => {
-      hoverTime = null;
-      tip(event, "");
-      requestDraw();
-    });
 }
