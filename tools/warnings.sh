@@ -16,16 +16,11 @@ read_with_clang() {
   xargs -r -P "$(nproc)" -n 20 clang $warnings "$@" -fsyntax-only <"$list"
 }
 
-# Most files of the firmware are the same for all pin maps: a file is read once for each text that the preprocessor
-# makes of it.
-touch "$lists/texts"
-for pin_map in $(grep -o 'PIN_MAP_[A-Z0-9_]*' platformio.ini | sort -u); do
-  touch "$lists/$pin_map"
-  for source in $(find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c); do
-    text="$source $(gcc -E -P -D$pin_map -Ifirmware/src "$source" | cksum)"
-    grep -qxF "$text" "$lists/texts" || echo "$source" >>"$lists/$pin_map"
-    echo "$text" >>"$lists/texts"
-  done
+# One pin map; with the argument `all` each. Most files are the same for all, and gcc reads each map's when it builds it.
+pin_maps=PIN_MAP_SHIELDBOT
+[ "${1:-}" != all ] || pin_maps=$(grep -o 'PIN_MAP_[A-Z0-9_]*' platformio.ini | sort -u)
+for pin_map in $pin_maps; do
+  find firmware/src -name '*.c' -not -path '*/hal/avr/*' -not -name main.c >"$lists/$pin_map"
   read_with_clang $pin_map -D$pin_map -Ifirmware/src
 done
 

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
 
+import copied_process
 from tools import shown_output
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [page for page in sorted(ROOT.glob("docs/**/*.md")) if "```console\n" in page.read_text(encoding="utf-8")]
+
+
+@pytest.fixture(autouse=True)
+def copied(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands run in copies of this process, as processes that start Python take seconds."""
+
+    def printed(command: str, folder: Path) -> str:
+        return copied_process.command(shlex.split(command), folder, {"COLUMNS": "80", "TERM": "dumb"}).stdout
+
+    monkeypatch.setattr(shown_output, "printed", printed)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
