@@ -175,7 +175,7 @@ check-generated:
 
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
-ready-test: ready-run build/.done-system-test build/.done-units build/.done-sanitized build/.done-read
+ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
 ready-bench: ready-test build/mcap-core/.done
 ready-soak: ready-bench build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
@@ -260,20 +260,3 @@ build/.done-images: platformio.ini tools/pio build/platformio-core/appstate.json
 	@touch $@
 $(IMAGES): build/.done-images
 	@test -e $@ || tools/pio run --silent
-
-# What tests need is compiled before they begin: the firmware's units, the simulator under sanitizers, and pytest's own
-# form of each file of tests, which two processes that read them side by side would each make.
-build/.done-units: build/.done-system-test platformio.ini tools/test_units.sh build/platformio-core/appstate.json $(FIRMWARE_SOURCES) \
-		$(shell find firmware/test -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.py') | build/.done-images
-	@echo "Building the firmware's units"
-	@tools/test_units.sh --without-testing >build/units.log 2>&1 || { cat build/units.log; exit 1; }
-	@touch $@
-
-build/.done-sanitized: build/.done-core tools/test_sanitized.sh
-	@echo "Compiling the simulated world under sanitizers"
-	@tools/test_sanitized.sh build
-	@touch $@
-
-build/.done-read: $(VENV)/.done-test build/wheelhouse/.done | build/.done-core $(ARENA_SCHEMA)
-	@$(PYTHON_VENV) -m pytest --collect-only -qq >build/read.log 2>&1 || { cat build/read.log; exit 1; }
-	@touch $@
