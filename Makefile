@@ -82,7 +82,6 @@ soak: experiments
 	@PYTHONMALLOC=malloc tools/test_sanitized.sh all
 	@tools/pio test -e native_quad
 	@tools/warnings.sh all
-	@tools/warnings.sh all
 	@tools/pio check -e native --fail-on-defect low --fail-on-defect medium --fail-on-defect high
 	@$(PYTHON_VENV) -m tools.tests.error_rates --page docs/reference/error-rates.md
 
