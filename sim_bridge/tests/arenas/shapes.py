@@ -14,7 +14,7 @@ from boebot.arenas.arena import Floats
 from sim_bridge._core import ffi, lib
 from sim_bridge.tests.simulated import square
 
-INDEXES = (lib.ARENA_INDEX_NONE, lib.ARENA_INDEX_GRID, lib.ARENA_INDEX_LISTS_AT_ONCE)
+INDEXES = (lib.ARENA_INDEX_NONE, lib.ARENA_INDEX_GRID, lib.ARENA_INDEX_LISTS)
 
 coordinates = st.floats(-3, 3).map(lambda v: round(v, 3))
 angles = st.floats(-math.pi, math.pi)

@@ -64,7 +64,7 @@ def test_rays_agree_with_shapely(scene: Shapes, x: float, y: float, angle: float
     """Where the ray does not pass within a nanometre of a corner or an end, there to 1e-9 m."""
     if lib.arena_disc_count(scene.handle):
         return  # shapely's discs are polygons; see the closed form below
-    scene.build(lib.ARENA_INDEX_LISTS_AT_ONCE)
+    scene.build(lib.ARENA_INDEX_LISTS)
     surfaces = shapely.union_all(scene.rings)
     direction = np.array([math.cos(angle), math.sin(angle)])
     corners = shapely.get_coordinates(surfaces) - (x, y)
@@ -189,7 +189,7 @@ def test_threads_share_an_arena_while_it_makes_its_lists() -> None:
         scene.polygon(ring_of(k % 7, k // 7, 0.3, 30))
     looks = [(0.5 + (k % 60) / 10, 0.5 + (k // 60) / 10, [k * 0.7, k * 0.7 + 0.3]) for k in range(3000)]
     expected = [scene.build(lib.ARENA_INDEX_NONE).fan(*look, 3.0) for look in looks[:200]]
-    scene.build(lib.ARENA_INDEX_LISTS_AT_ONCE)
+    scene.build(lib.ARENA_INDEX_LISTS)
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda _: [scene.fan(*look, 3.0) for look in looks], range(4)))
     assert found[0] == found[1] == found[2] == found[3]

@@ -24,9 +24,8 @@ enum { ARENA_FASTEST_M_S = 100 };    /* of any point of a moving shape: a step o
 enum { ARENA_WAYPOINTS_US = 1 };     /* waypoints are at least so far apart in time, or rounds could not be counted */
 enum { ARENA_FARTHEST_M = 1000000 }; /* from the origin: beyond it positions lose the precision that rays need */
 enum { ARENA_OUTLINE = 0, ARENA_OBSTACLE = 1, ARENA_WALL = 2, ARENA_DISC = 3 };
-/* What arena_use_index may choose: every question looks at every item; a grid; lists as well (the default), made where
- * many rays start, or wherever a ray starts. */
-enum { ARENA_INDEX_NONE = 0, ARENA_INDEX_GRID = 1, ARENA_INDEX_LISTS = 2, ARENA_INDEX_LISTS_AT_ONCE = 3 };
+/* What arena_use_index may choose: every question looks at every item; a grid; lists as well (the default). */
+enum { ARENA_INDEX_NONE = 0, ARENA_INDEX_GRID = 1, ARENA_INDEX_LISTS = 2 };
 
 typedef struct arena arena;
 

@@ -211,7 +211,6 @@ void arena_build(arena *self) {
   if (self->index_choice >= ARENA_INDEX_GRID && grid_build(&self->grid, &items) == 0 &&
       self->index_choice >= ARENA_INDEX_LISTS) {
     self->lists = ray_lists_new(&self->grid, &items);
-    if (self->lists != NULL && self->index_choice == ARENA_INDEX_LISTS_AT_ONCE) self->lists->patience = 0;
   }
 }
 

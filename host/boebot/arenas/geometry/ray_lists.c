@@ -3,13 +3,11 @@
 
 #include <stdlib.h>
 
-#define CELL_SHARE 0.4             /* of a grid cell's side */
-#define CELL_LEAST 0.05            /* m */
-#define SIDE_MAXIMUM 100           /* cells: more of them would not stay in the processor's cache */
-#define BORDER 1.0                 /* m around everything where rays may start */
-#define GATHER_ENOUGH 256u         /* items that a cell looks at, if there are that many */
-#define PATIENCE 128u              /* fans from a cell before it gets lists: by then they cost less than they save */
-#define MEMORY_LARGEST (64u << 20) /* bytes */
+#define CELL_SHARE 0.4                             /* of a grid cell's side */
+#define CELL_LEAST 0.05                            /* m */
+#define SIDE_MAXIMUM 100                           /* cells: more of them would not stay in the processor's cache */
+#define BORDER 1.0                                 /* m around everything where rays may start */
+#define GATHER_ENOUGH 256u                         /* items that a cell looks at, if there are that many */
 #define COVERED (1.0 / RAY_LISTS_PER_TURN + 0.611) /* of ray_turn by a list; a rad is one unit or less */
 
 #ifdef __GNUC__
@@ -35,11 +33,8 @@ ray_lists *ray_lists_new(const grid *g, const grid_items *items) {
   lay_out(self, g);
   self->items = *items;
   const size_t cells = (size_t)self->columns * (size_t)self->rows;
-  const size_t count = items->edge_count + items->disc_count;
   self->cells = calloc(cells, sizeof(ray_list_cell *));
-  self->visits = calloc(cells, sizeof *self->visits);
-  self->patience = (unsigned)(count < PATIENCE ? count : PATIENCE);
-  if (self->cells != NULL && self->visits != NULL) return self;
+  if (self->cells != NULL) return self;
   ray_lists_destroy(self);
   return NULL;
 }
@@ -49,7 +44,6 @@ void ray_lists_destroy(ray_lists *self) {
   const size_t count = self->cells != NULL ? (size_t)self->columns * (size_t)self->rows : 0;
   for (size_t i = 0; i < count; i++) free(self->cells[i]);
   free(self->cells);
-  free(self->visits);
   free(self);
 }
 
@@ -249,14 +243,8 @@ static ray_list_cell *made(const ray_lists *self, size_t number) {
   return cell;
 }
 
-/* Counts a fan that starts in a cell without lists, and makes them when it is time. */
+/* Makes the lists of a cell in which a fan starts for the first time. */
 static const ray_list_cell *visit(ray_lists *self, size_t number) {
-  const unsigned visits = __atomic_load_n(&self->visits[number], __ATOMIC_RELAXED);
-  if (visits < self->patience) {
-    __atomic_store_n(&self->visits[number], (uint16_t)(visits + 1), __ATOMIC_RELAXED);
-    return NULL;
-  }
-  if (__atomic_load_n(&self->memory, __ATOMIC_RELAXED) > MEMORY_LARGEST) return NULL;
   ray_list_cell *cell = made(self, number);
   if (cell == NULL) return NULL;
   ray_list_cell *there = NULL;
@@ -264,7 +252,6 @@ static const ray_list_cell *visit(ray_lists *self, size_t number) {
     free(cell); /* another thread was faster */
     return there;
   }
-  __atomic_fetch_add(&self->memory, sizeof *cell, __ATOMIC_RELAXED);
   return cell;
 }
 

@@ -1,8 +1,8 @@
 /* ray_lists.h: for each cell of the plane, what fans of rays from there may meet, nearest first.
  *
  * A fan asks a short list instead of walking through a grid, and stops where the rest cannot be nearer than what it has
- * met. A cell's lists are made when fans have started in it often enough to pay for them; making them changes no answer,
- * and threads may ask and make at the same time. What memory allows no list for is left to the grid.
+ * met. A cell's lists are made when the first fan starts in it; making them changes no answer, and threads may ask and
+ * make at the same time.
  */
 #ifndef GEOMETRY_RAY_LISTS_H
 #define GEOMETRY_RAY_LISTS_H
@@ -32,9 +32,6 @@ typedef struct {
   double x0, y0, cell, per_metre;
   int columns, rows;
   ray_list_cell **cells; /* columns * rows, NULL: not made yet */
-  uint16_t *visits;
-  unsigned patience; /* a cell's lists are made after this many fans from there */
-  size_t memory;     /* bytes in lists */
   const grid *grid;
   grid_items items;
 } ray_lists;
@@ -43,7 +40,7 @@ typedef struct {
 ray_lists *ray_lists_new(const grid *grid, const grid_items *items);
 void ray_lists_destroy(ray_lists *self);
 
-/* The lists of the cell around (x, y). NULL: there are none, or not yet. */
+/* The lists of the cell around (x, y). NULL: there are none. */
 const ray_list_cell *ray_lists_at(ray_lists *self, double x, double y);
 
 /* Direction as a number in [0, 4) that grows with the angle: 0 along x, 1 along y. No trigonometry. */
