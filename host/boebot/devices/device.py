@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot import slips
+from boebot.devices.drawing import spot
 from boebot.devices.latest import NEVER, Latest, fresh_ticks
 from boebot.link.messages import DevicesTelemetry
 
@@ -65,11 +66,6 @@ SERVO_CABLE: Final = (
     Wire(SERVO_POWER, "power", "red"),
     Wire(GROUND, "ground", "black"),
 )
-
-
-def servo_socket(pin: int) -> str:
-    """What a servo's plug goes into."""
-    return f"servo port {pin}" if pin in SERVO_PORTS else "three-pin header on the breadboard"
 
 
 Reader = Callable[[Any, Any], Any]
@@ -220,7 +216,10 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     @property
     def connector(self) -> str:
         """Where its wires are plugged in on the board."""
-        return self.CONNECTOR
+        if self.WIRES is not SERVO_CABLE:
+            return self.CONNECTOR
+        (pin,) = self.pins().values()
+        return f"servo port {pin}" if pin in SERVO_PORTS else "three-pin header on the breadboard"
 
     def reader(self, place: Place) -> Reader:
         """What makes its reading; for kinds that have one."""
@@ -254,8 +253,10 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
         return Readout(place.name, unit, digits, columns[name].values * factor, ages)
 
     def drawing(self, name: str) -> list[Item]:
-        """What it looks like from above, in the robot's frame; `name`: of the device."""
-        return []
+        """What it looks like from above, in the robot's frame: where it sits, and which way it looks, unless its kind
+        says more. `name`: of the device."""
+        position, heading = getattr(self, "position_m", None), getattr(self, "heading_rad", None)
+        return [] if position is None else spot(position, heading)
 
     def sweeps(self, place: Place, run: Run) -> Sweeps | None:
         """The area that it measured, at each tick; None: it measures none."""

@@ -33,7 +33,6 @@ from boebot.devices.device import (
     SlowDevice,
     Wire,
 )
-from boebot.devices.drawing import Item, spot
 
 LONGEST_US = 14_000  # on the wire: this time or longer
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -95,10 +94,6 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
             return Light(None, None, False, age, False)
         return Light(us * 1e-6, 1e6 / us, us >= LONGEST_US, age, fresh)
 
-    def drawing(self, name: str) -> list[Item]:
-        """Where it sits, and which way it looks."""
-        return spot(self.position_m, self.heading_rad)
-
 
 class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
     """A light sensor (section 1.9): L = sum of P max(0, cos theta) / (d0^2 + d^2)."""
@@ -118,7 +113,3 @@ class Phototransistor(Sensor, tag="phototransistor", frozen=True, kw_only=True):
     def reading(self, values: Sequence[float], age: float) -> Light:
         """See `VehicleDevice`."""
         return Light(None, values[0], False, age, True)
-
-    def drawing(self, name: str) -> list[Item]:
-        """Where it sits, and which way it looks."""
-        return spot(self.position_m, self.heading_rad)

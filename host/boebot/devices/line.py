@@ -20,7 +20,6 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import msgspec
 
 from boebot.devices.device import FIVE_VOLTS, GROUND, Checkup, NotNegative, Point, Sensor, Share, SlowDevice, Wire
-from boebot.devices.drawing import Item, spot
 from boebot.link.messages import LineTelemetry
 
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -80,10 +79,6 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
             return Line(None, None, False, age, False)
         return Line(us * 1e-6, None, us * 1e-6 > self.dark_s, age, fresh)
 
-    def drawing(self, name: str) -> list[Item]:
-        """Where it sits."""
-        return spot(self.position_m)
-
 
 class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=True):
     """A sensor that looks at the floor of a robot without a board: the mean reflectance of the spot below it."""
@@ -101,7 +96,3 @@ class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=T
     def reading(self, values: Sequence[float], age: float) -> Line:
         """See `VehicleDevice`."""
         return Line(None, values[0], values[0] < self.dark_below, age, True)
-
-    def drawing(self, name: str) -> list[Item]:
-        """Where it sits."""
-        return spot(self.position_m)

@@ -167,6 +167,7 @@ class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
     height_m: NotNegative = 0.08
 
     READING: ClassVar = Ping
+    SHOWN: ClassVar = _SHOWN
 
     def fault(self) -> tuple[str, str] | None:
         """See `Device`."""

@@ -20,7 +20,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import SERVO_CABLE, Checkup, Column, Device, Place, Reader, Run, Wire, servo_socket
+from boebot.devices.device import SERVO_CABLE, Checkup, Column, Device, Place, Reader, Run, Wire
 from boebot.link.messages import Telemetry
 
 PULSE_SCALE_US = 0.0625  # microseconds per count of the pulse widths on the wire
@@ -54,11 +54,6 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
-
-    @property
-    def connector(self) -> str:
-        """See `Device`."""
-        return servo_socket(self.pins()[""])
 
     def checkup(self, readings: Sequence[Servo]) -> Checkup:
         """See `Device`."""

@@ -21,8 +21,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import SERVO_CABLE, Checkup, Point, SlowDevice, Wire, servo_socket
-from boebot.devices.drawing import Item, spot
+from boebot.devices.device import SERVO_CABLE, Checkup, Point, SlowDevice, Wire
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.link.messages import Turret as TurretMessage
 
@@ -81,11 +80,6 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
         pulse_us = self.centre_us + self.gain_us_per_rad * message.angle * ANGLE_SCALE
         return round(max(PULSE_MIN_US, min(PULSE_MAX_US, pulse_us)) / PULSE_SCALE_US)
 
-    @property
-    def connector(self) -> str:
-        """See `Device`."""
-        return servo_socket(self.pins()[""])
-
     def checkup(self, readings: Sequence[Turret]) -> Checkup:
         """See `Device`."""
         expected = "no pulses, as nothing turns it"
@@ -100,7 +94,3 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
         pulse_us = message.turret_pulse * PULSE_SCALE_US
         gain = self.gain_us_per_rad
         return Turret((pulse_us - self.centre_us) / gain if gain else None, pulse_us, age, fresh)
-
-    def drawing(self, name: str) -> list[Item]:
-        """Its axis."""
-        return spot(self.position_m)

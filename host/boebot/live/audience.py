@@ -11,8 +11,8 @@ from typing import Any
 from boebot.arenas.floor_plan import FloorPlan, Moving
 from boebot.errors import BoebotError
 from boebot.live import messages
-from boebot.live.outbox import Message, merged
-from boebot.live.page_server import LOOPBACK, Page, PageServer
+from boebot.live.outbox import Message, Outbox, merged
+from boebot.live.page_server import PageServer
 from boebot.view import page_data, replay, scene
 
 Placed = tuple[float, float, float]
@@ -34,7 +34,6 @@ class Audience:
         asked: Callable[[int, messages.Asked], None],
         went: Callable[[int], None] = lambda page: None,
         *,
-        host: str = LOOPBACK,
         port: int = 0,
     ) -> None:
         """`asked`: a page, by its number, wants something; a BoebotError says why that cannot be done, and the page is
@@ -46,13 +45,13 @@ class Audience:
         self._asked, self._went = asked, went
         self._lock = threading.Lock()  # of all that follows: two threads use it
         self.changed = threading.Condition(self._lock)
-        self._pages: dict[int, Page] = {}
+        self._pages: dict[int, Outbox] = {}
         self._run: Message | None = None  # the present run's first message, without rows
         self._end: Message | None = None
         self._past: deque[Message] = deque()
         self._state: Message = {}  # the newest
         self._layers: list[dict[str, Message]] = []  # of each robot the newest sketches
-        self._server = PageServer(replay.live_page, self._heard, self._is_gone, host=host, port=port)
+        self._server = PageServer(replay.live_page, self._heard, self._is_gone, port=port)
         self.url = self._server.url
 
     @property
@@ -62,7 +61,7 @@ class Audience:
 
     # ---- in the server's thread ------------------------------------------------------------------------------------
 
-    def _heard(self, page: Page, data: str) -> str | None:
+    def _heard(self, page: Outbox, data: str) -> str | None:
         try:
             what = messages.decode(data)
         except BoebotError as error:
@@ -85,7 +84,7 @@ class Audience:
             self.changed.notify_all()
         return None
 
-    def _is_gone(self, page: Page) -> None:
+    def _is_gone(self, page: Outbox) -> None:
         with self.changed:
             self._pages.pop(page.number, None)
             self.changed.notify_all()
@@ -162,11 +161,11 @@ class Audience:
     def close(self) -> None:
         """Nothing is shown any more; what pages wait for still gets to them."""
         deadline = time.monotonic() + BYE_S
-        while time.monotonic() < deadline and any(page.outbox.is_waiting for page in list(self._pages.values())):
+        while time.monotonic() < deadline and any(page.is_waiting for page in list(self._pages.values())):
             time.sleep(0.01)
         self._server.close()
 
-    def _begin_page(self, page: Page) -> None:
+    def _begin_page(self, page: Outbox) -> None:
         """The run with its first chunk, those since, how it is now, and its end."""
         if self._run is None or not self._past:
             return
@@ -177,11 +176,11 @@ class Audience:
         runs = [known | {"rows": rows} for known, rows in zip(self._run["runs"], first["runs"], strict=True)]
         begin = self._run | {"runs": runs, "moving": first["moving"]}
         state = _as_seen_by(page, {"type": "state", "state": self._state})
-        page.outbox.begin(begin, [*others, state, *([] if self._end is None else [self._end])])
+        page.begin(begin, [*others, state, *([] if self._end is None else [self._end])])
         self._server.wake(page)
 
-    def _send(self, page: Page, message: Message) -> None:
-        page.outbox.put(message)
+    def _send(self, page: Outbox, message: Message) -> None:
+        page.put(message)
         self._server.wake(page)
 
 
@@ -198,7 +197,7 @@ def thinned(past: Iterable[Message]) -> deque[Message]:
     return kept
 
 
-def _as_seen_by(page: Page, message: Message) -> Message:
+def _as_seen_by(page: Outbox, message: Message) -> Message:
     """With who drives each robot by hand, who is a page's number so far, in that page's words."""
     state: dict[str, Any] | None = message.get("state")
     if state is None:

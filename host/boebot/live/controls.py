@@ -53,7 +53,6 @@ class Controls:
         can: what people may do, as the page has it.
         pace: how fast the run goes.
         restart: what the run is to begin afresh with; None: it goes on.
-        is_idle: nothing is to be done to any robot, nobody drives one by hand, and no other run is asked for.
     """
 
     def __init__(
@@ -62,7 +61,6 @@ class Controls:
         """`shapes`: how many of them move in the arena. `pages`: those that are open now."""
         self.can, self.pace = can, pace
         self.restart: messages.Restart | None = None
-        self.is_idle = True
         self._robots, self._shapes, self._pages = robots, shapes, pages
         self._lock = threading.Lock()
         self._deeds: list[deque[Deed]] = [deque() for _ in range(robots)]
@@ -100,13 +98,9 @@ class Controls:
             case messages.Speed(speed):
                 self.pace.set_speed(speed)
             case messages.Restart():
-                self.begin_afresh(asked)
+                self.restart = asked
             case messages.Do(robot, deed):
                 self._do(page, robot, deed)
-
-    def begin_afresh(self, restart: messages.Restart) -> None:
-        """Another run is asked for."""
-        self.restart, self.is_idle = restart, False
 
     def _do(self, page: int, robot: int, deed: Deed) -> None:
         if robot >= self._robots:
@@ -122,7 +116,6 @@ class Controls:
         if len(self._deeds[robot]) >= WAITING:
             raise BoebotError(f"{WAITING} interventions wait already; expected fewer at once")
         self._deeds[robot].append(deed)
-        self.is_idle = False
 
     def _may_drive(self, page: int, robot: int) -> None:
         wheel = self._wheels[robot]
@@ -136,7 +129,6 @@ class Controls:
             if speed is None or speed > REAL_TIME:
                 self.pace.set_speed(REAL_TIME)
         self._wheels[robot] = Wheel(page, hand, time.monotonic())
-        self.is_idle = False
 
     # ---- to the run ------------------------------------------------------------------------------------------------
 
@@ -145,8 +137,6 @@ class Controls:
         with self._lock:
             deeds = list(self._deeds[robot])
             self._deeds[robot].clear()
-            by_hand = self._wheels.count(None) < self._robots
-            self.is_idle = not any(self._deeds) and not by_hand and self.restart is None
             wheel = self._wheels[robot]
             if wheel is None:
                 return deeds

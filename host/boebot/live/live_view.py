@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
@@ -23,7 +23,6 @@ from boebot.live.chunks import EACH_S, Chunks
 from boebot.live.controls import Controls
 from boebot.live.outbox import LETTERS, Message
 from boebot.live.pace import Pace
-from boebot.live.page_server import LOOPBACK
 from boebot.record.interventions import Deed
 from boebot.record.run import Run
 from boebot.running import interrupts
@@ -49,9 +48,7 @@ class LiveView:
         url: the address of the page.
     """
 
-    def __init__(
-        self, show: Callable[[str], None], *, host: str = LOOPBACK, port: int = 0, speed: float | None = 1.0
-    ) -> None:
+    def __init__(self, show: Callable[[str], None], *, port: int = 0, speed: float | None = 1.0) -> None:
         """
         Args:
             show: is told the address as the first run begins.
@@ -75,7 +72,7 @@ class LiveView:
         self._told: Message = {}  # the newest state while time stood still
         self._printed = ""
         self._printing = threading.Lock()
-        self._audience = Audience(self._asked, self._went, host=host, port=port)
+        self._audience = Audience(self._asked, self._went, port=port)
         self.url = self._audience.url
 
     # ---- pages: in the server's thread -----------------------------------------------------------------------------
@@ -109,7 +106,7 @@ class LiveView:
         controls = Controls(len(robots), len(self._plan.moving), can, self._pace, self._audience.pages)
         with self._changing:
             if self.restart is not None:  # asked for since the last run has ended
-                controls.begin_afresh(self.restart)
+                controls.restart = self.restart
             self._controls, self._has_ended = controls, False
         self._number += 1
         self._rates.clear()
@@ -117,15 +114,10 @@ class LiveView:
         if self._number == 1:
             self._show(self.url)
 
-    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+    def before_step(self, number: int, time_s: float) -> Iterator[Deed]:
         """See `Onlooker`. While time stands still, what people do is carried out at once."""
         controls = self._controls
         assert controls is not None
-        if controls.is_idle and self._pace.is_free:
-            return ()  # at each step of a run that hurries: nothing else may take time there
-        return self._deeds(controls, number, time_s)
-
-    def _deeds(self, controls: Controls, number: int, time_s: float) -> Iterator[Deed]:
         while True:
             if controls.restart is not None:
                 raise RestartedError("restarted by hand")
@@ -199,7 +191,6 @@ class LiveView:
                     "driver": page,
                     "pose": _pose_now(robot),
                     "link": _quality(robot),
-                    "load": robot.driver.session.counters().get("load"),
                 }
                 for robot, page in zip(self._robots, self._controls.drivers(), strict=True)
             ],
@@ -328,15 +319,23 @@ def _pose_now(robot: Hands) -> tuple[float, float, float] | None:
     return None if now is None else now.pose
 
 
-def _quality(robot: Hands) -> Message | None:
+def _quality(robot: Hands) -> Message:
+    """Of its link, and how much of its time an emulated board works: in words."""
     link, status = robot.driver.link, robot.driver.status()
-    if link is None:
-        return None
-    return {
-        "lost": status.lost_frames,
-        "bad": status.bad_frames,
-        "sessions_lost": status.sessions_lost,
-        "resets": status.resets,
-        "round_trip_s": link.clock.round_trips.quantile(0.5),
-        "transport": link.transport.figures() if isinstance(link.transport, Measures) else {},
-    }
+    found: dict[str, Any] = {}
+    if link is not None:
+        found = {
+            "lost frames": status.lost_frames,
+            "damaged frames": status.bad_frames,
+            "round trip": _shown(link.clock.round_trips.quantile(0.5), 1000, "ms"),
+            "sessions lost": status.sessions_lost,
+            "resets": status.resets,
+        }
+        if isinstance(link.transport, Measures):
+            found |= {name.replace("_", " "): value for name, value in link.transport.figures().items()}
+    found["load of the tick"] = _shown(robot.driver.session.counters().get("load"), 100, "%")
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _shown(value: float | None, factor: float, unit: str) -> str | None:
+    return None if value is None else f"{factor * value:.1f} {unit}"

@@ -19,10 +19,12 @@ class Outbox:
     """Filled by the thread of the run, emptied by that of the server.
 
     Attributes:
+        number: of its page, of all so far.
         ready: there is something; of the server's loop.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, number: int = 1) -> None:
+        self.number = number
         self.ready = asyncio.Event()
         self._lock = threading.Lock()
         self._first: list[Message] = []  # must be sent, and before the rest

@@ -16,13 +16,11 @@ class Pace:
     Attributes:
         speed: simulated seconds in one of the wall clock; None: as fast as possible.
         paused: time stands still.
-        is_free: no step has to wait.
     """
 
     def __init__(self, speed: float | None) -> None:
         self.speed = speed
         self.paused = False
-        self.is_free = speed is None
         self._stepping = False
         self._passing_s = float("nan")  # the step that is carried out while time stands still
         self._anchor: tuple[float, float] | None = None  # wall clock and run's time that belong together
@@ -31,25 +29,21 @@ class Pace:
     def set_speed(self, speed: float | None) -> None:
         """Another speed from now on."""
         self.speed, self._anchor = speed, None
-        self._has_changed()
+        self.changed.set()
 
     def pause(self) -> None:
         """From the next step on time stands still."""
         self.paused = True
-        self._has_changed()
+        self.changed.set()
 
     def resume(self) -> None:
         """It goes on."""
         self.paused, self._anchor = False, None
-        self._has_changed()
+        self.changed.set()
 
     def step(self) -> None:
         """One step of the brains, then time stands still again."""
         self.paused = self._stepping = True
-        self._has_changed()
-
-    def _has_changed(self) -> None:
-        self.is_free = self.speed is None and not self.paused
         self.changed.set()
 
     def holds(self, time_s: float) -> bool:

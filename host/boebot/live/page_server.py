@@ -1,7 +1,7 @@
 """Serves one page and its stream to browsers: HTTP and WebSocket on one port, in a thread of its own.
 
 Only who has the address gets anything: it holds a random token, and requests that name another host or come from
-another page are refused. Without being told otherwise it listens on loopback only. A page that does not read, floods or
+another page are refused. It listens on loopback only. A page that does not read, floods or
 sends rubbish is let go; nothing that a page does slows the run.
 """
 
@@ -39,18 +39,6 @@ _LOGGER.propagate = False
 _POLICY = "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"  # beside what the page itself says
 
 
-class Page:
-    """One page that is open.
-
-    Attributes:
-        outbox: what it is to get.
-        number: of all pages so far.
-    """
-
-    def __init__(self, number: int, outbox: Outbox) -> None:
-        self.number, self.outbox = number, outbox
-
-
 class PageServer:
     """Serves until it is closed.
 
@@ -61,10 +49,8 @@ class PageServer:
     def __init__(
         self,
         page: Callable[[str], str],
-        heard: Callable[[Page, str], str | None],
-        went: Callable[[Page], None],
-        *,
-        host: str = LOOPBACK,
+        heard: Callable[[Outbox, str], str | None],
+        went: Callable[[Outbox], None],
         port: int = 0,
     ) -> None:
         """
@@ -76,11 +62,11 @@ class PageServer:
             port: 0: any free one.
 
         Raises:
-            BoebotError: the port is taken, or there is no such address.
+            BoebotError: the port is taken.
         """
         self._page, self._heard, self._went = page, heard, went
         self._token = secrets.token_urlsafe(16)
-        self._host, self._port = host, port
+        self._port = port
         self._count = self._open = 0
         self._failure: OSError | None = None
         self._started = threading.Event()
@@ -91,19 +77,15 @@ class PageServer:
         if self._failure is not None:
             self._thread.join()
             raise BoebotError(
-                f"the live view cannot be served at {host}:{port}: {self._failure.strerror or self._failure}; expected "
-                "a free port (--view-port 0: any)"
+                f"the live view cannot be served at {LOOPBACK}:{port}: {self._failure.strerror or self._failure}; "
+                "expected a free port (--view-port 0: any)"
             )
-        self.url = f"http://{self._name(host)}:{self._port}/?token={self._token}"
+        self.url = f"http://{LOOPBACK}:{self._port}/?token={self._token}"
 
-    @staticmethod
-    def _name(host: str) -> str:
-        return f"[{host}]" if ":" in host else host
-
-    def wake(self, page: Page) -> None:
+    def wake(self, page: Outbox) -> None:
         """There is something to be sent to it. Called from any thread."""
         with contextlib.suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(page.outbox.ready.set)
+            self._loop.call_soon_threadsafe(page.ready.set)
 
     def close(self) -> None:
         """Says good-bye to all pages. May be called twice."""
@@ -128,7 +110,7 @@ class PageServer:
         self._stop = asyncio.Event()
         async with serve(
             self._talk,
-            self._host,
+            LOOPBACK,
             self._port,
             process_request=self._answer,
             compression=None,
@@ -152,8 +134,8 @@ class PageServer:
             given = parse_qs(address.query).get("token", [""])[0]
         except (ValueError, MultipleValuesError):
             return _refusal(http.HTTPStatus.BAD_REQUEST, "that is no request of a browser")
-        if host not in self._hosts():
-            return _refusal(http.HTTPStatus.FORBIDDEN, f"this is {self._name(self._host)}:{self._port}, not {host!r}")
+        if host not in (f"{LOOPBACK}:{self._port}", f"localhost:{self._port}"):
+            return _refusal(http.HTTPStatus.FORBIDDEN, f"this is {LOOPBACK}:{self._port}, not {host!r}")
         if not hmac.compare_digest(given.encode(), self._token.encode()):
             return _refusal(http.HTTPStatus.FORBIDDEN, "wrong token; expected the address that boebot has printed")
         if address.path == "/stream":
@@ -166,17 +148,11 @@ class PageServer:
             return _refusal(http.HTTPStatus.NOT_FOUND, "there is one page here: /")
         return _response(http.HTTPStatus.OK, "text/html; charset=utf-8", self._page(f"ws://{host}").encode(), _POLICY)
 
-    def _hosts(self) -> set[str]:
-        names = {self._name(self._host)}
-        if self._host in (LOOPBACK, "::1"):
-            names.add("localhost")
-        return {f"{name}:{self._port}" for name in names}
-
     async def _talk(self, connection: ServerConnection) -> None:
         """One page, from its coming to its going."""
         self._count += 1
         self._open += 1
-        page = Page(self._count, Outbox())
+        page = Outbox(self._count)
         sender = asyncio.create_task(self._send(connection, page))
         try:
             await self._receive(connection, page)
@@ -187,17 +163,17 @@ class PageServer:
             self._open -= 1
             self._went(page)
 
-    async def _send(self, connection: ServerConnection, page: Page) -> None:
+    async def _send(self, connection: ServerConnection, page: Outbox) -> None:
         try:
             while True:
-                await page.outbox.ready.wait()
-                page.outbox.ready.clear()
-                for text in page.outbox.take():
+                await page.ready.wait()
+                page.ready.clear()
+                for text in page.take():
                     await connection.send(text)
         except ConnectionClosed:
             return
 
-    async def _receive(self, connection: ServerConnection, page: Page) -> None:
+    async def _receive(self, connection: ServerConnection, page: Outbox) -> None:
         allowed, since = float(MESSAGES_AT_ONCE), time.monotonic()
         async for data in connection:
             now = time.monotonic()

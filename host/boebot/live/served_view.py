@@ -15,7 +15,6 @@ from boebot.link.messages import DEVICE_MESSAGES, Hello, Telemetry
 from boebot.live import messages
 from boebot.live.audience import Audience
 from boebot.live.chunks import Chunks
-from boebot.live.page_server import LOOPBACK
 from boebot.record.blocks import Group
 from boebot.record.record import Record
 from boebot.record.run import Run
@@ -80,7 +79,7 @@ class ServedView:
         url: the address of the page.
     """
 
-    def __init__(self, request: BoardRequest, kind: str, *, host: str = LOOPBACK, port: int = 0) -> None:
+    def __init__(self, request: BoardRequest, kind: str, *, port: int = 0) -> None:
         """`kind`: of its board.
 
         Raises:
@@ -91,7 +90,7 @@ class ServedView:
         self._source: ReadAlong | None = None
         self._chunks: Chunks | None = None
         self._printed = ""
-        self._audience = Audience(self._asked, host=host, port=port)
+        self._audience = Audience(self._asked, port=port)
         self._audience.forget(1)
         self.url = self._audience.url
 

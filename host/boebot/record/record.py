@@ -275,17 +275,6 @@ class Record:
         return float(_CLOCK.unpack(rows[-1][1])[0]) if rows else 0.0
 
     @property
-    def times(self) -> list[float]:
-        """The run's time (s) of each tick or step, by the board's clock."""
-        times: list[float] = self.times_of(self.tick_stream).tolist()
-        return times
-
-    @property
-    def telemetry(self) -> list[bytes]:
-        """A board's payloads."""
-        return [data[: -_STAMP.size] for _, data in self.each_row("telemetry")]
-
-    @property
     def events(self) -> list[BoardEvent]:
         """What the board sent exactly once."""
         return [event_of(row) for row in self.each_row("event")]

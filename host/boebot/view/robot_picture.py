@@ -60,7 +60,7 @@ def write(robot: RobotDescription, path: Path) -> Path:
         axes.set_xlabel("x, forward (m)", color=style.INK, fontsize=9)
         axes.set_ylabel("y, left (m)", color=style.INK, fontsize=9)
         draw_robot(axes, robot, (0.0, 0.0, 0.0), style.END)
-        _write_names(axes, robot, scale, room)
+        _write_names(axes, robot, scale)
         if wires:
             below = figure.add_axes((0.0, 0.0, 1.0, wiring / tall))
             wiring_drawing.draw_wiring(below, wires, f"board {robot.board}, pin map {robot.pin_map}")
@@ -92,9 +92,8 @@ def _named_place(item: Item) -> tuple[float, float]:
     return x + share * (end_x - x), y + share * (end_y - y)
 
 
-def _write_names(axes: Axes, robot: RobotDescription, scale: float, room: float) -> None:
-    """Names right of the field, each with a line to its device, about as high as that; `scale`: inches per m; `room`:
-    for the names, inches."""
+def _write_names(axes: Axes, robot: RobotDescription, scale: float) -> None:
+    """Names right of the field, one below the other, each with a line to its device; `scale`: inches per m."""
     named = []
     for name, items in scene.device_items(robot).items():
         first = _shown(items)[0]
@@ -102,18 +101,9 @@ def _write_names(axes: Axes, robot: RobotDescription, scale: float, room: float)
     rows = sorted(named, key=lambda row: -row[0][1])
     step, right = NAME_ROW_IN / scale, axes.get_xlim()[1]
     x = right + NAME_IN / scale
-    wanted = [place[1] for place, _ in rows]
-    heights: list[float] = []
-    for y in wanted:
-        heights.append(min(y, heights[-1] - step) if heights else y)
-    shift = 0.0
-    if rows:
-        low, high = axes.get_ylim()
-        edge = (low + high) / 2 + room / scale / 2 - step / 2
-        shift = sum(wanted) / len(wanted) - sum(heights) / len(heights)
-        shift = max(low + high - edge - heights[-1], min(edge - heights[0], shift))
-    for (place, text), apart in zip(rows, heights, strict=True):
-        y = apart + shift
+    middle = sum(axes.get_ylim()) / 2
+    for number, (place, text) in enumerate(rows):
+        y = middle + ((len(rows) - 1) / 2 - number) * step
         axes.plot(
             (place[0], right + 0.3 * NAME_IN / scale, x - 0.15 * NAME_IN / scale), (place[1], y, y),
             color=style.FAINT, lw=0.7, zorder=14, clip_on=False,

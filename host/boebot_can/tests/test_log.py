@@ -85,7 +85,7 @@ def test_stock_tools_decode_what_the_run_has_recorded(run: RunResult, logs: dict
             newest |= signals
         elif message.arbitration_id == SET_POINT:
             set_points.append((signals["left"], signals["right"]))
-    recorded = [Telemetry.unpack(payload) for payload in run.record.telemetry]
+    recorded = [Telemetry.unpack(data[: Telemetry.LENGTH]) for _, data in run.record.rows("telemetry")]
     assert len(recorded) == 201 and max(seen.ping_echo for seen in recorded) > 0
     for seen in recorded:
         decoded = telemetry[seen.tick]
@@ -246,7 +246,7 @@ def test_first_command_that_differs_is_named(capsys: pytest.CaptureFixture[str],
     assert code == 2 and "expected --brain BRAIN" in err and "--again" not in err
     code, out, err = boebot(capsys, "replay", log, "--brain", str(other))
     index, _, left, _ = result.record.steps[6]
-    tick, left = Telemetry.unpack(result.record.telemetry[index]).tick, round(left, 4)
+    tick, left = Telemetry.unpack(result.record.rows("telemetry")[index][1][: Telemetry.LENGTH]).tick, round(left, 4)
     assert (code, err) == (1, "") and " ".join(out.split()) == (
         f"step 6 (tick {tick}, 0.30 s) differs: Command(kind='signal', left={left}, right=0.5) in the run, "
         f"Command(kind='signal', left={left}, right=0.25) in the replay"
@@ -458,11 +458,11 @@ def test_log_has_the_times_and_slow_readings_that_the_brain_saw(
         "    robot.drive(sum(passed) / 100, robot.line_left.age)\n"
     )
     result = library.run(brain, robot="shieldbot-line", seconds=1)
-    steps = [result.record.times[index] for index, *_ in result.record.steps]
+    steps = [result.record.times_of(result.record.tick_stream)[index] for index, *_ in result.record.steps]
     assert 0.0 < steps[0] < 0.05, "the brain's period has begun before"
     log = save_log(result, tmp_path / "can.log")
     read = read_log(log)
-    assert [read.record.times[index] for index, *_ in read.record.steps] == steps
+    assert [read.record.times_of(read.record.tick_stream)[index] for index, *_ in read.record.steps] == steps
     assert boebot(capsys, "replay", str(log), "--brain", str(brain))[:2] == (
         0,
         f"all {len(steps)} commands are the same\n",

@@ -171,7 +171,7 @@ def test_run_that_ends_early_stops_the_motors_and_keeps_its_record(
     assert session.peer.stops >= 1 and session.peer.latch == messages.Latch.STOP_COMMAND
     assert not session.peer.moving and session.closed
     result = read_run(tmp_path)
-    assert isinstance(result, RunResult) and result.record.times[-1] == pytest.approx(0.5)
+    assert isinstance(result, RunResult) and result.record.times_of(result.record.tick_stream)[-1] == pytest.approx(0.5)
     assert (tmp_path / "replay.html").exists()
     assert '"ended"' in (tmp_path / "summary.json").read_text()
 

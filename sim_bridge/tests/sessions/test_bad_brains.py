@@ -88,7 +88,7 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         return world
 
     for name in ("_write_picture", "_write_page"):  # tested elsewhere, and they take long
-        monkeypatch.setattr(f"boebot.view.{name}", lambda result, path: path.touch())
+        monkeypatch.setattr(f"boebot.view.{name}", lambda robots, path, error=None: path.touch())
     monkeypatch.setattr(loop, "open_world", opened)
     return stopped
 
@@ -108,7 +108,7 @@ def complete(folder: Path) -> None:
     """The record has a row for each tick up to that of the bad step."""
     result = read_run(folder)
     assert isinstance(result, RunResult)
-    assert result.record.times == pytest.approx([n / 100 for n in range(31)])
+    assert result.record.times_of(result.record.tick_stream) == pytest.approx([n / 100 for n in range(31)])
     assert set(result.series.command["kind"][1:]) == {KINDS.index("signal")}
     assert (folder / "summary.json").exists()
 

@@ -44,30 +44,17 @@ const COLOURS = (
   "smooth charger lamp moving start end estimate touch contact body"
 ).split(" ");
 const colours = {};
-let readableCache = {};
 function readColours() {
   const css = getComputedStyle(document.documentElement);
   for (const name of COLOURS) colours[name] = css.getPropertyValue("--" + name).trim();
-  readableCache = {};
 }
 const channels = colour => [1, 3, 5].map(k => parseInt(colour.slice(k, k + 2), 16));
-// Of WCAG.
-function luminance(rgb) {
-  const [r, g, b] = rgb.map(v => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
-  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-}
 // Colours of robots, behaviors and layers are chosen for lines on paper. On a dark floor they are made lighter, in texts on
-// paper darker, until they are told from it.
-const LEAST_CONTRAST = 4.6;
-const isDark = () => luminance(channels(colours.floor)) < 0.2;
+// paper darker.
+const isDark = () => channels(colours.floor)[0] < 128;
 function contrasting(colour) {
-  if (readableCache[colour]) return readableCache[colour];
-  const floor = luminance(channels(colours.floor));
-  const towards = isDark() ? 255 : 0;
-  const contrast = value => (Math.max(value, floor) + 0.05) / (Math.min(value, floor) + 0.05);
-  let rgb = channels(colour);
-  while (contrast(luminance(rgb)) < LEAST_CONTRAST) rgb = rgb.map(v => v + 0.08 * (towards - v));
-  return (readableCache[colour] = "#" + rgb.map(v => Math.round(v).toString(16).padStart(2, "0")).join(""));
+  const mixed = channels(colour).map(v => Math.round(v + 0.45 * ((isDark() ? 255 : 0) - v)));
+  return "#" + mixed.map(v => v.toString(16).padStart(2, "0")).join("");
 }
 const readable = colour => (isDark() ? contrasting(colour) : colour); // of lines and areas
 const inText = contrasting;

@@ -303,20 +303,9 @@ function tellPrinted(text) {
 function robotState() {
   return (state && state.robots && state.robots[runs.indexOf(run)]) || {};
 }
-const percent = share => (share == null ? null : (100 * share).toFixed(share < 0.2 ? 1 : 0) + " %");
 let linkTold = "";
 function tellLink() {
-  const { link } = robotState();
-  const values = {
-    "lost frames": link?.lost,
-    "damaged frames": link?.bad,
-    "round trip": link?.round_trip_s == null ? null : (1000 * link.round_trip_s).toFixed(1) + " ms",
-    "sessions lost": link?.sessions_lost,
-    resets: link?.resets,
-    ...Object.fromEntries(Object.entries(link?.transport ?? {}).map(([name, value]) => [name.replaceAll("_", " "), value])),
-    "load of the tick": percent(robotState().load),
-  };
-  const known = Object.entries(values).filter(([, value]) => value != null);
+  const known = Object.entries(robotState().link ?? {});
   if (linkTold === String(known)) return;
   linkTold = String(known);
   hide("linkCard", !known.length);
