@@ -59,7 +59,7 @@ test:
 
 check:
 	@$(SIDE_BY_SIDE) ready-check
-	@$(SIDE_BY_SIDE) --keep-going check-python check-types check-format check-static check-warnings check-generated
+	@$(SIDE_BY_SIDE) --keep-going check-types check-python check-examples check-format check-static check-warnings check-generated
 	@echo "check: all passed"
 
 bench:
@@ -154,13 +154,14 @@ lock:
 
 # ---- single checks -----------------------------------------------------------------------------------------------
 
-.PHONY: check-python check-types check-format check-static check-warnings check-generated
+.PHONY: check-python check-types check-examples check-format check-static check-warnings check-generated
 check-python:
 	@$(PYTHON_VENV) -m ruff check --quiet .
 	@$(PYTHON_VENV) -m ruff format --check --quiet . || { echo "run: make format"; exit 1; }
 	@$(PYTHON_VENV) -m tools.house --check
 check-types:
 	@$(PYTHON_VENV) -m mypy --no-error-summary
+check-examples:
 	@$(PYTHON_VENV) -m tools.examples
 check-format:
 	@$(VENV)/bin/clang-format --dry-run -Werror $$(tools/c_sources.sh)

@@ -44,7 +44,10 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return environment
 
 
-@pytest.mark.parametrize(("brain", "board"), [("wander", "native"), ("wander", "avr"), ("clearway", "native")])
+@pytest.mark.parametrize(
+    ("brain", "board"),
+    [("wander", "native"), ("wander", "avr"), pytest.param("clearway", "native", marks=pytest.mark.soak)],
+)
 def test_an_installed_wheel_runs_bundled_brains(installed: Path, tmp_path: Path, brain: str, board: str) -> None:
     out = tmp_path / "out"
     command = [str(installed / "bin" / "boebot"), "run", brain, "--on", board, "--seconds", "5"]

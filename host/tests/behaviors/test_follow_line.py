@@ -98,7 +98,7 @@ def test_a_sensor_that_was_not_read_is_not_over_a_line() -> None:
     assert math.isinf(read(sensor, "line_left", NOTHING).age)
 
 
-@pytest.mark.parametrize("board", ["native", "avr"])
+@pytest.mark.parametrize("board", ["native", pytest.param("avr", marks=pytest.mark.soak)])
 def test_a_robot_goes_around_the_track(board: str) -> None:
     """All of its middle's way is near the line: its sensors, 5 cm ahead, are over or beside it."""
     result = boebot.run(Brain([FollowLine()]), "shieldbot-line", arena="track", on=board, seconds=45)

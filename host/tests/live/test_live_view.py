@@ -267,7 +267,7 @@ def test_ctrl_c_ends_a_run_that_stands_still() -> None:
 
 
 def test_ctrl_c_at_the_end_of_a_run_leaves_what_came_of_it() -> None:
-    run = Run("run", "wander", "--view", "--seconds", "300", "--speed", "max", "--json")
+    run = Run("run", "wander", "--view", "--seconds", "60", "--speed", "max", "--json")
     with run.stream() as stream:
         page = Page(stream)
         page.until("end")

@@ -88,7 +88,7 @@ def test_beam_hears_the_nearest_surface_in_it() -> None:
         assert distance == pytest.approx(wanted, rel=0.01), degrees
 
 
-@pytest.mark.parametrize("on", ["native", "avr"])
+@pytest.mark.parametrize("on", ["native", pytest.param("avr", marks=pytest.mark.soak)])
 def test_turret_scan_is_what_the_map_lets_expect(on: str, office: LineMap) -> None:
     """Through board, line and host, with the imperfections of a real Ping: the directions that fit, fit to some %."""
     pose = (-0.7, 1.2, 0.3)
@@ -151,9 +151,10 @@ def test_way_and_coverage_by_an_exact_odometry_are_the_true_ones(monkeypatch: py
     assert share == pytest.approx(run.share, abs=0.002) and way == pytest.approx(run.trial.way, rel=0.01)
 
 
-def test_ten_starts_come_to_see_all_in_spite_of_a_low_block() -> None:
+@pytest.mark.parametrize("number", [3, pytest.param(10, marks=pytest.mark.soak)])
+def test_any_start_comes_to_see_all_in_spite_of_a_low_block(number: int) -> None:
     """Of E40's 24, at another seed."""
-    given = enumerate(starts("exploration-block", 20, 10), 1)
+    given = enumerate(starts("exploration-block", 20, number), 1)
     shares = [unrecorded("exploration-block", pose, seed, 420.0)[1] for seed, pose in given]
     assert min(shares) >= 0.995
 
@@ -318,6 +319,7 @@ def test_rounds_visits_three_rooms_and_charges_when_low() -> None:
     assert 0.5 < low[emptiest] < 0.95 and low[emptiest:].min() < 0.1, "it was neither idle nor empty, and is full again"
 
 
+@pytest.mark.soak
 def test_turret_robot_makes_its_rounds_too() -> None:
     result = boebot.run("rounds", robot="shieldbot-turret", arena="office", seconds=80)
     assert visited(result, list(rounds.ROOMS.values())[:2]) == [True, True]

@@ -152,9 +152,10 @@ def test_particle_filter_finds_itself_again(office: LineMap, places: list[Pose])
 # ---- on a robot ------------------------------------------------------------------------------------------------------
 
 
-def test_ten_patrols_stay_near_the_truth_by_localization_alone() -> None:
+@pytest.mark.parametrize("number", [3, pytest.param(10, marks=pytest.mark.soak)])
+def test_patrols_stay_near_the_truth_by_localization_alone(number: int) -> None:
     """Figs. 6.14 and 6.15, as E55 has them, at other seeds. Odometry goes on without a jump."""
-    runs = [patrolled(seed, "roller", 120.0, 5.0, RandomSearch()) for seed in trial_seeds(20, 10)]
+    runs = [patrolled(seed, "roller", 120.0, 5.0, RandomSearch()) for seed in trial_seeds(20, number)]
     assert np.median([run.odometry.max() for run in runs]) >= 0.5
     assert np.median([run.localization.max() for run in runs]) <= 0.2
     assert max(np.abs(np.diff(run.odometry)).max() for run in runs) < 0.02

@@ -114,7 +114,7 @@ def complete(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("on", ["native", "direct"])
+@pytest.mark.parametrize("on", ["native", pytest.param("direct", marks=pytest.mark.soak)])
 @pytest.mark.parametrize(
     ("deed", "sentence"),
     [
@@ -140,7 +140,7 @@ def test_brain_that_does_wrong(
     assert stood_still == [True]
 
 
-@pytest.mark.parametrize("on", ["native", "direct"])
+@pytest.mark.parametrize("on", ["native", pytest.param("direct", marks=pytest.mark.soak)])
 @pytest.mark.parametrize(
     ("deed", "sentence"),
     [

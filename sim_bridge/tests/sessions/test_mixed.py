@@ -248,7 +248,7 @@ def test_command_line_runs_three_without_boards() -> None:
 
 
 @pytest.mark.unsanitized
-@pytest.mark.parametrize("robot", ["arsim", "shieldbot"])
+@pytest.mark.parametrize("robot", ["arsim", pytest.param("shieldbot", marks=pytest.mark.soak)])
 def test_one_robot_starts_where_it_is_told(robot: str) -> None:
     pose = (0.3, -0.4, 1.25)
     result = boebot.run(stand, robot=robot, arena="empty", seconds=1, pose=pose)
