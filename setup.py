@@ -191,7 +191,9 @@ setup(
     package_dir={name: f"host/{name}" for name in ("boebot", *GUESTS)} | {"sim_bridge": "sim_bridge"},
     packages=[
         *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data*", "boebot.arenas.geometry"]),
-        *find_namespace_packages("host", include=[*GUESTS, *(f"{name}.*" for name in GUESTS)], exclude=["*.tests*"]),
+        *find_namespace_packages(
+            "host", include=[*GUESTS, *(f"{name}.*" for name in GUESTS)], exclude=["*.tests*", "*.generator"]
+        ),
         *find_namespace_packages(
             ".",
             include=["sim_bridge", "sim_bridge.*"],

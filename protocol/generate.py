@@ -4,10 +4,11 @@
     python protocol/generate.py --pages    writes what is in git, for it is read there
     python protocol/generate.py --check    exits 1 and names each file in git that is stale
 
-Built: the C headers in firmware/src/generated, the Python modules host/boebot/link/messages.py and
-host/boebot_can/layout.py, and the stub host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest
-begin with it; a file that would be the same is left alone. In git: the golden vectors protocol/vectors/frames.json,
-the CAN database protocol/boebot.dbc, and the tables of PROTOCOL.md. Each kind of file has a module beside this one.
+Built: the C headers in firmware/src/generated, the Python module host/boebot/link/messages.py, and the stub
+host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest begin with it; a file that would be the same
+is left alone. In git: the golden vectors protocol/vectors/frames.json, and the tables of PROTOCOL.md. Each kind of file
+has a module beside this one. Packages beside the core join by host/<package>/generator/<any>_files.py, which has the
+same two functions, `built` and `pages`, and `parts` of PROTOCOL.md.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ if sys.version_info < (3, 11):  # noqa: UP036  # PlatformIO may run on an older 
     sys.exit(f"protocol/generate.py: expected Python 3.11 or newer; {sys.executable} is {version}")
 
 import argparse
+import importlib
 import json
 import os
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-sys.path.insert(0, str(HERE))
+GUESTS = sorted((ROOT / "host").glob("*/generator/*_files.py"))
+sys.path[:0] = [str(HERE), *(str(path.parent) for path in GUESTS)]
 
 import attributes_stub  # noqa: E402
 import c_headers  # noqa: E402
-import can_database  # noqa: E402
-import can_module  # noqa: E402
 import device_header  # noqa: E402
 import pin_headers  # noqa: E402
 import protocol_page  # noqa: E402
@@ -40,6 +41,7 @@ import schema  # noqa: E402
 import vectors  # noqa: E402
 
 GENERATED = ROOT / "firmware" / "src" / "generated"
+GUESTS_MODULES = [importlib.import_module(path.stem) for path in GUESTS]
 
 
 def built() -> dict[Path, str]:
@@ -59,18 +61,19 @@ def built() -> dict[Path, str]:
     return {
         **{GENERATED / name: text for name, text in headers.items()},
         ROOT / "host" / "boebot" / "link" / "messages.py": python_module.python_module(spec),
-        ROOT / "host" / "boebot_can" / "layout.py": can_module.can_module(spec),
         attributes_stub.STUB: attributes_stub.stub(),
+        **{path: text for guest in GUESTS_MODULES for path, text in guest.built(spec).items()},
     }
 
 
 def pages() -> dict[Path, str]:
     """Each made file that is in git, and its text."""
     spec = schema.load()
+    parts = {name: text for guest in GUESTS_MODULES for name, text in guest.parts(spec).items()}
     return {
         HERE / "vectors" / "frames.json": json.dumps(vectors.vectors(spec), indent=1) + "\n",
-        HERE / "boebot.dbc": can_database.database(spec),
-        HERE / "PROTOCOL.md": protocol_page.protocol_page(spec),
+        HERE / "PROTOCOL.md": protocol_page.protocol_page(spec, parts),
+        **{path: text for guest in GUESTS_MODULES for path, text in guest.pages(spec).items()},
     }
 
 

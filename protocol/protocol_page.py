@@ -1,28 +1,20 @@
-"""The tables, the worked frame and the CAN frames of PROTOCOL.md."""
+"""The tables and the worked frame of PROTOCOL.md."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import can_layout
 import reference_frame
 import schema
 
 PAGE = Path(__file__).with_name("PROTOCOL.md")
-BEGIN, END = "<!-- tables: made by generate.py -->", "<!-- end of tables -->"
-WORKED_BEGIN, WORKED_END = "<!-- worked frame: made by generate.py -->", "<!-- end of worked frame -->"
-CAN_BEGIN, CAN_END = "<!-- CAN frames: made by generate.py -->", "<!-- end of CAN frames -->"
 
 
-def protocol_page(spec: schema.Schema) -> str:
-    """PROTOCOL.md with all that is made renewed."""
+def protocol_page(spec: schema.Schema, of_guests: dict[str, str]) -> str:
+    """PROTOCOL.md with all that is made renewed; `of_guests`: name of a part -> what a guest makes there."""
     text = PAGE.read_text(encoding="utf-8")
-    parts = (
-        (WORKED_BEGIN, WORKED_END, worked_frame(spec)),
-        (CAN_BEGIN, CAN_END, can_frames(spec)),
-        (BEGIN, END, tables(spec)),
-    )
-    for begin, end, made in parts:
+    for name, made in {"worked frame": worked_frame(spec), "tables": tables(spec), **of_guests}.items():
+        begin, end = f"<!-- {name}: made by generate.py -->", f"<!-- end of {name} -->"
         head, rest = text.split(begin)
         text = f"{head}{begin}\n\n{made}\n\n{end}{rest.split(end)[1]}"
     return text
@@ -96,13 +88,3 @@ def worked_frame(spec: schema.Schema) -> str:
         ("on the wire", wire.hex(" ")),
     ]
     return "\n".join(["```text", *(f"{name:<23}{value}" for name, value in steps), "```"])
-
-
-def can_frames(spec: schema.Schema) -> str:
-    """The table of CAN frames: what each data byte holds."""
-    lines = ["| at node 0 | frame | class | data, each with its bytes |", "|---|---|---|---|"]
-    for identifier, (_, frame) in can_layout.identifiers(spec).items():
-        data = ", ".join(f"`{place.name}` {place.size}" for place in frame.places)
-        kind = can_layout.CLASSES[identifier >> can_layout.CLASS_SHIFT]
-        lines.append(f"| `0x{identifier:03X}` | `{frame.name}` | {kind} | {data} |")
-    return "\n".join(lines)

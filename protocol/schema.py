@@ -139,7 +139,7 @@ class Message:
     fields: list[Field]
     since: int = 0
     devices: list[str] = dataclasses.field(default_factory=list)  # of the firmware, that fill it (device_header.py)
-    can_id: int = 0  # of its first CAN frame at node 0; 0: it goes by ISO-TP (can_layout.py)
+    can_id: int = 0  # of its first CAN frame at node 0; 0: it goes by ISO-TP (host/boebot_can/generator)
     cycle_ms: int = 0  # time between two of them by default; 0: sent when there is something to say
 
     @property

@@ -1,6 +1,6 @@
 """The CAN database (DBC) of the protocol's messages, for each node of a bus.
 
-protocol/can_database.py makes it; the package holds that of node 1. Its attribute SchemaHash says for which version.
+generator/can_database.py makes it; the package holds that of node 1. Its attribute SchemaHash says for which version.
 """
 
 from __future__ import annotations

@@ -1,14 +1,35 @@
-"""The Python module of the CAN frames' layout, host/boebot_can/layout.py."""
+"""What CAN has of the protocol, for protocol/generate.py: the module host/boebot_can/layout.py, the database
+protocol/boebot.dbc, and the table of CAN frames in PROTOCOL.md."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import can_database
 import can_layout
 import schema
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def built(spec: schema.Schema) -> dict[Path, str]:
+    """As of generate.py."""
+    return {ROOT / "host" / "boebot_can" / "layout.py": can_module(spec)}
+
+
+def pages(spec: schema.Schema) -> dict[Path, str]:
+    """As of generate.py."""
+    return {ROOT / "protocol" / "boebot.dbc": can_database.database(spec)}
+
+
+def parts(spec: schema.Schema) -> dict[str, str]:
+    """As of generate.py."""
+    return {"CAN frames": can_frames(spec)}
 
 
 def can_module(spec: schema.Schema) -> str:
     """host/boebot_can/layout.py"""
-    doc = "Which bytes of a message stand in which CAN frame, from protocol/messages.toml by protocol/can_layout.py."
+    doc = "Which bytes of a message stand in which CAN frame, from protocol/messages.toml by generator/can_layout.py."
     lines = [
         *schema.python_head(doc),
         "",
@@ -45,3 +66,13 @@ def can_module(spec: schema.Schema) -> str:
             f"{message.delivery == 'set_point'}),  # {message.name}"
         )
     return "\n".join([*lines, "}", ""])
+
+
+def can_frames(spec: schema.Schema) -> str:
+    """The table of CAN frames: what each data byte holds."""
+    lines = ["| at node 0 | frame | class | data, each with its bytes |", "|---|---|---|---|"]
+    for identifier, (_, frame) in can_layout.identifiers(spec).items():
+        data = ", ".join(f"`{place.name}` {place.size}" for place in frame.places)
+        kind = can_layout.CLASSES[identifier >> can_layout.CLASS_SHIFT]
+        lines.append(f"| `0x{identifier:03X}` | `{frame.name}` | {kind} | {data} |")
+    return "\n".join(lines)

@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import random
 import subprocess
-import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import can_layout
 import cantools.database
 import pytest
+import schema
 from cantools.database.can import Database, Message, Signal
 from cantools.database.can.c_source import generate
 from cffi import FFI
@@ -20,13 +21,7 @@ from cffi import FFI
 from boebot.link import messages
 from boebot_can.frames import PARTS, Assembler, FrameMaker
 
-PROTOCOL = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(PROTOCOL))
-
-import can_layout  # noqa: E402
-import schema  # noqa: E402
-
-DATABASE = PROTOCOL / "boebot.dbc"
+DATABASE = Path(__file__).resolve().parents[3] / "protocol" / "boebot.dbc"
 SCHEMA = schema.load()
 ON_CAN = [message for message in SCHEMA.message if message.can_id]
 CLASSES = {"stop": {0}, "set_point": {1}, "exactly_once": {2, 5}, "telemetry": {1, 2, 3, 4, 6}, "handshake": {6}}
