@@ -184,6 +184,8 @@ void encoder_task(void) {
   begin_tick();
 }
 
+int32_t encoder_count(uint8_t side) { return wheels[side].reading.count; }
+
 void encoder_report_telemetry(msg_telemetry *message) {
   const encoder_reading *left = &wheels[LEFT].reading;
   const encoder_reading *right = &wheels[RIGHT].reading;

@@ -39,6 +39,9 @@ void encoder_mask(uint8_t pins);
 /* A tick begins: all pins count again. Once, before encoder_task(), which reports what was masked. */
 void encoder_lift_masks(void);
 
+/* Edges since reset, at the start of this tick. */
+int32_t encoder_count(uint8_t side);
+
 /* Fills in its fields of telemetry: the readings at the start of this tick. */
 void encoder_report_telemetry(msg_telemetry *message);
 
