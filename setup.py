@@ -40,12 +40,9 @@ HAS_SIMAVR = any(Path("build/simavr").glob("**/sim_avr.c"))
 PIN_HEADERS = FIRMWARE.glob("generated/pins_*.h")
 PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in PIN_HEADERS)
 
-GUESTS = (
-    "avr_timing",
-    "boebot_can",
-    "boebot_course",
-    "boebot_timing",
-)  # packages beside the library, which join it by entry points
+# Packages beside the library, which join it by entry points.
+GUESTS = ("avr_timing", "boebot_can", "boebot_course", "boebot_timing")
+WITH_PARTS = [*GUESTS, *(f"{name}.*" for name in GUESTS)]
 
 # What a wheel carries beside its modules: folder in the package <- (folder in the checkout, patterns).
 WHEEL_DATA = {
@@ -191,9 +188,7 @@ setup(
     package_dir={name: f"host/{name}" for name in ("boebot", *GUESTS)} | {"sim_bridge": "sim_bridge"},
     packages=[
         *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data*", "boebot.arenas.geometry"]),
-        *find_namespace_packages(
-            "host", include=[*GUESTS, *(f"{name}.*" for name in GUESTS)], exclude=["*.tests*", "*.generator"]
-        ),
+        *find_namespace_packages("host", include=WITH_PARTS, exclude=["*.tests*", "*.generator"]),
         *find_namespace_packages(
             ".",
             include=["sim_bridge", "sim_bridge.*"],

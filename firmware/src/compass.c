@@ -1,8 +1,6 @@
 /* compass.c: see compass.h. */
 #include "compass.h"
 
-#include <stdbool.h>
-
 #include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"

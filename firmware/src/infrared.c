@@ -1,8 +1,6 @@
 /* infrared.c: see infrared.h. */
 #include "infrared.h"
 
-#include <stdbool.h>
-
 #include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"

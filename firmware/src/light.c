@@ -1,8 +1,6 @@
 /* light.c: see light.h. */
 #include "light.h"
 
-#include <stdbool.h>
-
 #include "clock.h"
 #include "generated/values.h"
 #include "hal/hal.h"

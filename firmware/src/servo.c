@@ -1,8 +1,6 @@
 /* servo.c: the edges of the servo pulses and nothing else; what they mean is in motion.c. */
 #include "servo.h"
 
-#include <stdbool.h>
-
 #include "hal/hal.h"
 #include "hal/interrupts.h"
 
