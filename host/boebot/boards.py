@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
@@ -49,7 +49,6 @@ class BoardRequest:
     noise: bool = True
     without: Sequence[str] = ()  # imperfections of this robot that are switched off, by name
     imperfections: Mapping[str, float] = field(default_factory=dict)  # magnitudes of others, by name
-    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -42,21 +42,8 @@ class WheelDirection:
 
     def update_all(self, signals: Floats, steps_s: Floats) -> NDArray[np.int64]:
         """Many updates one after the other: the signs, shape (n,)."""
-        wanted = (signals >= DEAD_BAND).astype(np.int64) - (signals <= -DEAD_BAND)
-        signs = np.empty(len(signals), dtype=np.int64)
-        begins = [0, *(np.flatnonzero(np.diff(wanted)) + 1).tolist()] if len(signals) else []
-        for begin, end in zip(begins, [*begins[1:], len(signals)], strict=True):  # the command does not change
-            signs[begin:end] = self.sign
-            if wanted[begin] != -self.sign:
-                self._reversed_s = 0.0
-                continue
-            reversed_s = np.cumsum(np.append(self._reversed_s, steps_s[begin:end]))[1:]
-            held = int(np.searchsorted(reversed_s, HOLD_S - 1e-9))
-            self._reversed_s = float(reversed_s[-1])
-            if held < len(reversed_s):
-                self.sign, self._reversed_s = -self.sign, 0.0
-                signs[begin + held : end] = self.sign
-        return signs
+        both = zip(signals.tolist(), steps_s.tolist(), strict=True)
+        return np.array([self.update(signal, step_s) for signal, step_s in both], dtype=np.int64)
 
 
 class Odometry:

@@ -115,7 +115,6 @@ class Robot(Attributes):
     """
 
     __slots__ = (
-        "_chances",
         "_period",
         "_seed",
         "_speed_limit",
@@ -143,7 +142,6 @@ class Robot(Attributes):
         """A `random.Random` of the brain's own: the same run gives the same numbers."""
         self.showing = Showing()
         """What the brain shows."""
-        self._chances: dict[tuple[float, float], float] = {}
 
     # ---- clock ---------------------------------------------------------------------------------------------
 
@@ -331,16 +329,11 @@ class Robot(Attributes):
 
         Args:
             probability: 0..1, of happening within `per` seconds.
-            per: seconds that the probability is meant for. A brain that asks once per step then behaves alike
-            at every
-                brain period: p' = 1 - (1 - p)^(period / per). None: the probability is meant as
-                it stands.
+            per: seconds that the probability is meant for. A brain that asks once per step then behaves alike at every
+                brain period: p' = 1 - (1 - p)^(period / per). None: the probability is meant as it stands.
         """
         if per is not None:
-            key = (probability, per)
-            if key not in self._chances:
-                self._chances[key] = 1.0 - (1.0 - probability) ** (self._period / per)
-            probability = self._chances[key]
+            probability = 1.0 - (1.0 - probability) ** (self._period / per)
         return self.random.random() < probability
 
     def stream(self, name: str) -> random.Random:

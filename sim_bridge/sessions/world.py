@@ -191,18 +191,11 @@ def _add(sim: Sim, kind: BoardKind | None, request: BoardRequest, pose: tuple[fl
 
 
 def _new_sim(request: BoardRequest, step_s: float) -> Sim:
-    """The world that a request wants, without robots; `step_s`: its step, unless the request has one.
-
-    Raises:
-        BoardError: the request has an option that there is not.
-    """
-    if unknown := request.options.keys() - {"world_step_s"}:
-        raise BoardError(f"there is no option {min(unknown)!r} of a simulated world; expected world_step_s")
-    step_cycles = round(float(request.options.get("world_step_s", step_s)) * CLOCK_HZ)
+    """The world that a request wants, without robots; `step_s`: its step."""
     return Sim(
         load_arena(request.arena),
         seed=request.seed,
         noise=request.noise,
         record=request.record,
-        step_cycles=step_cycles,
+        step_cycles=round(step_s * CLOCK_HZ),
     )

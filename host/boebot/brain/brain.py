@@ -179,10 +179,6 @@ class Brain:
         del self.switches[: len(switches)]
         return steps, switches
 
-    def is_active(self, process: Process) -> bool:
-        """Whether one of the brain's processes is active."""
-        return bool(self._active) and self._active[self._place(process)]
-
     def utility(self, process: Process) -> float:
         """The present utility of one of the brain's processes."""
         return self._utilities.values[self._place(process)]

@@ -72,7 +72,6 @@ class Process:
         self.step_time = math.nan
         self._others: Callable[[object], Process] = _alone
         self._kick: Callable[[Process, float], None] = _unheard
-        self._chances: dict[tuple[float, float], float] = {}
         self.has_changed = False  # parameters have since it was made
         self.forget()
 
@@ -116,10 +115,7 @@ class Process:
             per: seconds that the probability is meant for; None: it is meant as it stands.
         """
         if per is not None:
-            key = (probability, per)
-            if key not in self._chances:
-                self._chances[key] = 1.0 - (1.0 - probability) ** (self.step_time / per)
-            probability = self._chances[key]
+            probability = 1.0 - (1.0 - probability) ** (self.step_time / per)
         return self.random.random() < probability
 
     def other(self, kind: type[P]) -> P:
@@ -159,7 +155,6 @@ class Process:
             self.forget()
         self.step_time, self.random = step_time, source
         self._others, self._kick = others, kick
-        self._chances.clear()
 
 
 @dataclass(kw_only=True)

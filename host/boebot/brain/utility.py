@@ -19,8 +19,6 @@ from typing import NamedTuple
 
 from boebot.errors import BrainError
 
-_FACTORS = 64  # times whose factors are remembered
-
 HOLD = 10.0
 """A gamma parameter with which a process is active whatever the state variables: no usual sum is that large."""
 
@@ -92,7 +90,6 @@ class Utilities:
         self._weights = [self._indexed(function) for function in functions]
         self._functions = tuple(functions)
         self._arguments = [(one.b, one.c, weights) for one, weights in zip(functions, self._weights, strict=True)]
-        self._factors: dict[float, list[tuple[float, float]]] = {}  # by the time that has passed (s)
 
     def _indexed(self, function: Utility) -> tuple[tuple[int, float], ...]:
         for name in function.w:
@@ -108,23 +105,15 @@ class Utilities:
 
     def advance(self, z: Sequence[float], elapsed: float) -> None:
         """By `elapsed` seconds, in which the state variables are `z`: first gamma parameters, then utilities."""
-        factors = self._factors.get(elapsed)
-        if factors is None:
-            factors = self._factors_of(elapsed)
         values, gammas, arguments = self.values, self.gammas, self._arguments
-        for index, (lag, decay) in enumerate(factors):
+        for index, (lag, decay) in enumerate(self._factors_of(elapsed)):
             gammas[index] = gamma = gammas[index] * decay
             settled = _settled(arguments[index], gamma, z)
             values[index] = settled + (values[index] - settled) * lag
 
     def _factors_of(self, elapsed: float) -> list[tuple[float, float]]:
-        """e^(-Δt/τ_i) and e^(-Δt/τΓ_i): remembered, for the time between two steps takes few values, a bit apart."""
-        if len(self._factors) >= _FACTORS:
-            self._factors.clear()
-        factors = self._factors[elapsed] = [
-            (math.exp(-elapsed / function.tau), math.exp(-elapsed / function.tau_gamma)) for function in self._functions
-        ]
-        return factors
+        """e^(-Δt/τ_i) and e^(-Δt/τΓ_i)."""
+        return [(math.exp(-elapsed / one.tau), math.exp(-elapsed / one.tau_gamma)) for one in self._functions]
 
     def shares(self, index: int, z: Sequence[float]) -> list[Share]:
         """What now drives the utility of a process, the strongest first."""

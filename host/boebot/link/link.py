@@ -40,7 +40,6 @@ from boebot.link.session import Session
 from boebot.link.transport import CountsOverruns, Transport
 
 _TIME_OUT = messages.PARAMETERS["session_time_out"]
-_PERIOD = messages.PARAMETERS["telemetry_period"]
 _SHORTEST_S = 1e-4  # a wait that rounds to nothing would never end on a clock that only waits advance
 _ROUNDING_S = 0.5e-6  # a clock of whole cycles may stop this much before what was waited for
 _STOP_BYTES = 20
@@ -137,7 +136,6 @@ class Link:
         """
         if not self.session.is_open:
             self.session.open(limit_s)
-            self._report_thinning()
         assert self.session.hello is not None
         return self.session.hello
 
@@ -416,21 +414,3 @@ class Link:
         task, longest = messages.TaskTime.unpack(payload)
         if task < len(_TASKS):  # this kit knows it
             self.task_times[_TASKS[task]] = longest
-
-    def _report_thinning(self) -> None:
-        """Where the line is slow the board sends telemetry less often than its parameter says."""
-        hello = self.session.hello
-        assert hello is not None
-        ticks = hello.telemetry_period
-        if ticks <= _PERIOD.minimum:
-            return
-        request = self.submit(messages.GetParameter, _PERIOD.id, what="send parameter telemetry_period")
-        while not request.done:
-            self._turn(NEVER)
-        answer = request.answer  # if there is none, the next request says why
-        if answer is not None and answer.status == messages.AnswerStatus.OK and answer.value < ticks:
-            sent_ms, wanted_ms = (1000 * count * self.session.tick_s for count in (ticks, answer.value))
-            self.notices.append(
-                f"the board at {self.transport.name} sends telemetry every {sent_ms:g} ms, not every {wanted_ms:g} ms "
-                "as its parameter telemetry_period says: its line is slow"
-            )

@@ -176,10 +176,10 @@ def test_e64_one_motor_behavior_and_all_cognitive_processes_above_zero() -> None
     for _ in range(6000):
         command = stepped.step(brain)
         step = brain.steps[-1]
-        assert [brain.is_active(one) for one in motor].count(True) == 1
+        assert [brain._active[brain._place(one)] for one in motor].count(True) == 1
         assert step.utilities[:3].index(max(step.utilities[:3])) == [one.name for one in motor].index(step.motor)
         assert command.left == next(one.signal for one in motor if one.name == step.motor)
-        assert [brain.is_active(one) for one in (think, *others)] == [u > 0 for u in step.utilities[3:]]
+        assert [brain._active[brain._place(one)] for one in (think, *others)] == [u > 0 for u in step.utilities[3:]]
     low, high = math.tanh(-0.5), math.tanh(1.0)
     on = 0.3 * math.log((high - low) / high)
     off = 0.3 * math.log((high - low) / -low)

@@ -49,7 +49,7 @@ def test_every_kind_of_process_can_be_made_and_stepped(kind: str, tmp_path: Path
     was_active = False
     for _ in range(20):  # touched, and something near: what waits for a stimulus has it
         stepped.step(brain, whiskers=1, infrared=3, light_left=900, light_right=800, battery=700, battery_age=0)
-        was_active |= brain.is_active(process)
+        was_active |= brain._active[brain._place(process)]
     assert was_active
 
 

@@ -553,13 +553,6 @@ def test_link_prints_an_object_every_second(board: InProcess, capsys: pytest.Cap
     assert seen[-1]["host"]["good"] > seen[0]["host"]["good"] > 0
 
 
-def test_link_says_that_telemetry_is_thinned(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
-    board.peer.telemetry_period = 5
-    _, out, err = boebot(capsys, "doctor", "native", "--watch", "--seconds", "1", "--json")
-    assert "sends telemetry every 50 ms, not every 10 ms" in err
-    assert json.loads(out)["telemetry_period_s"] == 0.05
-
-
 def test_link_refuses_to_watch_for_less_than_no_time(board: InProcess, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = boebot(capsys, "doctor", "native", "--watch", "--json", "--seconds", "-1")
     assert (code, out) == (2, "") and "seconds" in err

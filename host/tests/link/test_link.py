@@ -576,19 +576,6 @@ def test_late_telemetry_is_counted() -> None:
     assert link.counters().late - late <= 4, "those that were under way"
 
 
-@pytest.mark.parametrize(("line_ticks", "parameter"), [(1, 1), (5, 1), (5, 2), (2, 5), (5, 5)])
-def test_telemetry_thinner_than_its_parameter_is_reported(line_ticks: int, parameter: int) -> None:
-    peer = Peer()
-    peer.telemetry_period = line_ticks  # as its line allows
-    peer.parameters[messages.PARAMETERS["telemetry_period"].id] = parameter
-    link, _, _ = open_link(peer)
-    notice = (
-        f"the board at peer sends telemetry every {10 * line_ticks} ms, not every {10 * parameter} ms as its parameter "
-        "telemetry_period says: its line is slow"
-    )
-    assert link.notices == ([notice] if line_ticks > parameter else [])
-
-
 def test_stops_without_a_host_are_reported_in_the_next_session() -> None:
     """The host sleeps in mid-drive: dead-man, end of the session. Both come with their times, once, and are earlier."""
     link, peer, session = open_link()

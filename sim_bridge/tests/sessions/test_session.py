@@ -156,8 +156,6 @@ def test_wrong_requests_are_told_in_a_sentence(tmp_path: Path) -> None:
             "no firmware for this computer",
             {"robot": msgspec.structs.replace(robot, pin_map="other")},
         ),
-        (BoardError, "does not divide", {"options": {"world_step_s": 0.003}}),
-        (BoardError, "no option 'world_step' of a simulated world", {"options": {"world_step": 0.001}}),
     ):
         with pytest.raises(error, match=message):
             open_with(**wishes)
