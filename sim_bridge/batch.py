@@ -76,11 +76,9 @@ class Batch:
         for index, (arena, pose, seed) in enumerate(zip(self.arenas, starts.tolist(), keys.tolist(), strict=True)):
             pose = arena.free_start(model.radius, seed) if is_random else pose
             worlds.place(f"batch, world {index}", self.handle, index, model, arena, seed, 1, pose)
-        columns = lib.vehicles_reading_count(self.handle)
-        size = 8 * self.count * columns
-        pointer = worlds.kept(lib.vehicles_readings(self.handle), self.handle)
-        room = ffi.buffer(pointer, size) if size else b""
-        self.readings: Floats = np.frombuffer(room, dtype=np.float64).reshape(self.count, columns)
+        size = 8 * self.count * model.readings
+        room = ffi.buffer(worlds.kept(self.handle.readings, self.handle), size) if size else b""
+        self.readings: Floats = np.frombuffer(room, dtype=np.float64).reshape(self.count, model.readings)
         self.readings.flags.writeable = False
         self._seeds: list[int] = keys.tolist()
         self._brains: Brains | None = None
@@ -127,7 +125,7 @@ class Batch:
         borders = np.linspace(0, self.count, self.threads + 1).astype(int).tolist()
         return [(a, b - a) for a, b in pairwise(borders) if b > a]
 
-    def _portion(self, work: Callable[[int, int, int], int], steps: int) -> bool:
+    def _portion(self, work: Callable[[int, int, int], int | None], steps: int) -> bool:
         """Calls work(first, count, steps), which leaves the interpreter, for all shares. Whether all went well."""
         if self._pool is None:
             return not work(0, self.count, steps)
@@ -140,7 +138,7 @@ class Batch:
             raise
         return not any(statuses)
 
-    def _advance(self, work: Callable[[int, int, int], int], steps: int) -> bool:
+    def _advance(self, work: Callable[[int, int, int], int | None], steps: int) -> bool:
         """`steps` steps of all worlds, in portions. Whether all went well."""
         left = arguments.whole("batch: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
         if self._closed:
@@ -176,8 +174,7 @@ class Batch:
             raise BrainError("batch: a motor signal is not a finite number; expected numbers in [-1, 1]")
         pointer = ffi.from_buffer("double[]", given)
         self._advance(
-            lambda first, count, some: int(lib.vehicles_step(self.handle, first, count, pointer + 2 * first, some)),
-            steps,
+            lambda first, count, some: lib.vehicles_step(self.handle, first, count, pointer + 2 * first, some), steps
         )
         return self.readings
 
@@ -236,7 +233,7 @@ class Batch:
         Raises:
             RobotError: there is no such world or type, or it is larger than the memory.
         """
-        memory = lib.vehicles_brain_state(self.handle, self._index(index))
+        memory = self.handle.brains + self._index(index) * self.handle.state_size
         try:
             pointer = ffi.cast(kind, memory)
             size = ffi.sizeof(ffi.typeof(pointer).item)
@@ -263,23 +260,25 @@ class Batch:
     @property
     def true_poses(self) -> Floats:
         """Truth: shape (N, 3), x (m), y (m), heading (rad)."""
-        poses = np.empty((self.count, 3))
-        lib.vehicles_poses(self.handle, 0, self.count, ffi.from_buffer("double[]", poses))
-        return poses
+        return self._of_all("body", "state", "x", kind=np.float64, numbers=3)
 
     @property
     def flags(self) -> NDArray[np.int8]:
         """Shape (N,): 0 while a run goes on, 1 ended by a collision, 2 by an empty battery, 3 by a compiled brain that
         gave a signal that is no finite number."""
-        flags = np.empty(self.count, dtype=np.int8)
-        lib.vehicles_flags(self.handle, 0, self.count, ffi.from_buffer("int8_t[]", flags))
-        return flags
+        return self._of_all("state", "flag", kind=np.int32)[:, 0].astype(np.int8)
 
     @property
     def steps(self) -> NDArray[np.uint64]:
         """Shape (N,): steps done by each world."""
-        done = (lib.vehicles_steps_done(self.handle, i) for i in range(self.count))
-        return np.fromiter(done, dtype=np.uint64, count=self.count)
+        return self._of_all("state", "step", kind=np.uint64)[:, 0]
+
+    def _of_all(self, *place: str, kind: type[Any], numbers: int = 1) -> NDArray[Any]:
+        """Shape (N, numbers): what stands in each world at that place of C struct vehicle; a copy."""
+        each, size = ffi.sizeof("vehicle"), np.dtype(kind).itemsize
+        room = ffi.buffer(self.handle.worlds, each * (self.count + 1))  # there is room for one more
+        at = ffi.offsetof("vehicle", *place)
+        return np.ndarray((self.count, numbers), kind, room, at, (each, size)).copy()
 
     def hashes(self) -> NDArray[np.uint64]:
         """Shape (N,): of all that each world has come to; the same on every machine."""

@@ -20,7 +20,7 @@ typedef struct part_kind part_kind;
 typedef struct sensor_kind sensor_kind;
 """
 AFTER = """
-static const double WHISKER_HEIGHT_M;
+static const double WHISKER_HEIGHT_M, SUPPLY_NOMINAL_V;
 typedef struct { body_state state; uint32_t id; ...; } body;
 void body_init(body *self, const body_parameters *parameters, double reach);
 void body_place(body *self, double x, double y, double heading);
@@ -30,6 +30,36 @@ int body_advance(body *self, const scene *around, double torque_left, double tor
 double body_wheel_hold(const body *self, double dt);
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1,
                          double height);
+typedef struct { size_t obstacles; mover *movers; ...; } world;
+typedef struct { uint64_t step; int32_t flag; double energy; ...; } vehicle_state;
+typedef struct { world own; body body; vehicle_state state; ...; } vehicle;
+struct vehicle_model { size_t readings; ...; };
+struct vehicles {
+  const vehicle_model *model;
+  size_t state_size;
+  vehicle *worlds;
+  double *readings;
+  unsigned char *brains;
+  ...;
+};
+typedef struct { brown_out_parameters parameters; uint32_t resets, upsets; ...; } brown_out;
+typedef struct { supply supply; ...; } battery;
+typedef struct { motor_position motor; ...; } turret;
+typedef struct { double supply; ...; } chassis;
+struct robot {
+  body *body;
+  vehicles *vehicle;
+  chassis chassis;
+  brown_out brown_out;
+  battery *battery;
+  double held_supply;
+  buffer received, truth, looks, tones;
+  edge_log edges;
+  uint64_t last_byte, listen_from, reset_at, contacts;
+  ...;
+};
+turret *robot_turret(const robot *self, uint8_t pin);
+struct sim { world world; mover movers[...]; uint64_t now, world_at; buffer waits, shifts; ...; };
 """
 SOURCES = [
     "world/*.c",
@@ -40,7 +70,7 @@ SOURCES = [
     "boards/native/*.c",
     "loop/*.c",
 ]
-UNMARKED = ["world/body_step.h"]  # what is declared here
+UNMARKED = ["world/body_step.h", "loop/state.h"]  # what is declared here
 ROOM = Path("sim_bridge")
 LIBRARIES = [] if sys.platform in ("win32", "darwin") else ["-ldl"]
 

@@ -28,7 +28,6 @@ class BoardPins(BoardMemory):
     def __init__(self, robot: SimRobot) -> None:
         self._robot = robot
         self._sim = robot.sim
-        self._number = robot.number
 
     @property
     def board(self) -> EmulatedBoard:
@@ -36,13 +35,9 @@ class BoardPins(BoardMemory):
         return self._robot.board
 
     @property
-    def _handle(self) -> Any:
-        return self._sim.handle
-
-    @property
     def reset_cycle(self) -> int:
         """At which the program was last started by `reset`; 0 before."""
-        return int(lib.sim_reset_at(self._handle, self._number))
+        return int(self._robot.handle.reset_at)
 
     @property
     def cycle(self) -> int:
@@ -52,23 +47,24 @@ class BoardPins(BoardMemory):
     @property
     def edge_count(self) -> int:
         """Output edges of the board so far."""
-        return int(lib.sim_edges_seen(self._handle, self._number))
+        return int(self._robot.handle.edges.count)
 
     def pin_log(self, newest: int = EDGES_KEPT) -> NDArray[Any]:
         """The board's `newest` output edges (dtype EDGE), a million at most, oldest first."""
         count = min(self.edge_count, EDGES_KEPT, newest)
         log = np.empty(count, dtype=EDGE)
-        lib.sim_edges(self._handle, self._number, ffi.from_buffer("sim_edge[]", log, require_writable=True), count)
+        edges = ffi.addressof(self._robot.handle, "edges")
+        lib.edge_log_copy(edges, ffi.from_buffer("board_edge[]", log, require_writable=True), count)
         return log
 
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:
         """Takes a pin from its part and drives it from `at_cycle` on (now)."""
         at = self._sim.cycle + 64 if at_cycle is None else at_cycle
-        self._check(lib.sim_drive(self._handle, self._number, max(0, at), pin, level), f"pin {pin}, level {level}")
+        self._check(lib.robot_drive(self._robot.handle, max(0, at), pin, level), f"pin {pin}, level {level}")
 
     def square_wave(self, pin: int, period: int, seconds: float) -> None:
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
-        status = lib.sim_wave(self._handle, self._number, pin, period // 2, round(seconds * CLOCK_HZ))
+        status = lib.robot_wave(self._robot.handle, pin, period // 2, round(seconds * CLOCK_HZ))
         self._check(status, f"square wave of {period} cycles on pin {pin}")
 
     def answer_ping(self, echo_us: float | None) -> None:
@@ -78,7 +74,7 @@ class BoardPins(BoardMemory):
             echo = round(
                 number("answer_ping: the pulse", echo_us, BoardError, least=0, most=ECHO_MAXIMUM_US) * CLOCK_HZ / 1e6
             )
-        self._check(lib.sim_answer_ping(self._handle, self._number, echo), "Ping")
+        self._check(lib.robot_answer_ping(self._robot.handle, echo), "Ping")
 
     def unplug(self, device: str) -> None:
         """Pulls the plug of a device of the robot's description: it hears and drives nothing."""
@@ -91,7 +87,7 @@ class BoardPins(BoardMemory):
     def _plug(self, device: str, *, unplugged: bool) -> None:
         found = self._robot.description.device.get(device)
         for pin in set(found.pins().values()) if found else ():
-            self._check(lib.sim_unplug(self._handle, self._number, pin, unplugged), f"device {device!r}")
+            self._check(lib.robot_unplug(self._robot.handle, pin, unplugged), f"device {device!r}")
         if not found:
             raise BoardError(f"device {device!r}: the robot has no such thing")
 
@@ -100,7 +96,8 @@ class BoardPins(BoardMemory):
         held = (
             0.0 if volts is None else number("supply: the voltage", volts, BoardError, least=0, most=SUPPLY_MAXIMUM_V)
         )
-        self._check(lib.sim_set_supply(self._handle, self._number, held), "supply")
+        self._robot.handle.held_supply = held / lib.SUPPLY_NOMINAL_V
+        lib.robot_update_supply(self._robot.handle)
 
     def brown_out(self, **changes: float) -> None:
         """What a weak supply does to the board: reset_v, hysteresis_v, erratic_v, upsets_per_s (parts/brown_out.h).
@@ -112,13 +109,14 @@ class BoardPins(BoardMemory):
             if name not in values:
                 raise BoardError(f"brown_out: there is no {name!r}; expected one of {', '.join(values)}")
             values[name] = number(f"brown_out: {name}", value, BoardError, least=0)
-        parameters = ffi.new("brown_out_parameters *", values)
-        self._check(lib.sim_set_brown_out(self._handle, self._number, parameters), f"brown-out with {changes}")
+        if values["reset_v"] >= values["erratic_v"]:
+            raise BoardError(f"brown_out: reset_v is {values['reset_v']:g}; expected less than erratic_v")
+        self._robot.handle.brown_out.parameters = values
 
     def brown_outs(self) -> tuple[int, int]:
         """Resets by the brown-out detector so far, and upsets above its voltage."""
-        upsets = ffi.new("uint32_t *")
-        return int(lib.sim_brown_outs(self._handle, self._number, upsets)), int(upsets[0])
+        brown_out = self._robot.handle.brown_out
+        return int(brown_out.resets), int(brown_out.upsets)
 
     def place(self, x: float, y: float, heading: float) -> None:
         """See `SimRobot.place`."""
@@ -129,7 +127,8 @@ class BoardPins(BoardMemory):
         causes = {one.name.lower(): one for one in ResetCause}
         if cause not in causes:
             raise BoardError(f"reset: there is no cause {shown(cause)}; expected one of {', '.join(causes)}")
-        self._check(lib.sim_reset(self._handle, self._number, causes[cause]), f"reset by {cause}")
+        self._robot.handle.reset_at = self.cycle
+        self.board.handle.op.reset(self.board.handle, causes[cause])
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the host's side of the serial line."""

@@ -74,6 +74,16 @@ _kept: dict[int, tuple[object, ...]] = {}
 things apart in any order, could free a board before the simulation that runs it."""
 
 
+def rows_of(buffer: Any, width: int) -> Floats:
+    """What a C buffer holds, as rows of that many doubles."""
+    data = ffi.buffer(buffer.data, buffer.count)[:] if buffer.count else b""
+    return np.frombuffer(data, dtype=np.float64).reshape(-1, width)
+
+
+def _columns(buffer: Any, names: tuple[str, ...]) -> dict[str, Floats]:
+    return dict(zip(names, rows_of(buffer, len(names)).T, strict=True))
+
+
 def _destroy(handle: Any) -> None:
     """Frees a simulation in C, and only then what it points to."""
     lib.sim_destroy(handle)
@@ -120,7 +130,6 @@ class Sim:
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        self._count, self._time = ffi.new("size_t *"), ffi.new("double *")
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
         _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
@@ -210,7 +219,7 @@ class Sim:
         self.members[number] = Member(board, description, None)
         me = weakref.ref(self)
         board.is_in_use = lambda: (sim := me()) is not None and sim._handle is not None
-        join(self.handle, number, description, draw)
+        join(lib.sim_robot(self.handle, number), description, draw)
 
     def _add_vehicle(self, number: int, description: robots.RobotDescription, pose: Pose) -> None:
         from sim_bridge.vehicles.model_file import vehicle_model
@@ -248,7 +257,7 @@ class Sim:
     def cycle(self) -> int:
         """Up to where the simulation has run."""
         handle = self._handle
-        cycle: int = lib.sim_now(self.handle if handle is None else handle)
+        cycle: int = (self.handle if handle is None else handle).now
         return cycle
 
     def run(self, cycles: int) -> None:
@@ -274,7 +283,7 @@ class Sim:
                 return
 
     def _anybody_speaks(self) -> bool:
-        return any(lib.sim_speaks(self.handle, number) for number in self.members)
+        return any(robot.speaks for robot in self.robots)
 
     def check(self, crashed: int) -> None:
         """Raises BoardError where a run has ended since the board of robot `crashed` - 1 crashed."""
@@ -307,8 +316,11 @@ class Sim:
 
     def shapes(self) -> tuple[Pose, ...]:
         """Truth: where the arena's moving shapes stand now (m, m, rad)."""
-        movers = lib.sim_movers(self.handle, self._count, self._time)
-        return tuple((m.x, m.y, math.atan2(m.sine, m.cosine)) for m in (movers[k] for k in range(self._count[0])))
+        return tuple((m.x, m.y, math.atan2(m.sine, m.cosine)) for m in self.movers())
+
+    def movers(self) -> list[Any]:
+        """Truth: the arena's moving shapes as they stand, C structs mover, up to a step ahead of `cycle`."""
+        return [self.handle.movers[k] for k in range(self.handle.world.obstacles)]
 
     def drain(self, *, ended: bool = False) -> Group:
         """The streams of a record that tell of the arena's moving shapes since it was last drained. "waits": rows
@@ -323,30 +335,22 @@ class Sim:
             ]
         ]
         shifts = [(shift.time, _SHIFT.pack(shift.shape, shift.x, shift.y, shift.heading)) for shift in self.shifts()]
-        lib.sim_forget_world(self.handle)
+        self.handle.waits.count = self.handle.shifts.count = 0
         return group_of({"waits": sorted(waits), "shifts": shifts})
 
     def shifts(self) -> list[Shift]:
         """Truth: when moving shapes were put elsewhere, oldest first; empty without recording."""
-        count = ffi.new("size_t *")
-        rows = lib.sim_shifts(self.handle, count)
-        return [Shift(row.time, int(row.shape), row.x, row.y, row.heading) for row in rows[0 : count[0]]]
+        return [Shift(time, int(shape), *pose) for time, shape, *pose in rows_of(self.handle.shifts, 5).tolist()]
 
     def lateness(self) -> list[Lateness]:
         """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had
         waited for robots; empty without recording."""
         if not self._record:
             return []
-        count, now = ffi.new("size_t *"), ffi.new("double *")
-        movers = lib.sim_movers(self.handle, count, now)
-        last = [movers[k].waited for k in range(count[0])]
-        rows = lib.sim_waits(self.handle, count)
-        size = count[0] * ffi.sizeof("sim_wait")
-        table = np.frombuffer(ffi.buffer(rows, size)[:] if size else b"", dtype=np.float64).reshape(-1, 3)
-        found = []
-        for shape, waited in enumerate(last):
+        table, now, found = rows_of(self.handle.waits, 3), self.handle.world_at / CLOCK_HZ, []
+        for shape, mover in enumerate(self.movers()):
             time, _, late = table[table[:, 1] == shape].T
-            found.append(Lateness(time=np.append(time, now[0]), waited=np.append(late, waited)))
+            found.append(Lateness(time=np.append(time, now), waited=np.append(late, mover.waited)))
         return found
 
     def hash(self) -> int:
@@ -369,7 +373,8 @@ class SimRobot:
 
     def __init__(self, sim: Sim, number: int) -> None:
         self.sim, self.number = sim, number
-        self._count = ffi.new("size_t *")
+        self._robot = lib.sim_robot(sim.handle, number)  # stays where it is until the simulation is closed
+        self._received = ffi.addressof(self._robot, "received")
         self._room = ffi.new("uint8_t[]", ROOM)
         self._view = ffi.buffer(self._room)
 
@@ -391,16 +396,16 @@ class SimRobot:
         return self.sim.members[self.number].description
 
     @property
-    def _handle(self) -> Any:
-        return self.sim.handle
+    def handle(self) -> Any:
+        """The robot in C; raises as that of the simulation."""
+        assert self.sim.handle  # raises where it is closed
+        return self._robot
 
     def receive(self) -> bytes:
         """Bytes that left the board since the last call."""
-        handle, number, room = self.sim.handle, self.number, self._room
-        count = lib.sim_receive(handle, number, room, ROOM)
-        data: bytes = self._view[:count]
+        data, count, _ = b"", ROOM, self.handle
         while count == ROOM:
-            count = lib.sim_receive(handle, number, room, ROOM)
+            count = lib.buffer_take(self._received, self._room, ROOM)
             data += self._view[:count]
         return data
 
@@ -413,8 +418,8 @@ class SimRobot:
         if not isinstance(data, bytes | bytearray | memoryview):
             raise BoardError(f"send: got {shown(data)}; expected bytes")
         data = bytes(data)
-        if lib.sim_send(self.sim.handle, self.number, data, len(data)) != lib.SIM_OK:
-            self._need_board("bytes")
+        self._need_board("bytes")
+        lib.robot_send(self.handle, data, len(data))
 
     # ---- without a board ---------------------------------------------------------------------------------------------
 
@@ -426,8 +431,12 @@ class SimRobot:
 
     def readings(self) -> tuple[float, ...]:
         """All readings now, in SI units; of a robot without a board."""
-        readings = lib.sim_readings(self._handle, self.number, self._count)
-        return tuple(ffi.unpack(readings, self._count[0])) if self._count[0] else ()
+        vehicle = self.handle.vehicle
+        if not vehicle:
+            return ()
+        lib.vehicles_sense(vehicle, 0)
+        count = vehicle.model.readings
+        return tuple(ffi.unpack(vehicle.readings, count)) if count else ()
 
     def signals(self, left: float, right: float) -> None:
         """Motor signals from now on, of a robot without a board; what is beyond -1 to 1 is limited.
@@ -439,23 +448,24 @@ class SimRobot:
         if self.description.has_board:
             raise BoardError(f"robot {self.description.name!r} is driven by its board; expected bytes for it")
         try:
-            status = lib.sim_signals(self._handle, self.number, left, right)
+            status = lib.vehicles_send(self.handle.vehicle, 0, left, right)
         except (TypeError, OverflowError):
-            status = lib.SIM_BAD_ARGUMENT
-        if status != lib.SIM_OK:
+            status = lib.VEHICLE_BAD_NUMBER
+        if status != lib.VEHICLE_OK:
             raise BrainError(f"motor signals {shown(left)}, {shown(right)}; expected two finite numbers")
 
     @property
     def ended(self) -> str:
         """Why a robot without a board can go no further, or ""."""
-        return ENDS[lib.sim_vehicle_flag(self._handle, self.number)]
+        vehicle = self.handle.vehicle
+        return ENDS[vehicle.worlds[0].state.flag] if vehicle else ""
 
     # ---- its line ----------------------------------------------------------------------------------------------------
 
     def listen(self, cycle: int) -> None:
         """From that cycle on its bytes end a run of `Sim.run_until`."""
         cycle = whole("listen: the cycle", cycle, BoardError, least=0, most=2**64 - 1)
-        lib.sim_listen(self._handle, self.number, cycle)
+        self.handle.listen_from = cycle
 
     def wait(self, cycles: int, quiet: int) -> None:
         """Lets that many cycles pass; after `quiet` of them (0: 1) only until a robot speaks that is listened to, as
@@ -466,7 +476,7 @@ class SimRobot:
         """
         sim, quiet = self.sim, quiet or 1
         if cycles <= PORTION_CYCLES:
-            if crashed := lib.sim_run_for(sim.handle, self.number, cycles, quiet):
+            if crashed := lib.robot_wait(self.handle, cycles, quiet):
                 sim.check(crashed)
         else:
             now = sim.cycle
@@ -476,7 +486,7 @@ class SimRobot:
     @property
     def speaks(self) -> bool:
         """Bytes have come since it is listened to, and the line has been idle since."""
-        return bool(lib.sim_speaks(self._handle, self.number))
+        return bool(lib.robot_speaks(self.handle))
 
     def line_rate(self, baud: int) -> None:
         """Bit rate of the outside's side of the serial line.
@@ -486,33 +496,32 @@ class SimRobot:
         """
         baud = whole("line_rate: the rate", baud, BoardError, least=1, most=BAUD_MAXIMUM)
         self._need_board("a line")
-        lib.sim_line_rate(self._handle, self.number, baud)
+        lib.robot_line_rate(self.handle, baud)
 
     @property
     def last_byte_cycle(self) -> int:
         """At which the last byte from the board had come."""
-        return int(lib.sim_last_byte(self._handle, self.number))
+        return int(self.handle.last_byte)
 
     @property
     def true_contacts(self) -> int:
         """Touches begun so far; apart by 0.1 s at least."""
-        return int(lib.sim_contacts(self._handle, self.number))
+        return int(self.handle.contacts)
 
     @property
     def pack_voltage(self) -> float:
         """Of the battery, V."""
-        return float(lib.sim_pack_voltage(self._handle, self.number))
+        battery = self.handle.battery
+        return float(battery.supply.pack_v) if battery else 0.0
 
     @property
     def supply_voltage(self) -> float:
         """Of the rail that the board runs on, V."""
-        return float(lib.sim_supply_voltage(self._handle, self.number))
+        return float(self.handle.chassis.supply * lib.SUPPLY_NOMINAL_V)
 
     def body(self) -> Any:
         """The body's state now (a copy, as C struct body_state): pose, speeds, wheel angles, distance, contact."""
-        body = ffi.new("body_state *")
-        lib.sim_body(self._handle, self.number, body)
-        return body
+        return ffi.new("body_state *", self.handle.body.state)
 
     def truth_now(self) -> TruthNow:
         """What only a simulator knows, as it stands now."""
@@ -520,13 +529,13 @@ class SimRobot:
         return TruthNow((body.x, body.y, body.heading), self.true_contacts, self.sim.shapes())
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """Lifts the robot and puts it elsewhere, at rest (m, m, rad): see `sim_place` of loop/loop.h.
+        """Lifts the robot and puts it elsewhere, at rest (m, m, rad): see `robot_place` of loop/loop.h.
 
         Raises:
             ArenaError: that place is not free.
         """
         x, y, heading = checked_pose("place: the pose", (x, y, heading))
-        if lib.sim_place(self._handle, self.number, x, y, heading) != lib.SIM_OK:
+        if lib.robot_place(self.handle, x, y, heading) != lib.SIM_OK:
             raise ArenaError(
                 f"a robot cannot stand at {x:.2f} m, {y:.2f} m: a wall, a moving shape or another robot is in the way"
             )
@@ -535,16 +544,10 @@ class SimRobot:
         if not self.description.has_board:
             raise BoardError(f"robot {self.description.name!r} has no board, and so no {what}")
 
-    def _rows(self, rows: Any, columns: tuple[str, ...]) -> dict[str, Floats]:
-        count = self._count[0]
-        size = count * len(columns) * 8
-        table = np.frombuffer(ffi.buffer(rows, size)[:] if count else b"", dtype=np.float64)
-        return dict(zip(columns, table.reshape(-1, len(columns)).T, strict=True))
-
     def truth(self) -> dict[str, Floats]:
         """Columns `TRUTH`, one row every 10 ms, and two a cycle apart where it was put elsewhere; empty without
         recording."""
-        return self._rows(lib.sim_record(self._handle, self.number, self._count), TRUTH)
+        return _columns(self.handle.truth, TRUTH)
 
     def truth_to_now(self) -> dict[str, Floats]:
         """The same with a row of now at its end, of a robot whose run ends with a world step."""
@@ -559,7 +562,7 @@ class SimRobot:
 
     def tones(self) -> dict[str, Floats]:
         """Columns `TONE`, one row per tone that a buzzer has sounded."""
-        return self._rows(lib.sim_tones(self._handle, self.number, self._count), TONE)
+        return _columns(self.handle.tones, TONE)
 
     def drain(self, *, to_now: bool = False) -> Group:
         """The stream "truth" of a record since it was last drained: rows of doubles, columns `TRUTH` without the time.
@@ -567,7 +570,8 @@ class SimRobot:
         if not self.sim.is_recorded:
             return {}
         time, *columns = (self.truth_to_now() if to_now else self.truth()).values()
-        lib.sim_forget(self._handle, self.number)
+        robot = self.handle
+        robot.truth.count = robot.looks.count = robot.tones.count = 0
         if not len(time):
             return {}
         data = np.column_stack(columns)
@@ -575,8 +579,9 @@ class SimRobot:
 
     def turret_angle(self, pin: int) -> float:
         """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
-        return float(lib.sim_turret_angle(self._handle, self.number, pin))
+        turret = lib.robot_turret(self.handle, pin)
+        return float(turret.motor.angle) if turret else 0.0
 
     def looks(self) -> dict[str, Floats]:
         """Columns `LOOK`, one row per IR burst (kind 0) and Ping (kind 1); empty without recording."""
-        return self._rows(lib.sim_looks(self._handle, self.number, self._count), LOOK)
+        return _columns(self.handle.looks, LOOK)

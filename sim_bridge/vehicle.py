@@ -59,11 +59,10 @@ class Vehicle:
         self.seed, self.robot = seed, robot
         self.handle = worlds.make_worlds("vehicle", model, 1, state_bytes)
         self.place(arena.start if pose is None else pose)
-        count = lib.vehicles_reading_count(self.handle)
-        pointer = worlds.kept(lib.vehicles_readings(self.handle), self.handle)
-        self.readings = memoryview(ffi.buffer(pointer, 8 * count)).cast("B").cast("d").toreadonly()
-        self._body = worlds.kept(lib.vehicles_body(self.handle, 0), self.handle)
-        self._flag = ffi.new("int8_t *")
+        pointer = worlds.kept(self.handle.readings, self.handle)
+        self.readings = memoryview(ffi.buffer(pointer, 8 * model.readings)).cast("B").cast("d").toreadonly()
+        self._world = worlds.kept(self.handle.worlds, self.handle)
+        self._body = worlds.kept(ffi.addressof(self._world[0].body, "state"), self.handle)
         self._pair = ffi.new("double[2]")
 
     def place(self, pose: Sequence[float], speed: float = 0.0, turn_rate: float = 0.0) -> None:
@@ -97,7 +96,7 @@ class Vehicle:
     @property
     def time(self) -> float:
         """s since the start."""
-        return float(lib.vehicles_steps_done(self.handle, 0) * self.model.dt)
+        return float(self._world.state.step * self.model.dt)
 
     @property
     def true_pose(self) -> tuple[float, float, float]:
@@ -112,17 +111,13 @@ class Vehicle:
     @property
     def movers(self) -> Any:
         """Truth: C structs mover of the arena's moving shapes as they stand now, which may have waited; a copy."""
-        count = ffi.new("size_t *")
-        movers = lib.vehicles_movers(self.handle, 0, count)
-        copy = ffi.new("mover[]", count[0])
-        ffi.memmove(copy, movers, ffi.sizeof(copy))
-        return copy
+        own = self._world.own
+        return ffi.new("mover[]", [own.movers[k] for k in range(own.obstacles)])
 
     @property
     def ended(self) -> str:
         """Why the run has ended, "" while it goes on: "collision" or "battery empty"."""
-        lib.vehicles_flags(self.handle, 0, 1, self._flag)
-        return ENDS[self._flag[0]]
+        return ENDS[self._world.state.flag]
 
     @property
     def collided(self) -> bool:
@@ -138,7 +133,7 @@ class Vehicle:
     @property
     def energy(self) -> float:
         """Of the notes' battery, [0, 1]."""
-        return float(lib.vehicles_energy(self.handle, 0))
+        return float(self._world.state.energy)
 
     def step(self, left: float, right: float) -> None:
         """One step under these motor signals; does nothing once the run has ended.

@@ -11,8 +11,8 @@ from typing import Any
 
 from boebot.errors import RobotError
 from sim_bridge._core import ffi, lib
-from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, number, struct
-from sim_bridge.vehicles.drives import dc_parameters, defaults, regulated_parameters, servo_parameters
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, number, struct, values_of
+from sim_bridge.vehicles.drives import dc_parameters, regulated_parameters, servo_parameters
 
 
 class DCMotor:
@@ -126,8 +126,9 @@ class PositionServo:
         Raises:
             RobotError: there is no parameter of that name, or it is outside its range.
         """
-        usual = defaults("motor_position")
-        self.parameters = struct("motor_position_parameters", "servo", parameters, usual)
+        usual = ffi.new("motor_position_parameters *")
+        lib.motor_position_default(usual)
+        self.parameters = struct("motor_position_parameters", "servo", parameters, values_of(usual))
         self._state = ffi.new("motor_position *")
         lib.motor_position_init(self._state, number("servo", "angle", angle))
 

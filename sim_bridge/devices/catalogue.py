@@ -37,7 +37,7 @@ class At(NamedTuple):
 
 
 class Part(NamedTuple):
-    """What stands for a device at its board's pins (sim_add_part in loop.h)."""
+    """What stands for a device at its board's pins (robot_add_part in loop.h)."""
 
     kind: str
     """name of its part_kind"""

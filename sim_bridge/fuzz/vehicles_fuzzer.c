@@ -119,8 +119,7 @@ static vehicle_model *model(void) {
   const touch_parameters whisker = {0.2, 0.0, 0.3, 0.0};
   const charge_parameters gauge = {.empty = 5.0, .full = 7.75, .sigma = 0.005};
   const energy_parameters energy = {0.002, 0.004, 0.1};
-  motor_dc_parameters motor;
-  motor_dc_default(&motor);
+  const motor_dc_parameters motor = {0.0333, 0.0333, 0.62, 0.2e-3, 0.008, 0.02, 2.0, 1.0, 1.0, 12.0};
   vehicle_model *made = vehicle_model_new(&chassis, 0.01);
   int bad = vehicle_model_drive_dc(made, &motor, &motor, 1) != VEHICLE_OK;
   bad |= vehicle_model_add(made, infrared_proximity_sensor, &eye, 0.0) < 0;
@@ -142,15 +141,15 @@ static vehicle_model *model(void) {
 static int placed(const vehicles *all, size_t i) { return all->worlds[i].in != NULL; }
 
 static void check_world(vehicles *all, size_t i) {
-  double pose[3];
-  int8_t flag;
-  vehicles_poses(all, i, 1, pose);
-  vehicles_flags(all, i, 1, &flag);
-  CHECK(isfinite(pose[0]) && isfinite(pose[1]) && isfinite(pose[2]));
-  CHECK(flag >= VEHICLE_RUNS && flag <= VEHICLE_BRAIN_FAILED);
-  const size_t count = vehicles_reading_count(all);
-  for (size_t k = 0; k < count; k++) CHECK(isfinite(vehicles_readings(all)[i * count + k]));
+  const vehicle *w = &all->worlds[i];
+  const body_state *b = &w->body.state;
+  CHECK(isfinite(b->x) && isfinite(b->y) && isfinite(b->heading));
+  CHECK(w->state.flag >= VEHICLE_RUNS && w->state.flag <= VEHICLE_BRAIN_FAILED);
+  const size_t count = all->model->readings;
+  for (size_t k = 0; k < count; k++) CHECK(isfinite(all->readings[i * count + k]));
 }
+
+static double bounded(input *in, double most) { return fmax(fmin(number(in), most), -most); }
 
 static void act(vehicles *all, const arena *where, input *in) {
   const uint8_t action = byte(in);
@@ -158,24 +157,24 @@ static void act(vehicles *all, const arena *where, input *in) {
   const double signals[2] = {number(in), number(in)};
   switch (action % 8) {
     case 0:
-      (void)vehicles_place(all, i, where, byte(in), byte(in), number(in), number(in), number(in));
+      (void)vehicles_place(all, i, where, byte(in), 1u + byte(in), bounded(in, ARENA_FARTHEST_M),
+                           bounded(in, ARENA_FARTHEST_M), bounded(in, BODY_HEADING_LIMIT));
       break;
     case 1:
-      (void)vehicles_set_speeds(all, i, number(in), number(in));
+      if (placed(all, i)) vehicles_set_speeds(all, i, bounded(in, 99.9), bounded(in, 999.9));
       break;
     case 2:
       (void)vehicles_hash(all, i);
       break;
     case 3:
-      (void)vehicles_run(all, i, byte(in) % 4, vehicle_wander, byte(in) % STEPS);
+      if (placed(all, i)) (void)vehicles_run(all, i, 1, vehicle_wander, byte(in) % STEPS);
       break;
     case 4:
       (void)arena_ray(where, signals[0], signals[1], 1.0, 0.0, number(in), number(in), NULL);
       CHECK(!isnan(arena_clearance(where, signals[0], signals[1], 5.0)));
       break;
     default:
-      (void)vehicles_step(all, i, byte(in) % 4, (const double[]){signals[0], signals[1], 0.5, 0.5, 0.1, 0.1},
-                          byte(in) % STEPS);
+      if (placed(all, i) && isfinite(signals[0] + signals[1])) vehicles_step(all, i, 1, signals, byte(in) % STEPS);
   }
   for (size_t k = 0; k < WORLDS; k++) {
     if (placed(all, k)) check_world(all, k);

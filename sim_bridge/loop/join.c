@@ -1,5 +1,4 @@
 /* join.c: see loop.h. Here: a simulation, its robots and their parts come and go. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,8 +9,6 @@
 /* ---- simulation ---------------------------------------------------------------------------------------------------- */
 
 sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise) {
-  if (where == NULL || step_cycles < 2 * PART_GUARD || record_cycles % step_cycles != 0) return NULL;
-  if (arena_moving_count(where) > SIM_OBSTACLES_MAXIMUM) return NULL;
   sim *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   self->seed = seed;
@@ -28,7 +25,7 @@ static void destroy_robot(robot *r) {
     r->board->sink = NULL;
     r->board->op->analog(r->board, NULL, NULL);
   }
-  vehicles_destroy(r->vehicle);
+  if (r->vehicle != NULL) vehicles_destroy(r->vehicle);
   for (int i = 0; i < r->part_count; i++) free(r->parts[i]);
   free(r->parts);
   buffer_free(&r->received);
@@ -40,7 +37,6 @@ static void destroy_robot(robot *r) {
 }
 
 void sim_destroy(sim *self) {
-  if (self == NULL) return;
   for (int i = 0; i < self->robot_count; i++) destroy_robot(self->robots[i]);
   free(self->robots);
   buffer_free(&self->waits);
@@ -70,12 +66,6 @@ static part_place place_of(robot *r, uint32_t kind, int index) {
                 .on = r->sim->noise != 0},
       .index = index,
   };
-}
-
-int sim_has_room(const sim *self, int number, double reach, double x, double y, double heading) {
-  if (number < 0 || sim_robot(self, number) != NULL || self->robot_count == BODY_MAXIMUM) return SIM_BAD_ARGUMENT;
-  if (self->now > 0 || !(fabs(heading) <= BODY_HEADING_LIMIT) || !isfinite(x + y)) return SIM_BAD_ARGUMENT;
-  return world_is_free(&self->world, x, y, reach, 0) ? SIM_OK : SIM_NOT_FREE;
 }
 
 robot *sim_new_robot(sim *self, int number, board *b) {
@@ -121,9 +111,8 @@ void sim_insert(sim *self, robot *r, double x, double y, double heading) {
 int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameters *parameters, double x, double y,
                   double heading) {
   board *b = (board *)address;
-  if (b == NULL || b->op == NULL || b->op->version != BOARD_INTERFACE_VERSION) return SIM_WRONG_BOARD;
-  const int room = sim_has_room(self, number, body_reach_of(parameters), x, y, heading);
-  if (room != SIM_OK) return room;
+  if (b->op->version != BOARD_INTERFACE_VERSION) return SIM_WRONG_BOARD;
+  if (!world_is_free(&self->world, x, y, body_reach_of(parameters), 0)) return SIM_NOT_FREE;
   robot *r = sim_new_robot(self, number, b);
   if (r == NULL) return SIM_NO_MEMORY;
   body_init(r->body, parameters, 0.0);
@@ -143,7 +132,6 @@ static int is_pin(uint8_t pin) { return pin < BOARD_PIN_COUNT; }
 
 /* Room for a part of that size in the robot's list, or NULL. */
 static void *new_part(robot *r, size_t size) {
-  if (r == NULL) return NULL;
   part **parts = realloc(r->parts, (size_t)(r->part_count + 1) * sizeof *parts);
   if (parts == NULL) return NULL;
   r->parts = parts;
@@ -175,47 +163,42 @@ static int join(robot *r, part *p) {
   return SIM_OK;
 }
 
-int sim_add_part(sim *self, int number, const part_kind *kind, int index, const uint8_t *pins, const void *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || index < 0 || !is_pin(pins[0])) return SIM_BAD_ARGUMENT;
-  for (int i = 1; i < kind->pins; i++) {
-    if (!is_pin(pins[i]) && pins[i] != PART_NO_PIN) return SIM_BAD_ARGUMENT;
+int robot_add_part(robot *self, const part_kind *kind, int index, const uint8_t *pins, const void *parameters) {
+  for (int i = 0; i < kind->pins; i++) {
+    if (!is_pin(pins[i]) && (i == 0 || pins[i] != PART_NO_PIN)) return SIM_BAD_ARGUMENT;
   }
-  part *p = new_part(r, kind->size);
+  part *p = new_part(self, kind->size);
   if (p == NULL) return SIM_NO_MEMORY;
-  const part_place place = place_of(r, kind->noise, index);
-  if (kind->init(p, &place, pins, parameters) == 0) return join(r, p);
+  const part_place place = place_of(self, kind->noise, index);
+  if (kind->init(p, &place, pins, parameters) == 0) return join(self, p);
   free(p);
   return SIM_BAD_ARGUMENT;
 }
 
-int sim_add_battery(sim *self, int number, uint8_t channel, const battery_parameters *parameters) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || (channel != PART_NO_PIN && channel >= BOARD_ANALOG_COUNT)) return SIM_BAD_ARGUMENT;
-  const part_place place = place_of(r, BATTERY_NOISE, 0);
-  if (r->battery != NULL) { /* a fresh one */
-    battery_init(r->battery, &place, channel, parameters);
+int robot_add_battery(robot *self, uint8_t channel, const battery_parameters *parameters) {
+  const part_place place = place_of(self, BATTERY_NOISE, 0);
+  if (self->battery != NULL) { /* a fresh one */
+    battery_init(self->battery, &place, channel, parameters);
     return SIM_OK;
   }
-  battery *b = new_part(r, sizeof *b);
+  battery *b = new_part(self, sizeof *b);
   if (b == NULL) return SIM_NO_MEMORY;
   battery_init(b, &place, channel, parameters);
-  const int status = join(r, &b->part);
-  if (status == SIM_OK) r->battery = b;
+  const int status = join(self, &b->part);
+  if (status == SIM_OK) self->battery = b;
   return status;
 }
 
-int sim_mount(sim *self, int number, uint8_t turret_pin, uint8_t pin) {
-  robot *r = sim_robot_with_board(self, number);
-  turret *t = r == NULL ? NULL : robot_turret(r, turret_pin);
-  int mounted = 0;
-  for (int i = 0; t != NULL && i < r->part_count; i++) {
-    part *p = r->parts[i];
+int robot_mount(robot *self, uint8_t turret_pin, uint8_t pin) {
+  turret *t = robot_turret(self, turret_pin);
+  int status = SIM_BAD_ARGUMENT;
+  for (int i = 0; t != NULL && i < self->part_count; i++) {
+    part *p = self->parts[i];
     for (int k = 0; k < PART_PINS; k++) {
       if (p->pins[k].pin != pin || !(p->pins[k].role & (PART_DRIVES | PART_ANALOG))) continue;
       p->turret = &t->carried;
-      mounted = 1;
+      status = SIM_OK;
     }
   }
-  return mounted ? SIM_OK : SIM_BAD_ARGUMENT;
+  return status;
 }

@@ -46,9 +46,10 @@ typedef struct {
 } sim_truth;
 
 typedef struct sim sim;
+typedef struct robot robot;
 
 /* step_cycles: world step; record_cycles: between two rows of the truth, a multiple of it, 0: no record. NULL without
- * memory or on bad arguments. */
+ * memory. */
 sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_cycles, int noise);
 void sim_destroy(sim *self);
 
@@ -60,103 +61,59 @@ int sim_add_robot(sim *self, int robot, uintptr_t board, const body_parameters *
 /* The same for a robot without a board; its model steps as far as the world. */
 int sim_add_vehicle(sim *self, int robot, const vehicle_model *model, double x, double y, double heading);
 
-/* Motor signals of such a robot, from now on; its readings, which stay in place; and VEHICLE_RUNS, or why its motors do
- * nothing any more. NULL and VEHICLE_RUNS for others. */
-int sim_signals(sim *self, int robot, double left, double right);
-const double *sim_readings(sim *self, int robot, size_t *count);
-int sim_vehicle_flag(const sim *self, int robot);
+/* The robot of that number, which stays where it is; NULL: there is none. */
+robot *sim_robot(const sim *self, int number);
 
 /* Joins a device to pins of a robot's board, as many as its kind has; `index` among those of its kind on the robot (of
  * what has a side 0 left, 1 right), and `parameters` as its kind says. Returns SIM_OK or an error. */
-int sim_add_part(sim *self, int robot, const part_kind *kind, int index, const uint8_t *pins, const void *parameters);
+int robot_add_part(robot *self, const part_kind *kind, int index, const uint8_t *pins, const void *parameters);
 
 /* Puts a sensor on the turret at that pin: the part that drives `pin` of the board, or is measured there. The sensor's
  * place and heading are those with the turret straight ahead. */
-int sim_mount(sim *self, int robot, uint8_t turret_pin, uint8_t pin);
+int robot_mount(robot *self, uint8_t turret_pin, uint8_t pin);
 
 /* The pack that everything runs on, measured at an analog channel or at none (PART_NO_PIN). */
-int sim_add_battery(sim *self, int robot, uint8_t channel, const battery_parameters *parameters);
+int robot_add_battery(robot *self, uint8_t channel, const battery_parameters *parameters);
 
 /* Runs until a cycle, or until bytes have come from a robot that is listened to and its line has been idle for two byte
  * times. Returns 0, or 1 + the number of a robot whose board crashed. */
 int sim_run_until(sim *self, uint64_t deadline);
 
-/* From that cycle on bytes from the robot end a run (2^64 - 1, as at first: never). `sim_speaks` says whether they have
- * come, and its line has been idle since. When a robot is heard does not depend on the other listeners. */
-int sim_listen(sim *self, int robot, uint64_t from);
-int sim_speaks(const sim *self, int robot);
+/* Bytes have come from a robot since its `listen_from`, and its line has been idle since. When a robot is heard does not
+ * depend on the other listeners. */
+int robot_speaks(const robot *self);
 
 /* Listens to a robot when `quiet` cycles from now have passed, and runs for `cycles` at most. Returns as
  * sim_run_until. */
-int sim_run_for(sim *self, int robot, uint64_t cycles, uint64_t quiet);
+int robot_wait(robot *self, uint64_t cycles, uint64_t quiet);
 
-/* The cycle up to which the simulation has run. */
-uint64_t sim_now(const sim *self);
+/* Bit rate of the outside's side of a robot's serial line, 500,000 unless set. */
+void robot_line_rate(robot *self, uint32_t baud);
 
-/* Bit rate of the outside's side of a robot's serial line, 500,000 unless set. Returns SIM_OK or an error. */
-int sim_line_rate(sim *self, int robot, uint32_t baud);
+/* Bytes to a robot's board. */
+void robot_send(robot *self, const uint8_t *bytes, size_t count);
 
-/* The cycle at which the last byte from a robot's board had come. */
-uint64_t sim_last_byte(const sim *self, int robot);
-
-/* Bytes to and from a robot's board. */
-int sim_send(sim *self, int robot, const uint8_t *bytes, size_t count);
-size_t sim_receive(sim *self, int robot, uint8_t *bytes, size_t capacity);
-
-/* Truth. The pointers stay good until the next run. */
-void sim_body(const sim *self, int robot, body_state *out);
-const sim_truth *sim_record(const sim *self, int robot, size_t *count);
-const sim_look *sim_looks(const sim *self, int robot, size_t *count);
-const sim_wait *sim_waits(const sim *self, size_t *count);   /* by time; none without a record */
-const sim_shift *sim_shifts(const sim *self, size_t *count); /* as waits */
-/* The arena's moving shapes as they stand, at `time`, s: up to a step ahead of sim_now. */
-const mover *sim_movers(const sim *self, size_t *count, double *time);
-uint64_t sim_contacts(const sim *self, int robot); /* touches begun; apart by 0.1 s at least */
-uint64_t sim_hash(const sim *self);                /* of the whole state of all bodies, by robot number */
-
-/* What buzzers sounded, oldest first; a tone that sounds is not yet in it. */
-const sim_tone *sim_tones(const sim *self, int robot, size_t *count);
-/* All of the above that has been read is forgotten: of one robot, and of the arena's moving shapes. */
-void sim_forget(sim *self, int robot);
-void sim_forget_world(sim *self);
-double sim_turret_angle(const sim *self, int robot, uint8_t pin); /* rad; 0 where there is no turret */
-
-/* Output edges of the board, the newest SIM_EDGES_KEPT, oldest first. */
-size_t sim_edges(const sim *self, int robot, sim_edge *out, size_t capacity);
-uint64_t sim_edges_seen(const sim *self, int robot);
-
-/* A reset from outside (a board_reset_cause); `sim_reset_at`: the cycle of the last one. */
-int sim_reset(sim *self, int robot, int cause);
-uint64_t sim_reset_at(const sim *self, int robot);
+uint64_t sim_hash(const sim *self); /* of the whole state of all bodies, by robot number */
 
 /* What a person does to the things in the arena, between two steps of the world. A robot is lifted and put elsewhere: body
  * and wheels are at rest there, and touch nothing. All else is as it was: motors go on as they are told, wheels have the
  * angles that they had, so that encoders and odometers know nothing of it, and no distance is counted. Sensors look from
- * there; those of a robot without a board read again at the end of the next step. In the truth it is two rows a cycle apart. A moving shape goes along its way shifted by as much, and
- * turned in itself; the direction of the way stays. SIM_NOT_FREE, and nothing has changed: something is in the circle
- * around the robot, or a robot's circle in the shape. */
-int sim_place(sim *self, int robot, double x, double y, double heading);
+ * there; those of a robot without a board read again at the end of the next step. In the truth it is two rows a cycle
+ * apart. A moving shape goes along its way shifted by as much, and turned in itself; the direction of the way stays.
+ * SIM_NOT_FREE, and nothing has changed: something is in the circle around the robot, or a robot's circle in the shape. */
+int robot_place(robot *self, double x, double y, double heading);
 int sim_place_shape(sim *self, int shape, double x, double y, double heading);
 
 /* For tests: a pin taken from its part and driven at a cycle, or by a square wave of that half period for that long;
  * length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part at a pin pulled
- * out (1) or put in again (0); voltage of the rail that board and servos run on, 0: what the regulator gives. Return SIM_OK
- * or an error. */
-int sim_drive(sim *self, int robot, uint64_t at, uint8_t pin, uint8_t level);
-int sim_wave(sim *self, int robot, uint8_t pin, uint32_t half_cycles, uint64_t duration);
-int sim_answer_ping(sim *self, int robot, int64_t echo_cycles);
-int sim_unplug(sim *self, int robot, uint8_t pin, int unplugged);
-int sim_set_supply(sim *self, int robot, double volts);
+ * out (1) or put in again (0). Return SIM_OK or an error. */
+int robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level);
+int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration);
+int robot_answer_ping(robot *self, int64_t echo_cycles);
+int robot_unplug(robot *self, uint8_t pin, int unplugged);
 
-/* What a weak supply does to a robot's board; by default it is as the data sheet has it, with 2 upsets per second at the
- * worst. Returns SIM_OK or an error. `sim_brown_outs`: resets by the detector, and upsets above it. */
-int sim_set_brown_out(sim *self, int robot, const brown_out_parameters *parameters);
-uint32_t sim_brown_outs(const sim *self, int robot, uint32_t *upsets);
-
-/* Voltages of pack and regulator. */
-double sim_pack_voltage(const sim *self, int robot);
-double sim_supply_voltage(const sim *self, int robot);
-
+/* The voltage of the rail as it is now goes to all that runs on it: after a change of `held_supply`, too. */
+void robot_update_supply(robot *self);
 /* python: end */
 
 #endif

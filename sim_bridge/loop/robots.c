@@ -9,11 +9,6 @@ robot *sim_robot(const sim *self, int number) {
   return NULL;
 }
 
-robot *sim_robot_with_board(const sim *self, int number) {
-  robot *r = sim_robot(self, number);
-  return r == NULL || r->board == NULL ? NULL : r;
-}
-
 turret *robot_turret(const robot *self, uint8_t pin) {
   for (int i = 0; i < self->part_count; i++) {
     turret *t = turret_of(self->parts[i]);

@@ -167,49 +167,20 @@ int sim_run_until(sim *self, uint64_t deadline) {
   return 0;
 }
 
-int sim_listen(sim *self, int number, uint64_t from) {
-  robot *r = sim_robot(self, number);
-  if (r == NULL) return SIM_BAD_ARGUMENT;
-  r->listen_from = from;
-  return SIM_OK;
+int robot_wait(robot *self, uint64_t cycles, uint64_t quiet) {
+  self->listen_from = self->sim->now + quiet;
+  return sim_run_until(self->sim, self->sim->now + cycles);
 }
 
-int sim_run_for(sim *self, int number, uint64_t cycles, uint64_t quiet) {
-  sim_listen(self, number, self->now + quiet);
-  return sim_run_until(self, self->now + cycles);
-}
-
-int sim_speaks(const sim *self, int number) {
-  const robot *r = sim_robot(self, number);
-  return r != NULL && is_look(self) && message_waits(r, self->now);
-}
-
-uint64_t sim_now(const sim *self) { return self->now; }
+int robot_speaks(const robot *self) { return is_look(self->sim) && message_waits(self, self->sim->now); }
 
 /* ---- the lines ----------------------------------------------------------------------------------------------------- */
 
-int sim_send(sim *self, int number, const uint8_t *bytes, size_t count) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || count > UINT32_MAX) return SIM_BAD_ARGUMENT;
-  if (count == 0) return SIM_OK;
-  r->board->op->send(r->board, self->now + PART_GUARD, bytes, count);
-  return SIM_OK;
+void robot_send(robot *self, const uint8_t *bytes, size_t count) {
+  if (count > 0) self->board->op->send(self->board, self->sim->now + PART_GUARD, bytes, count);
 }
 
-int sim_line_rate(sim *self, int number, uint32_t baud) {
-  robot *r = sim_robot_with_board(self, number);
-  if (r == NULL || baud == 0) return SIM_BAD_ARGUMENT;
-  r->idle = line_idle_cycles(baud);
-  r->board->op->line_rate(r->board, baud);
-  return SIM_OK;
-}
-
-uint64_t sim_last_byte(const sim *self, int number) {
-  const robot *r = sim_robot(self, number);
-  return r == NULL ? 0 : r->last_byte;
-}
-
-size_t sim_receive(sim *self, int number, uint8_t *bytes, size_t capacity) {
-  robot *r = sim_robot(self, number);
-  return r == NULL ? 0 : buffer_take(&r->received, bytes, capacity);
+void robot_line_rate(robot *self, uint32_t baud) {
+  self->idle = line_idle_cycles(baud);
+  self->board->op->line_rate(self->board, baud);
 }

@@ -18,7 +18,7 @@ typedef struct {
   double lost;   /* s, in that step */
 } mover_clock;
 
-typedef struct {
+struct robot {
   sim *sim;
   int number;
   board *board; /* NULL: it has none, and is a vehicle */
@@ -45,8 +45,8 @@ typedef struct {
   uint64_t next_row; /* least cycle of the truth's next row */
   int touched;       /* since its last row */
   uint64_t last_touch;
-  uint64_t contacts;
-} robot;
+  uint64_t contacts; /* touches begun; apart by 0.1 s at least */
+};
 
 struct sim {
   world world;
@@ -68,17 +68,8 @@ struct sim {
 
 /* ---- robots.c, which the others build on */
 
-/* The robot of that number, or NULL. */
-robot *sim_robot(const sim *self, int number);
-
-/* The same; NULL also for one without a board. */
-robot *sim_robot_with_board(const sim *self, int number);
-
 /* The turret on that pin, or NULL. */
 turret *robot_turret(const robot *self, uint8_t pin);
-
-/* The voltage of the rail as it is now goes to all that runs on it. */
-void robot_update_supply(robot *self);
 
 /* Sensors of robots without a board begin anew, when another robot has come: they may meet another thing now. */
 void sim_sense_anew(sim *self);
@@ -107,9 +98,6 @@ void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
 double robot_on_analog(void *context, uint64_t cycle, uint8_t channel);
 
 /* ---- join.c */
-
-/* SIM_OK where there can be one more robot of that number and radius at a place. */
-int sim_has_room(const sim *self, int number, double radius, double x, double y, double heading);
 
 /* A new robot with a board or without; the caller fills in its body. NULL without memory. */
 robot *sim_new_robot(sim *self, int number, board *b);

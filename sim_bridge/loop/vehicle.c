@@ -7,8 +7,7 @@
 
 int sim_add_vehicle(sim *self, int number, const vehicle_model *model, double x, double y, double heading) {
   if (fabs(model->dt - self->world.dt) > 1e-12) return SIM_BAD_ARGUMENT;
-  const int room = sim_has_room(self, number, body_reach_of(&model->body), x, y, heading);
-  if (room != SIM_OK) return room;
+  if (!world_is_free(&self->world, x, y, body_reach_of(&model->body), 0)) return SIM_NOT_FREE;
   vehicles *v = vehicles_new(model, 1, 0);
   if (v == NULL) return SIM_NO_MEMORY;
   const int status = vehicles_place(v, 0, self->world.arena, self->seed, robot_mover_id(number), x, y, heading);
@@ -23,25 +22,4 @@ int sim_add_vehicle(sim *self, int number, const vehicle_model *model, double x,
   r->body = &v->worlds[0].body;
   sim_insert(self, r, x, y, heading);
   return SIM_OK;
-}
-
-int sim_signals(sim *self, int number, double left, double right) {
-  robot *r = sim_robot(self, number);
-  if (r == NULL || r->vehicle == NULL || !isfinite(left) || !isfinite(right)) return SIM_BAD_ARGUMENT;
-  if (r->vehicle->worlds[0].state.flag == VEHICLE_RUNS) (void)vehicles_send(r->vehicle, 0, left, right);
-  return SIM_OK;
-}
-
-const double *sim_readings(sim *self, int number, size_t *count) {
-  const robot *r = sim_robot(self, number);
-  *count = 0;
-  if (r == NULL || r->vehicle == NULL) return NULL;
-  vehicles_sense(r->vehicle, 0);
-  *count = vehicles_reading_count(r->vehicle);
-  return vehicles_readings(r->vehicle);
-}
-
-int sim_vehicle_flag(const sim *self, int number) {
-  const robot *r = sim_robot(self, number);
-  return r == NULL || r->vehicle == NULL ? VEHICLE_RUNS : r->vehicle->worlds[0].state.flag;
 }

@@ -42,7 +42,7 @@ void buffer_free(buffer *self) {
 
 static int grow(edge_log *self) {
   const size_t capacity = self->capacity == 0 ? 4096 : 2 * self->capacity;
-  sim_edge *edges = realloc(self->edges, capacity * sizeof *edges);
+  board_edge *edges = realloc(self->edges, capacity * sizeof *edges);
   if (edges == NULL) return -1;
   self->edges = edges;
   self->capacity = capacity;
@@ -51,13 +51,13 @@ static int grow(edge_log *self) {
 
 void edge_log_add(edge_log *self, uint64_t cycle, uint8_t pin, uint8_t level) {
   if (self->count >= self->capacity && self->capacity < SIM_EDGES_KEPT && grow(self) != 0) return;
-  sim_edge *edge = &self->edges[self->count++ & (self->capacity - 1)];
+  board_edge *edge = &self->edges[self->count++ & (self->capacity - 1)];
   edge->cycle = cycle;
   edge->pin = pin;
   edge->level = level;
 }
 
-size_t edge_log_copy(const edge_log *self, sim_edge *out, size_t capacity) {
+size_t edge_log_copy(const edge_log *self, board_edge *out, size_t capacity) {
   const uint64_t kept = self->count < self->capacity ? self->count : self->capacity;
   const uint64_t count = kept < capacity ? kept : capacity;
   for (uint64_t i = 0; i < count; i++) out[i] = self->edges[(self->count - count + i) & (self->capacity - 1)];

@@ -8,15 +8,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* python: begin */
-/* One edge on a pin of the board. */
-typedef struct {
-  uint64_t cycle;
-  uint8_t pin;
-  uint8_t level;
-  uint8_t unused[6];
-} sim_edge;
+#include "../boards/board.h"
 
+/* python: begin */
 /* What a range sensor saw. */
 typedef struct {
   double time;          /* s */
@@ -47,9 +41,6 @@ typedef struct {
   double shape;         /* its number among the arena's moving shapes */
   double x, y, heading; /* m, m, rad */
 } sim_shift;
-/* python: end */
-
-#define SIM_EDGES_KEPT (1u << 20)
 
 /* A growing array of bytes; what is in it is `count` bytes from `start` on. */
 typedef struct {
@@ -57,27 +48,30 @@ typedef struct {
   size_t start, count, capacity;
 } buffer;
 
+/* Takes at most `capacity` bytes from the front. Returns how many. */
+size_t buffer_take(buffer *self, uint8_t *bytes, size_t capacity);
+
+/* The newest SIM_EDGES_KEPT edges: a ring once it is full. */
+typedef struct {
+  board_edge *edges;
+  size_t capacity; /* a power of two, or 0 */
+  uint64_t count;  /* edges seen */
+} edge_log;
+
+/* Copies the newest, at most `capacity`, oldest first. Returns how many. */
+size_t edge_log_copy(const edge_log *self, board_edge *out, size_t capacity);
+/* python: end */
+
+#define SIM_EDGES_KEPT (1u << 20)
+
 /* Room for `size` more bytes behind what is there, or NULL. */
 void *buffer_room(buffer *self, size_t size);
 
 void buffer_append(buffer *self, const void *bytes, size_t size);
 
-/* Takes at most `capacity` bytes from the front. Returns how many. */
-size_t buffer_take(buffer *self, uint8_t *bytes, size_t capacity);
-
 void buffer_free(buffer *self);
 
-/* The newest SIM_EDGES_KEPT edges: a ring once it is full. */
-typedef struct {
-  sim_edge *edges;
-  size_t capacity; /* a power of two, or 0 */
-  uint64_t count;  /* edges seen */
-} edge_log;
-
 void edge_log_add(edge_log *self, uint64_t cycle, uint8_t pin, uint8_t level);
-
-/* Copies the newest, at most `capacity`, oldest first. Returns how many. */
-size_t edge_log_copy(const edge_log *self, sim_edge *out, size_t capacity);
 
 void edge_log_free(edge_log *self);
 

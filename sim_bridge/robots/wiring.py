@@ -20,8 +20,8 @@ NO_PIN = 255
 FIRST_ANALOG_PIN = 14
 
 
-def join(handle: Any, number: int, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
-    """Joins battery and every device that is on to robot `number` of a simulation (C `sim *`).
+def join(robot: Any, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
+    """Joins battery and every device that is on to a robot of a simulation (C `robot *`).
 
     Devices without a part in the world are left alone. A Ping sits on the turret where there are both.
 
@@ -29,7 +29,7 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
         BoardError: a device cannot be joined; one sentence names it.
         MemoryError: there is none.
     """
-    _join_supply(handle, number, description, draw)
+    _join_supply(robot, description, draw)
     counts: Counter[type] = Counter()
     for name, device in description.device.items():
         if not device.on:
@@ -38,20 +38,20 @@ def join(handle: Any, number: int, description: robots.RobotDescription, draw: i
         part = part_of(device, At(side, counts[type(device)], description.body, draw))
         counts[type(device)] += 1
         if part is not None:
-            done(add_part(handle, number, part), f"device {name!r}")
+            done(add_part(robot, part), f"device {name!r}")
     for device in description.device.values():
         if isinstance(device, PositionServo) and device.on:
-            _mount(handle, number, device, description)
+            _mount(robot, device, description)
     for name, device in description.device.items():
         if device.on and not device.plugged:
             for pin in device.pins().values():
-                done(lib.sim_unplug(handle, number, pin, 1), f"device {name!r}")
+                done(lib.robot_unplug(robot, pin, 1), f"device {name!r}")
 
 
-def add_part(handle: Any, number: int, part: Part) -> int:
-    """Joins a part to robot `number` of a simulation; a status of loop.h."""
+def add_part(robot: Any, part: Part) -> int:
+    """Joins a part to a robot of a simulation; a status of loop.h."""
     pins = [pin if pin == NO_PIN else pin_number(pin) for pin in part.pins]
-    status: int = lib.sim_add_part(handle, number, getattr(lib, part.kind), part.number, pins, part.parameters)
+    status: int = lib.robot_add_part(robot, getattr(lib, part.kind), part.number, pins, part.parameters)
     return status
 
 
@@ -73,7 +73,7 @@ def done(status: int, what: str) -> None:
     raise BoardError(f"{what} cannot be joined to the simulation: {why.get(status, 'a value is out of its range')}")
 
 
-def _join_supply(handle: Any, number: int, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
+def _join_supply(robot: Any, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
     """The pack, and where the board measures it."""
     if description.supply is None:
         return
@@ -81,13 +81,11 @@ def _join_supply(handle: Any, number: int, description: robots.RobotDescription,
     channel = pin_number(gauges[0].pin) - FIRST_ANALOG_PIN if gauges else NO_PIN
     ratio = gauges[0].ratio if gauges else 2.0
     battery = battery_parameters(description.supply, ratio, draw)
-    done(lib.sim_add_battery(handle, number, channel, battery), "the battery")
+    done(lib.robot_add_battery(robot, channel, battery), "the battery")
 
 
-def _mount(handle: Any, number: int, turret: PositionServo, description: robots.RobotDescription) -> None:
+def _mount(robot: Any, turret: PositionServo, description: robots.RobotDescription) -> None:
     """The Ping sits on the turret where there are both."""
     for device in description.device.values():
         if isinstance(device, PingSensor) and device.on:
-            done(
-                lib.sim_mount(handle, number, pin_number(turret.pin), pin_number(device.pin)), "the Ping on the turret"
-            )
+            done(lib.robot_mount(robot, pin_number(turret.pin), pin_number(device.pin)), "the Ping on the turret")

@@ -2,7 +2,7 @@
 
 `native_world`, `avr_world` and `direct_world` are what the entry points of the group `boebot.boards` name. A robot that
 is alone lets time pass as it waits. Among several time is everybody's: it passes only while all of them wait, and then
-up to the earliest wake-up of any. A robot's wake-up depends on its own line and its own waiting only (sim_listen of
+up to the earliest wake-up of any. A robot's wake-up depends on its own line and its own waiting only (`listen_from` of
 loop/loop.h), so that a robot that nobody senses changes no bit of another's run.
 """
 

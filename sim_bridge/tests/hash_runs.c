@@ -125,8 +125,7 @@ static vehicle_model *model(int servos, const double notes[BODY]) {
   servo_motor_parameters right = left;
   right.mount = -1.0;
   vehicle_model *m = vehicle_model_new(servos ? &small : &large, servos ? 0.001 : 0.01);
-  motor_dc_parameters dc;
-  motor_dc_default(&dc);
+  const motor_dc_parameters dc = {0.0333, 0.0333, 0.62, 0.2e-3, 0.008, 0.02, 2.0, 1.0, 1.0, 12.0};
   const int driven = servos ? vehicle_model_drive_servo(m, &left, &right) : vehicle_model_drive_dc(m, &dc, &dc, 1);
   const charge_parameters gauge = {.empty = 5.0, .full = 7.75, .sigma = 0.005};
   const energy_parameters energy = {0.002, 0.004, 0.1};
@@ -148,7 +147,7 @@ int main(int count, char **arguments) {
     for (size_t i = 0; i < WORLDS; i++) {
       if (vehicles_place(worlds, i, where, 100 + i, (uint32_t)i + 1, -0.5 + 0.1 * (double)i, 0.0, (double)i))
         printf("not placed\n");
-      ((vehicle_wander_state *)vehicles_brain_state(worlds, i))->seed = i;
+      ((vehicle_wander_state *)(void *)(worlds->brains + i * worlds->state_size))->seed = i;
     }
     if (vehicles_run(worlds, 0, WORLDS, vehicle_wander, STEPS) != VEHICLE_OK) printf("bad run\n");
     for (size_t i = 0; i < WORLDS; i++) printf("%016" PRIx64 "\n", vehicles_hash(worlds, i));

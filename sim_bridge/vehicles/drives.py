@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
-from sim_bridge._core import ffi, lib
+from boebot.devices.battery import Energy
+from boebot.devices.motor import DcMotor, RegulatedMotor
+from sim_bridge.devices import motor
 from sim_bridge.devices.servo import RPM
 from sim_bridge.robots.imperfections import AS_BUILT
 from sim_bridge.vehicles.checked_structs import keys_of, known, struct
 
-REGULATED_KEYS = ("gain_n_s", "torque_maximum_n_m", "speed_maximum_m_s")
-
-
-def defaults(kind: str) -> dict[str, float]:
-    """What `NAME_default` of a C struct `NAME_parameters` gives."""
-    pointer = ffi.new(f"{kind}_parameters *")
-    getattr(lib, f"{kind}_default")(pointer)
-    return {key: getattr(pointer, key) for key in keys_of(f"{kind}_parameters")}
+ENERGY: Final = {key: getattr(Energy(), key) for key in keys_of("energy_parameters")}
+"""The notes' battery, by its rates in C."""
 
 
 def dc_parameters(where: str, changes: Any) -> Any:
     """C struct of the notes' default DC motor with `changes`."""
-    return struct("motor_dc_parameters", where, changes, defaults("motor_dc"))
+    return struct("motor_dc_parameters", where, changes, motor.dc_parameters(DcMotor(full=True)))
 
 
 def regulated_parameters(where: str, changes: Any) -> Any:
     """C struct of the default regulated motor with `changes`; it never coasts, so what says how is no key of it."""
-    usual = defaults("motor_regulated")
-    return struct("motor_regulated_parameters", where, known(where, changes, REGULATED_KEYS), usual)
+    usual = motor.regulated_parameters(RegulatedMotor(), 0.3)
+    return struct("motor_regulated_parameters", where, known(where, changes, usual), usual)
 
 
 def servo_parameters(where: str, changes: Any, mount: int = 1, wheel_radius: float = 0.0331) -> Any:

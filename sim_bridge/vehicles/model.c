@@ -4,10 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static int positive(double value) { return value > 0.0 && isfinite(value); }
-
 vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
-  if (!positive(dt) || body_parameters_wrong(parameters) != NULL) return NULL;
   vehicle_model *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   self->body = *parameters;
@@ -17,7 +14,6 @@ vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
 }
 
 void vehicle_model_destroy(vehicle_model *self) {
-  if (self == NULL) return;
   for (size_t i = 0; i < self->sensors_count; i++) free(self->sensors[i].made);
   free(self->sensors);
   free(self);
@@ -88,7 +84,6 @@ int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_par
 
 int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy) {
   if (self->has_battery) return VEHICLE_TOO_MANY;
-  if (!isfinite(energy->idle_per_s + energy->signal_per_s + energy->charger_per_s)) return VEHICLE_BAD_NUMBER;
   self->energy = *energy;
   self->has_battery = 1;
   return VEHICLE_OK;
@@ -102,7 +97,6 @@ static uint32_t device_of(const sensor_kind *kind, uint32_t number) {
 }
 
 int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *parameters, double period) {
-  if (!(period >= 0.0) || !isfinite(period)) return VEHICLE_BAD_NUMBER;
   vehicle_sensor *sensors = realloc(self->sensors, (self->sensors_count + 1) * sizeof *sensors);
   if (sensors == NULL) return VEHICLE_NO_MEMORY;
   self->sensors = sensors;

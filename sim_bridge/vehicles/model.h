@@ -30,12 +30,12 @@ enum {
 
 typedef struct vehicle_model vehicle_model;
 
-/* A model that steps by `dt` seconds, without drive and sensors; NULL without memory or with a body whose mass, inertia,
- * radius, half track or wheel radius is not positive (see body_parameters_wrong), or dt <= 0. */
+/* A model that steps by `dt` seconds, without drive and sensors; NULL without memory. All parameters here and below are within
+ * their ranges (checked_structs.py, sim_bridge/devices). */
 vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt);
 void vehicle_model_destroy(vehicle_model *self);
 
-/* Drives, whose parameters checked_structs.py has checked: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the current as a state if `full` (a motor
+/* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the current as a state if `full` (a motor
  * with inductance 0 is quasi-static nevertheless). Servo: 1500 us +- 200 us s, one pulse every 20 ms. Regulated: (3.15)
  * with the reference s v_max. */
 int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,

@@ -19,7 +19,7 @@ from sim_bridge.devices.catalogue import SensorKind, sensor_kinds
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.robots.imperfections import collision_outline
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, known, number, struct, values_of
-from sim_bridge.vehicles.drives import dc_parameters, defaults, regulated_parameters, servo_parameters
+from sim_bridge.vehicles.drives import ENERGY, dc_parameters, regulated_parameters, servo_parameters
 
 SIDES: Final = ("left", "right")
 MOUNTS: Final = {"left": 1, "right": -1}  # of servos: which way drives forward
@@ -43,7 +43,8 @@ def _body_and_outline(body: Any) -> tuple[Any, Any]:
     if not isinstance(body, Mapping) or "outline_m" not in body:
         return body, None
     outline = collision_outline("vehicle: body: outline_m", body["outline_m"])
-    return {key: value for key, value in body.items() if key != "outline_m"} | {"outline": outline}, outline
+    rest = {key: value for key, value in body.items() if key != "outline_m"}
+    return {"radius": outline.reach, **rest, "outline": outline}, outline
 
 
 class VehicleModel:
@@ -169,7 +170,7 @@ class VehicleModel:
     ) -> None:
         """The notes' battery, read as a voltage; `energy`: idle_per_s, signal_per_s, charger_per_s."""
         where = self._named(name)
-        rates = struct("energy_parameters", where, energy, defaults("energy"))
+        rates = struct("energy_parameters", where, energy, ENERGY)
         if lib.vehicle_model_battery(self._open, rates) == lib.VEHICLE_TOO_MANY:
             raise RobotError(f"{where}: it has a battery already; expected one")
         self.sensor("charge", name, empty=empty, full=full, sigma=sigma)

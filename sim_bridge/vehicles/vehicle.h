@@ -27,18 +27,18 @@ typedef void vehicle_brain(void *state, const double *readings, double *signals)
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size);
 void vehicles_destroy(vehicles *self);
 
-/* Puts vehicle `i` at rest at a pose in an arena and starts its run: `seed` and `id` (not 0) are the keys of its noise.
+/* Puts vehicle `i` at rest at a pose, which is finite, in an arena and starts its run: `seed` and `id` (not 0) are the keys of its noise.
  * The arena must outlive it. Senses for the first time. */
 int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
                    double heading);
 
 /* Vehicle `i`, placed, goes from here on at `speed` (m/s, along its heading) and `turn_rate` (rad/s), its wheels rolling
  * without slip. */
-int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate);
+void vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate);
 
 /* `steps` steps of worlds first ... first + count - 1 with motor signals (count, 2) that hold throughout. A world whose
- * run has ended stays as it is. Nothing moves where a signal is not finite. Different threads may step different worlds. */
-int vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps);
+ * run has ended stays as it is. Signals are finite, worlds are placed. Different threads may step different worlds. */
+void vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps);
 
 /* One step of one world. Returns VEHICLE_RUNS or why the run has ended, or an error. */
 int vehicles_step_one(vehicles *self, size_t i, double left, double right);
@@ -55,25 +55,6 @@ void vehicles_move(vehicles *self, size_t i);
 void vehicles_update_arena(vehicles *self, size_t i);
 int vehicles_check(vehicles *self, size_t i); /* VEHICLE_RUNS or why the run ended */
 
-/* Readings of all worlds, one after another; they stay in place. */
-double *vehicles_readings(vehicles *self);
-size_t vehicles_reading_count(const vehicles *self);
-
-/* The brain's memory in world i, `state_size` bytes. */
-void *vehicles_brain_state(vehicles *self, size_t i);
-
-/* Poses x, y, heading, (count, 3); flags VEHICLE_RUNS ... (count). */
-void vehicles_poses(const vehicles *self, size_t first, size_t count, double *poses);
-void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *flags);
-
-/* Truth of one world, for records and tests: never for a brain. */
-const body_state *vehicles_body(const vehicles *self, size_t i);
-uint64_t vehicles_steps_done(const vehicles *self, size_t i);
-
-/* The arena's moving shapes as they are in that world; good until it is placed anew. */
-const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count);
-double vehicles_energy(const vehicles *self, size_t i);
-
 /* Currents of the DC motors, left and right, A: the state of the full motor, else what the last signals and the speed now
  * give; 0 with another drive. */
 void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
@@ -82,7 +63,7 @@ void vehicles_currents(const vehicles *self, size_t i, double currents[2]);
  * machine. */
 uint64_t vehicles_hash(const vehicles *self, size_t i);
 
-/* Memory of `count` worlds, bytes. */
+/* Memory of all worlds, bytes. */
 size_t vehicles_memory(const vehicles *self);
 /* python: end */
 
@@ -127,10 +108,10 @@ struct vehicles {
   size_t count, state_size;
   vehicle *worlds;
   size_t slots_count;
-  sensor_slot *slots; /* as many for each world as the model has sensors */
-  double *numbers;    /* that the sensors keep, world by world */
-  double *readings;
-  unsigned char *brains;
+  sensor_slot *slots;    /* as many for each world as the model has sensors */
+  double *numbers;       /* that the sensors keep, world by world */
+  double *readings;      /* world by world */
+  unsigned char *brains; /* memory of compiled ones, `state_size` bytes for each world */
 };
 
 #endif

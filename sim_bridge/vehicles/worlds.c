@@ -1,13 +1,9 @@
 /* worlds.c: worlds are made, a vehicle is placed in each, and what can be asked of them; see vehicle.h. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sense.h"
 #include "vehicle.h"
-
-#define SPEED_LIMIT 100.0 /* m/s: as body_step.c limits it */
-#define TURN_LIMIT 1000.0 /* rad/s */
 
 vehicles *vehicles_new(const vehicle_model *model, size_t count, size_t state_size) {
   if (state_size > SIZE_MAX - 15u) return NULL;
@@ -39,7 +35,6 @@ static void leave(vehicle *w) {
 }
 
 void vehicles_destroy(vehicles *self) {
-  if (self == NULL) return;
   for (size_t i = 0; self->worlds != NULL && i < self->count; i++) leave(&self->worlds[i]);
   if (self->slots != NULL) vehicle_sensors_free_room(self);
   free(self->worlds);
@@ -53,11 +48,8 @@ void vehicles_destroy(vehicles *self) {
 int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
                    double heading) {
   const vehicle_model *m = self->model;
-  if (m->drive == DRIVE_NONE || i >= self->count) return VEHICLE_NOT_PLACED;
+  if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
   if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
-  if (!(fabs(x) <= ARENA_FARTHEST_M && fabs(y) <= ARENA_FARTHEST_M && fabs(heading) <= BODY_HEADING_LIMIT))
-    return VEHICLE_BAD_NUMBER;
-  if (id == 0 || id >= SCENE_FIRST_MOVER) return VEHICLE_BAD_NUMBER;
   vehicle *w = &self->worlds[i];
   const size_t moving = arena_moving_count(where);
   mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;
@@ -97,9 +89,7 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   return VEHICLE_OK;
 }
 
-int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate) {
-  if (i >= self->count || self->worlds[i].in == NULL) return VEHICLE_NOT_PLACED;
-  if (!(fabs(speed) < SPEED_LIMIT) || !(fabs(turn_rate) < TURN_LIMIT)) return VEHICLE_BAD_NUMBER;
+void vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate) {
   body *b = &self->worlds[i].body;
   b->state.speed = speed;
   b->state.turn_rate = turn_rate;
@@ -107,41 +97,7 @@ int vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate
   b->state.rim_left = body_left_speed(b);
   b->state.rim_right = body_right_speed(b);
   b->state.slipping = 0;
-  return VEHICLE_OK;
 }
-
-/* ---- what can be asked -------------------------------------------------------------------------------------------- */
-
-double *vehicles_readings(vehicles *self) { return self->readings; }
-
-size_t vehicles_reading_count(const vehicles *self) { return self->model->readings; }
-
-void *vehicles_brain_state(vehicles *self, size_t i) { return self->brains + i * self->state_size; }
-
-void vehicles_poses(const vehicles *self, size_t first, size_t count, double *poses) {
-  for (size_t k = 0; k < count; k++) {
-    const body_state *b = &self->worlds[first + k].body.state;
-    poses[3 * k] = b->x;
-    poses[3 * k + 1] = b->y;
-    poses[3 * k + 2] = b->heading;
-  }
-}
-
-void vehicles_flags(const vehicles *self, size_t first, size_t count, int8_t *flags) {
-  for (size_t k = 0; k < count; k++) flags[k] = (int8_t)self->worlds[first + k].state.flag;
-}
-
-const body_state *vehicles_body(const vehicles *self, size_t i) { return &self->worlds[i].body.state; }
-
-const mover *vehicles_movers(const vehicles *self, size_t i, size_t *count) {
-  const world *own = &self->worlds[i].own;
-  *count = own->obstacles;
-  return own->movers;
-}
-
-uint64_t vehicles_steps_done(const vehicles *self, size_t i) { return self->worlds[i].state.step; }
-
-double vehicles_energy(const vehicles *self, size_t i) { return self->worlds[i].state.energy; }
 
 size_t vehicles_memory(const vehicles *self) {
   const vehicle_model *m = self->model;

@@ -8,32 +8,6 @@
 
 #define SPIN_SHARE 0.1 /* least spin inertia of a slipping wheel / M r^2 */
 
-const char *body_parameters_wrong(const body_parameters *p) {
-  const struct {
-    const char *name;
-    double value;
-    int may_be_zero;
-  } all[] = {
-      {"mass", p->mass, 0},
-      {"inertia", p->inertia, 0},
-      {"radius", body_reach_of(p), 0},
-      {"half_track", p->half_track, 0},
-      {"axis_half_track", p->axis_half_track, 1},
-      {"wheel_radius", p->wheel_radius, 0},
-      {"wheel_mass", p->wheel_mass, 1},
-      {"wheel_inertia", p->wheel_inertia, 1},
-      {"spin_inertia", p->spin_inertia, 1},
-      {"linear_damping", p->linear_damping, 1},
-      {"angular_damping", p->angular_damping, 1},
-      {"grip", p->grip, 1},
-  };
-  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
-    const double value = all[i].value;
-    if (!(value < 1e12) || !(all[i].may_be_zero ? value >= 0.0 : value > 0.0)) return all[i].name;
-  }
-  return NULL;
-}
-
 double body_a(const body_parameters *p) { /* (2.26) */
   const double r = p->wheel_radius;
   return 1.0 / (r * (1.0 + 2.0 * (p->wheel_inertia / (p->mass * r * r) + p->wheel_mass / p->mass)));

@@ -55,10 +55,6 @@ typedef struct {
 enum { BODY_MAXIMUM = 64 }; /* robots in one world */
 enum { BODY_OK = 0, BODY_BAD_STEP = -1, BODY_TOO_MANY = -2, BODY_SAME_ID = -3, BODY_BAD_TORQUE = -4 };
 
-/* NULL if they describe a body: else the name of the first that does not (not finite, or zero or less where that makes no
- * sense). */
-const char *body_parameters_wrong(const body_parameters *p);
-
 /* A of (2.26) and B of (2.30). */
 double body_a(const body_parameters *p);
 double body_b(const body_parameters *p);

@@ -40,10 +40,6 @@ typedef struct {
   double voltage_maximum;    /* volts at motor signal 1 */
 } motor_dc_parameters;
 
-/* The default motor of the notes' simulator: 12 V, c_t = c_e = 0.0333, R 0.62 ohm, c_C 0.008 N m, c_v 0.02 N m s, G 2,
- * 1 N m, and L 0.2 mH. */
-void motor_dc_default(motor_dc_parameters *out);
-
 /* Volts for a motor signal: s in [-1, 1], beyond it limited, times the maximum. */
 static double motor_dc_voltage(const motor_dc_parameters *self, double signal);
 

@@ -11,10 +11,6 @@ double motor_regulated(const motor_regulated_parameters *self, double reference,
   return limited(self->gain_n_s * (reference - speed), self->torque_maximum_n_m * supply); /* (3.15) */
 }
 
-void motor_regulated_default(motor_regulated_parameters *out) {
-  *out = (motor_regulated_parameters){.gain_n_s = 10.0, .torque_maximum_n_m = 1.0, .speed_maximum_m_s = 0.3};
-}
-
 double motor_regulated_reference(const motor_regulated_parameters *self, double signal) {
   return limited(signal, 1.0) * self->speed_maximum_m_s;
 }

@@ -20,9 +20,6 @@ typedef struct {
  * share of the nominal voltage. */
 double motor_regulated(const motor_regulated_parameters *self, double reference, double speed, double supply);
 
-/* The default motor: K 10 N s, 1 N m, and v_ref 0.3 m/s at signal 1 (chosen; the torque is that of ARSim's DC motor). */
-void motor_regulated_default(motor_regulated_parameters *out);
-
 /* v_ref, m/s, of a motor signal: s in [-1, 1], beyond it limited, times the speed at signal 1. */
 double motor_regulated_reference(const motor_regulated_parameters *self, double signal);
 

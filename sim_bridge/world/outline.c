@@ -5,10 +5,8 @@
 #include <string.h>
 
 #define ROUNDING 1e-3
-#define ROUNDING_NARROW 1e-4  /* m: a narrow place needs no less */
-#define ROUNDING_LEAST 1.5e-5 /* m: of a corner of 15 degrees */
-#define CORNER_LOSS 1e-4      /* m: a corner's tip is at most so far outside of what is rounded */
-#define EDGE_LEAST 1e-6
+#define ROUNDING_NARROW 1e-4 /* m: a narrow place needs no less */
+#define CORNER_LOSS 1e-4     /* m: a corner's tip is at most so far outside of what is rounded */
 
 static double cross(const double *o, const double *a, const double *b) {
   return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
@@ -102,17 +100,6 @@ static double rounding_of(const double *xy, size_t n) {
 
 int body_outline_make(body_outline *self, const double *xy, size_t corners) {
   memset(self, 0, sizeof *self);
-  if (corners < 3 || corners > BODY_CORNERS_MAXIMUM) return OUTLINE_CORNERS;
-  for (size_t i = 0; i < 2 * corners; i++) {
-    if (!(fabs(xy[i]) < 1e6)) return OUTLINE_NUMBER;
-  }
-  for (size_t i = 0; i < corners; i++) {
-    const size_t k = (i + 1) % corners;
-    const double dx = xy[2 * k] - xy[2 * i];
-    const double dy = xy[2 * k + 1] - xy[2 * i + 1];
-    if (!(dx * dx + dy * dy > EDGE_LEAST * EDGE_LEAST)) return OUTLINE_EDGE;
-  }
-  if (!is_simple(xy, corners)) return OUTLINE_CROSSING;
   const int turned = area_of(xy, corners) < 0.0;
   for (size_t i = 0; i < corners; i++) {
     const size_t from = turned ? corners - 1 - i : i;
@@ -122,7 +109,6 @@ int body_outline_make(body_outline *self, const double *xy, size_t corners) {
     if (reach > self->reach) self->reach = reach;
   }
   const double most = rounding_of(self->xy, corners);
-  if (most < ROUNDING_LEAST) return OUTLINE_SHARP;
   for (double by = most; by >= fmin(most, ROUNDING_NARROW); by *= 0.5) {
     /* shrunk twice as far it must still be itself: so that the core has a width */
     if (!shrink(self->xy, corners, 2.0 * by, self->core) || !shrink(self->xy, corners, by, self->core)) continue;

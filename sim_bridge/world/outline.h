@@ -14,15 +14,7 @@
 
 /* python: begin */
 enum { BODY_CORNERS_MAXIMUM = 32 };
-enum {
-  OUTLINE_OK = 0,
-  OUTLINE_CORNERS = -1,
-  OUTLINE_NUMBER = -2,
-  OUTLINE_EDGE = -3,
-  OUTLINE_CROSSING = -4,
-  OUTLINE_THIN = -5,
-  OUTLINE_SHARP = -6
-};
+enum { OUTLINE_OK = 0, OUTLINE_THIN = -1 };
 
 /* Shared by all bodies of that kind; it must outlive them. */
 typedef struct {
@@ -33,9 +25,8 @@ typedef struct {
   double reach;    /* of the farthest corner from the origin */
 } body_outline;
 
-/* Takes a simple polygon of 3 to 32 corners, in either sense. Returns OUTLINE_OK or what is wrong with it: the number of
- * corners, a number that is not finite, an edge without length, edges that cross or touch, a place narrower than 0.4 mm,
- * an outward corner of less than 15 degrees. */
+/* Takes a simple polygon of 3 to 32 corners, in either sense, none of them sharper than 15 degrees (outlines.py of
+ * boebot.description has checked it). Returns OUTLINE_OK, or OUTLINE_THIN: a place is narrower than 0.4 mm. */
 int body_outline_make(body_outline *self, const double *xy, size_t corners);
 /* python: end */
 

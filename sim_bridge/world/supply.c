@@ -3,22 +3,7 @@
 
 #include <math.h>
 
-#include "geometry/numbers.h"
-
 static double within_one(double value) { return value < 0.0 ? 0.0 : (value > 1.0 ? 1.0 : value); }
-
-/* The curve by straight lines between its points. */
-double supply_open_circuit(const supply_parameters *p, double charge) {
-  const double left = within_one(charge);
-  double share = left;
-  if (p->curve[SUPPLY_CURVE_POINTS - 1] > 0.0) {
-    const double at = left * (SUPPLY_CURVE_POINTS - 1);
-    int i = (int)number_floor(at);
-    if (i > SUPPLY_CURVE_POINTS - 2) i = SUPPLY_CURVE_POINTS - 2;
-    share = p->curve[i] + (p->curve[i + 1] - p->curve[i]) * (at - i);
-  }
-  return p->empty_v + (p->full_v - p->empty_v) * share;
-}
 
 double supply_servo_current(const supply_parameters *p, int pulsed, double speed, double torque) {
   double current = p->servo_a_per_n_m * fabs(torque);
@@ -27,15 +12,12 @@ double supply_servo_current(const supply_parameters *p, int pulsed, double speed
 }
 
 static void load(const supply_parameters *p, supply *self, double current) {
-  self->pack_v = supply_open_circuit(p, self->charge) - p->resistance_ohm * current;
+  self->pack_v = p->empty_v + (p->full_v - p->empty_v) * self->charge - p->resistance_ohm * current;
   if (self->pack_v < 0.0) self->pack_v = 0.0;
   self->board_v = self->pack_v - p->drop_out_v;
   if (self->board_v > SUPPLY_NOMINAL_V) self->board_v = SUPPLY_NOMINAL_V;
   if (self->board_v < 0.0) self->board_v = 0.0;
   self->servo_v = p->unregulated != 0.0 ? self->pack_v : self->board_v;
-  self->state = self->board_v < SUPPLY_RESET_V     ? SUPPLY_RESET
-                : self->board_v < SUPPLY_ERRATIC_V ? SUPPLY_ERRATIC
-                                                   : SUPPLY_GOOD;
 }
 
 void supply_init(const supply_parameters *p, supply *self, double charge) {
@@ -47,10 +29,6 @@ void supply_step(const supply_parameters *p, supply *self, double servos_a, int 
   const double current = p->board_a + servos_a - (at_charger ? p->charger_a : 0.0);
   if (p->capacity_as > 0.0) self->charge = within_one(self->charge - current * dt / p->capacity_as);
   load(p, self, current);
-}
-
-void energy_default(energy_parameters *out) {
-  *out = (energy_parameters){.idle_per_s = 0.002, .signal_per_s = 0.004, .charger_per_s = 0.1};
 }
 
 double energy_step(const energy_parameters *p, double energy, double left, double right, int at_charger, double dt) {

@@ -1,6 +1,6 @@
 /* supply.h: the battery pack, its sagging under load, the regulator, the rails, and the charger.
  *
- * Pack voltage = open-circuit voltage (a curve against the charge left) - internal resistance * current. The regulator
+ * Pack voltage = open-circuit voltage (a straight line against the charge left) - internal resistance * current. The regulator
  * gives 5 V until the pack comes within its drop-out; servos hang on it (Shield-Bot) or on the pack itself (the classic
  * Boe-Bot). Below 3.78 V a controller at 16 MHz is out of its specification and erratic; below 2.7 V its brown-out
  * detector holds it in reset (section 1.4 of the hardware's fact sheet). The notes' battery without volts is `energy`.
@@ -9,12 +9,8 @@
 #define WORLD_SUPPLY_H
 
 /* python: begin */
-enum { SUPPLY_CURVE_POINTS = 11 };
-enum { SUPPLY_GOOD = 0, SUPPLY_ERRATIC = 1, SUPPLY_RESET = 2 };
-
 typedef struct {
   double full_v, empty_v; /* open-circuit voltage of the pack */
-  double curve[11];       /* where between them at charge 0, 0.1 ... 1, as shares 0 to 1; all 0: a straight line */
   double capacity_as;     /* A s between full and empty */
   double resistance_ohm;  /* internal */
   double drop_out_v;      /* of the regulator */
@@ -31,11 +27,7 @@ typedef struct {
   double pack_v;  /* at the pack's terminals */
   double board_v; /* behind the regulator */
   double servo_v; /* what the servos get */
-  int state;      /* SUPPLY_GOOD, SUPPLY_ERRATIC or SUPPLY_RESET, of the board */
 } supply;
-
-/* Open-circuit voltage at a charge in [0, 1]. */
-double supply_open_circuit(const supply_parameters *p, double charge);
 
 /* What one servo draws, A, at that speed of the rim and that torque. `pulsed`: it gets pulses. */
 double supply_servo_current(const supply_parameters *p, int pulsed, double speed, double torque);
@@ -53,7 +45,6 @@ typedef struct {
   double signal_per_s;  /* p_m */
   double charger_per_s; /* p_c */
 } energy_parameters;
-void energy_default(energy_parameters *out);
 double energy_step(const energy_parameters *p, double energy, double left, double right, int at_charger, double dt);
 /* python: end */
 

@@ -16,7 +16,7 @@ from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
 from sim_bridge import _core
-from sim_bridge._core import ffi, lib
+from sim_bridge._core import ffi
 from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
 from sim_bridge.sessions.session import SimTransport
 from sim_bridge.sessions.world import NATIVE, open_on
@@ -136,7 +136,7 @@ def outcome(robot: Scripted) -> tuple[Any, ...]:
 def test_lively_robot_is_lively() -> None:
     robot = lively()
     robot.run(2.0)
-    assert lib.sim_contacts(robot.sim.handle, 0) >= 1
+    assert robot.robot.true_contacts >= 1
     assert all(len(robot.inputs(pin)) > 2 for pin in (16, 17, 5, 7, 10, 8))
 
 
@@ -262,7 +262,7 @@ def test_contacts_are_counted_once_each() -> None:
     robot.pulses(2.0, {13: 1300, 12: 1700}, start=4.0)
     robot.pulses(4.0, {13: 1700, 12: 1300}, start=6.0)
     robot.run(10.0)
-    assert lib.sim_contacts(robot.sim.handle, 0) == 2
+    assert robot.robot.true_contacts == 2
 
 
 # ---- hands of a test -------------------------------------------------------------------------------------

@@ -472,18 +472,18 @@ def test_answers_can_be_given_in_the_worlds_place() -> None:
 
 def test_pack_sags_under_load_and_the_regulator_holds() -> None:
     robot = scripted()
-    idle = lib.sim_pack_voltage(robot.sim.handle, 0)
+    idle = robot.robot.pack_voltage
     assert idle == pytest.approx(7.75 - 0.6 * 0.08, abs=1e-3)
     robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
     robot.run(1.0)
-    steady = lib.sim_pack_voltage(robot.sim.handle, 0)
+    steady = robot.robot.pack_voltage
     assert steady == pytest.approx(7.75 - 0.6 * (0.08 + 2 * (0.015 + 0.13)), abs=0.03)
     robot.pulses(0.5, {LEFT: 1300, RIGHT: 1700}, start=1.0)
     lowest = idle
     for _ in range(50):
         robot.run(0.01)
-        lowest = min(lowest, lib.sim_pack_voltage(robot.sim.handle, 0))
-        assert lib.sim_supply_voltage(robot.sim.handle, 0) == 5.0
+        lowest = min(lowest, robot.robot.pack_voltage)
+        assert robot.robot.supply_voltage == 5.0
     assert lowest < steady - 0.1  # reversing costs most
 
 
@@ -500,10 +500,10 @@ def test_charge_runs_out() -> None:
     parameters = battery_model.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 1.0
     robot = scripted()
-    assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
+    assert lib.robot_add_battery(robot.robot.handle, 255, parameters) == 0
     robot.run(20.0)
-    assert lib.sim_pack_voltage(robot.sim.handle, 0) == pytest.approx(5.0 - 0.6 * 0.08)
-    assert lib.sim_supply_voltage(robot.sim.handle, 0) == pytest.approx(4.5 - 0.6 * 0.08)
+    assert robot.robot.pack_voltage == pytest.approx(5.0 - 0.6 * 0.08)
+    assert robot.robot.supply_voltage == pytest.approx(4.5 - 0.6 * 0.08)
 
 
 def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
@@ -512,7 +512,7 @@ def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
     assert scripts.script_board_volts(robot.script, supply) == 5.0
     parameters = battery_model.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 1.0
-    assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
+    assert lib.robot_add_battery(robot.robot.handle, 255, parameters) == 0
     robot.run(20.0)
     # an empty pack of 5.0 V, sagging under the board's 0.08 A, less the drop-out of 0.5 V
     assert scripts.script_board_volts(robot.script, supply) == pytest.approx(5.0 - 0.6 * 0.08 - 0.5)
@@ -520,7 +520,7 @@ def test_supply_of_the_board_is_the_regulator_or_what_a_test_holds() -> None:
     assert scripts.script_board_volts(robot.script, supply) == pytest.approx(3.9)
     robot.run(0.1)
     assert scripts.script_board_volts(robot.script, supply) == pytest.approx(3.9)
-    assert lib.sim_supply_voltage(robot.sim.handle, 0) == pytest.approx(3.9)
+    assert robot.robot.supply_voltage == pytest.approx(3.9)
     robot.pins.supply(None)
     assert scripts.script_board_volts(robot.script, supply) == pytest.approx(4.452)
     with pytest.raises(BoardError):

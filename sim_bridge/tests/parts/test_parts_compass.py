@@ -35,7 +35,7 @@ class Master:
 
     def __init__(self, heading: float = 0.0, noise: bool = False, **field: float) -> None:
         self.robot: Scripted = scripted(pose=(0, 0, heading), noise=noise)
-        assert add_part(self.robot.sim.handle, 0, Part("compass_kind", 0, ["A4", "A5"], parameters(**field))) == 0
+        assert add_part(self.robot.robot.handle, Part("compass_kind", 0, ["A4", "A5"], parameters(**field))) == 0
         self.at = 1 * MS
 
     def wait(self, seconds: float) -> None:
@@ -273,17 +273,17 @@ def test_self_test_adds_its_bias() -> None:
 
 def test_one_address_is_for_one_chip() -> None:
     robot = scripted()
-    handle = robot.sim.handle
+    handle = robot.robot.handle
 
     def add(sda: int, scl: int, **field: float) -> int:
         pins = [pin_name(sda) if sda > 13 else sda, pin_name(scl) if scl > 13 else scl]
-        return add_part(handle, 0, Part("compass_kind", 0, pins, parameters(**field)))
+        return add_part(handle, Part("compass_kind", 0, pins, parameters(**field)))
 
     assert add(SDA, SCL) == 0
     assert add(SDA, SCL) == lib.SIM_PIN_TAKEN
     assert add(SDA, SDA) == lib.SIM_BAD_ARGUMENT
     assert add(16, 17, sigma=-1.0) == lib.SIM_BAD_ARGUMENT
-    assert lib.sim_add_part(handle, 0, lib.compass_kind, 0, [20, SCL], parameters()) == lib.SIM_BAD_ARGUMENT
+    assert lib.robot_add_part(handle, lib.compass_kind, 0, [20, SCL], parameters()) == lib.SIM_BAD_ARGUMENT
 
 
 PROGRAM = """
@@ -326,7 +326,7 @@ def test_the_chip_of_the_emulated_board_reads_it(heading: float) -> None:
 
     sim = Sim(arena_of(outline=square(0, 0, 2)), noise=False)
     robot = sim.add(board, load_robot("shieldbot"), pose=(0, 0, heading))
-    assert add_part(sim.handle, 0, Part("compass_kind", 0, ["A4", "A5"], parameters())) == 0
+    assert add_part(sim.robot(0).handle, Part("compass_kind", 0, ["A4", "A5"], parameters())) == 0
     sim.run(round(0.02 * CLOCK_HZ))
     from sim_bridge.pins import BoardPins
 

@@ -42,7 +42,7 @@ def lit(arena: Arena, heading: float = 0.0, **changes: float) -> Scripted:
             value,
         )
     robot = scripted(arena, pose=(0, 0, heading))
-    assert add_part(robot.sim.handle, 0, Part("light_kind", 0, [LIGHT], parameters)) == 0
+    assert add_part(robot.robot.handle, Part("light_kind", 0, [LIGHT], parameters)) == 0
     return robot
 
 
@@ -110,7 +110,8 @@ def test_bad_light_parameters_are_refused() -> None:
     for name, value in (("decay_s", 0.0), ("threshold_v", 6.0), ("maximum_s", math.nan)):
         parameters = light_model.light_parameters(LIGHT_SENSOR, 0, OFF)
         setattr(parameters if hasattr(parameters, name) else parameters.capacitor, name, value)
-        assert add_part(scripted().sim.handle, 0, Part("light_kind", 0, [LIGHT], parameters)) == lib.SIM_BAD_ARGUMENT
+        robot = scripted()
+        assert add_part(robot.robot.handle, Part("light_kind", 0, [LIGHT], parameters)) == lib.SIM_BAD_ARGUMENT
 
 
 # ---- analog infrared -------------------------------------------------------------------------------------
@@ -121,7 +122,7 @@ def sharp_before(distance: float, draw: imperfections.Draw = OFF) -> Scripted:
     x = 0.06 + distance
     robot = scripted(arena_of([(x, -3), (x + 0.1, -3), (x + 0.1, 3), (x, 3)]), pose=(0, 0, 0))
     parameters = analog_infrared_model.analog_infrared_parameters(SHARP, draw)
-    assert add_part(robot.sim.handle, 0, Part("analog_infrared_kind", 0, ["A2"], parameters)) == 0
+    assert add_part(robot.robot.handle, Part("analog_infrared_kind", 0, ["A2"], parameters)) == 0
     return robot
 
 
@@ -168,8 +169,8 @@ def with_turret(arena: Arena, width_us: float, seconds: float = 1.0) -> Scripted
     robot = scripted(arena, pose=(0, 0, 0))
     parameters = ffi.new("turret_parameters *", {"x": 0.045})
     lib.motor_position_default(ffi.addressof(parameters.motor))
-    assert add_part(robot.sim.handle, 0, Part("turret_kind", 0, [TURRET], parameters)) == 0
-    assert lib.sim_mount(robot.sim.handle, 0, TURRET, PING) == 0
+    assert add_part(robot.robot.handle, Part("turret_kind", 0, [TURRET], parameters)) == 0
+    assert lib.robot_mount(robot.robot.handle, TURRET, PING) == 0
     robot.pulses(seconds, {TURRET: width_us})
     robot.run(seconds)
     return robot
@@ -218,7 +219,7 @@ def test_turret_turns_at_its_speed() -> None:
 
 def test_only_what_is_there_can_be_mounted() -> None:
     robot = scripted()
-    assert lib.sim_mount(robot.sim.handle, 0, TURRET, PING) == lib.SIM_BAD_ARGUMENT
+    assert lib.robot_mount(robot.robot.handle, TURRET, PING) == lib.SIM_BAD_ARGUMENT
     assert robot.robot.turret_angle(TURRET) == 0
 
 
@@ -236,7 +237,7 @@ def sound(robot: Scripted, start: float, frequency: float, seconds: float) -> No
 
 def buzzing() -> Scripted:
     robot = scripted()
-    assert add_part(robot.sim.handle, 0, Part("buzzer_kind", 0, [BUZZER], ffi.NULL)) == 0
+    assert add_part(robot.robot.handle, Part("buzzer_kind", 0, [BUZZER], ffi.NULL)) == 0
     return robot
 
 
@@ -298,7 +299,7 @@ def turning(missed: float, extra: float, noise: bool = True) -> tuple[int, int]:
     robot = scripted(noise=noise)
     parameters = encoder_model.encoder_parameters(64)
     parameters.missed, parameters.extra = missed, extra
-    assert add_part(robot.sim.handle, 0, Part("encoder_kind", 0, [2, 255], parameters)) == 0
+    assert add_part(robot.robot.handle, Part("encoder_kind", 0, [2, 255], parameters)) == 0
     robot.pulses(20.0, {13: 1700, 12: 1300})
     robot.run(20.0)
     levels = [level for _, level in robot.inputs(2)]

@@ -139,7 +139,7 @@ def charged(x: float) -> Scripted:
     parameters = battery_model.battery_parameters(SUPPLY)
     parameters.supply.capacity_as = 10.0
     parameters.supply.charger_a = 0.5
-    assert lib.sim_add_battery(robot.sim.handle, 0, 255, parameters) == 0
+    assert lib.robot_add_battery(robot.robot.handle, 255, parameters) == 0
     return robot
 
 

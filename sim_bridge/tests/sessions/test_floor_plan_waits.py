@@ -20,7 +20,7 @@ from boebot.record.record import Record
 from boebot.record.truth import lateness
 from boebot_course.recorder import Recorder
 from boebot_course.vehicle_view import View
-from sim_bridge._core import ffi, lib
+from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sessions.session import DirectSession, InWorld
 from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
@@ -65,10 +65,8 @@ def apart(here: tuple[float, float, float], there: tuple[float, float, float]) -
 
 def poses_in(sim: Sim) -> tuple[float, tuple[float, float, float]]:
     """The world's time and its one moving shape's pose, from the core itself."""
-    count, time = ffi.new("size_t *"), ffi.new("double *")
-    movers = lib.sim_movers(sim.handle, count, time)
-    assert count[0] == 1
-    return time[0], pose_of(movers[0])
+    (mover,) = sim.movers()
+    return sim.handle.world_at / CLOCK_HZ, pose_of(mover)
 
 
 def run(sim: Sim, seconds: float) -> Iterator[tuple[float, tuple[float, float, float]]]:

@@ -12,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from boebot.devices.motor import DcMotor
 from sim_bridge._core import ffi, lib
+from sim_bridge.devices.motor import dc_parameters
 from sim_bridge.tests.world.bodies import ARSIM, BOE_BOT, Body, World, constant
 
 FREE: dict[str, Any] = {"linear_damping": 0.0, "angular_damping": 0.0}
@@ -79,8 +81,7 @@ def test_e03_regulated_motor_diverges_beyond_its_step(dt: float, stable: bool) -
 
 def drive_arsim(left: float, right: float, seconds: float, dt: float = 0.01) -> tuple[Body, list[tuple[float, float]]]:
     """The default robot by motor signals; speed and turn rate after each step."""
-    motor = ffi.new("motor_dc_parameters *")
-    lib.motor_dc_default(motor)
+    motor = ffi.new("motor_dc_parameters *", dc_parameters(DcMotor(full=True)))
     body = Body(parameters=ARSIM)
     rows = []
     for _ in range(round(seconds / dt)):
@@ -126,18 +127,6 @@ def test_e07_circle_closes_around_its_centre_of_rotation() -> None:
     assert (max(ys) - min(ys)) / 2 == pytest.approx(0.2625, abs=0.0005)
     assert (max(ys) + min(ys)) / 2 == pytest.approx(0.2625, abs=0.0005)
     assert body.state.distance == pytest.approx(2 * math.pi * 0.2625, rel=1e-3)
-
-
-def test_parameters_that_describe_no_body_are_named() -> None:
-    good = ffi.new("body_parameters *", BOE_BOT)
-    assert lib.body_parameters_wrong(good) == ffi.NULL
-    wrong: list[tuple[str, float]] = [
-        ("mass", 0.0), ("inertia", -1.0), ("radius", 0.0), ("half_track", math.nan), ("wheel_radius", math.inf),
-        ("wheel_mass", -0.1), ("spin_inertia", math.nan), ("linear_damping", -1.0), ("grip", -0.5),
-    ]  # fmt: skip
-    for name, value in wrong:
-        bad = ffi.new("body_parameters *", {**BOE_BOT, name: value})
-        assert ffi.string(lib.body_parameters_wrong(bad)).decode() == name
 
 
 def test_coasting_decays_exponentially() -> None:
@@ -236,8 +225,7 @@ def test_motion_converges_to_the_integrator(
 
     def error(dt: float) -> float:
         body = Body(parameters=parameters)
-        motor = ffi.new("motor_dc_parameters *")
-        lib.motor_dc_default(motor)
+        motor = ffi.new("motor_dc_parameters *", dc_parameters(DcMotor(full=True)))
         for step in range(round(8.0 / dt)):
             t, s = step * dt, body.state
             if torques is regulated:

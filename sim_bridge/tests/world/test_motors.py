@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from boebot.description.robots import load_robot
+from boebot.devices.motor import DcMotor
 from sim_bridge._core import ffi, lib
 from sim_bridge.devices import servo as servo_model
+from sim_bridge.devices.motor import dc_parameters
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.world.bodies import ARSIM, BOE_BOT, Body
 
@@ -23,8 +25,7 @@ ROTOR = 5e-5  # kg m^2, of E01
 
 
 def dc_motor(**changes: float) -> Any:
-    motor = ffi.new("motor_dc_parameters *")
-    lib.motor_dc_default(motor)
+    motor = ffi.new("motor_dc_parameters *", dc_parameters(DcMotor(full=True)))
     for name, value in changes.items():
         setattr(motor, name, value)
     return motor

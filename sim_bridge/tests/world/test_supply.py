@@ -14,6 +14,7 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.world.bodies import BOE_BOT, Body
+from sim_bridge.vehicles.drives import ENERGY
 
 PACK: dict[str, Any] = {
     "full_v": 7.75,
@@ -39,33 +40,22 @@ def supply(charge: float = 1.0, **changes: Any) -> tuple[Any, Any]:
 def test_voltage_falls_with_charge_and_load() -> None:
     p, s = supply()
     assert s.pack_v == pytest.approx(7.75 - 0.6 * 0.08)
-    assert (s.board_v, s.servo_v, s.state) == (5.0, 5.0, lib.SUPPLY_GOOD)
+    assert (s.board_v, s.servo_v) == (5.0, 5.0)
     lib.supply_step(p, s, 2.0, 0, 1800.0)
     assert s.charge == pytest.approx(1 - 2.08 * 1800 / 7200)
     assert s.pack_v == pytest.approx(5.0 + 2.75 * s.charge - 0.6 * 2.08)
     assert s.board_v == pytest.approx(s.pack_v - 0.5)  # within its drop-out
 
 
-def test_curve_between_its_points() -> None:
-    curve = [0.0, 0.25, 0.4, 0.5, 0.56, 0.62, 0.68, 0.74, 0.8, 0.88, 1.0]
-    p, _ = supply(curve=curve)
-    for charge in np.linspace(-0.2, 1.2, 57):
-        expected = 5.0 + 2.75 * np.interp(charge, np.linspace(0, 1, 11), curve)
-        assert lib.supply_open_circuit(p, charge) == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("current", "state"), [(2.0, lib.SUPPLY_GOOD), (4.0, lib.SUPPLY_ERRATIC), (6.0, lib.SUPPLY_RESET)]
-)
-def test_brown_out_band(current: float, state: int) -> None:
-    """Below 3.78 V erratic, below 2.7 V reset; as soon as the load goes all is well again."""
+@pytest.mark.parametrize("current", [2.0, 4.0, 6.0])
+def test_rail_sags_with_the_load(current: float) -> None:
+    """As soon as the load goes all is well again."""
     p, s = supply(empty_v=6.5, full_v=6.5, resistance_ohm=0.6)
     lib.supply_step(p, s, current, 0, 0.001)
     board = 6.5 - 0.6 * (current + 0.08) - 0.5
     assert s.board_v == pytest.approx(min(board, 5.0))
-    assert s.state == state
     lib.supply_step(p, s, 0.0, 0, 0.001)
-    assert s.state == lib.SUPPLY_GOOD
+    assert s.board_v == 5.0
 
 
 def test_charger_fills_the_pack() -> None:
@@ -87,8 +77,7 @@ def test_charge_stays_within_its_bounds(charge: float, loads: list[tuple[float, 
 
 def test_energy_of_the_notes() -> None:
     """E' = -(p_0 + p_m (|s_L| + |s_R|)) + p_c at the charger, within 0 and 1 (section 1.9)."""
-    p = ffi.new("energy_parameters *")
-    lib.energy_default(p)
+    p = ffi.new("energy_parameters *", ENERGY)
     assert lib.energy_step(p, 0.5, 0.5, -1.0, 0, 2.0) == pytest.approx(0.5 - 2 * (0.002 + 0.004 * 1.5))
     assert lib.energy_step(p, 0.5, 0.0, 0.0, 1, 2.0) == pytest.approx(0.5 + 2 * 0.098)
     assert lib.energy_step(p, 0.001, 1.0, 1.0, 0, 2.0) == 0.0
