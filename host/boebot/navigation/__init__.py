@@ -1,8 +1,6 @@
 """Navigation (chapter 6 of the notes): maps, search, paths, potential fields and localization, for brain processes and
 as what they are made of."""
 
-from boebot.navigation.cells import Cells
-from boebot.navigation.coverage import Coverage
 from boebot.navigation.estimators import Estimate, Estimator, RandomSearch
 from boebot.navigation.exploration_graph import ExplorationGraph, Placement
 from boebot.navigation.explore import Explore
@@ -21,8 +19,6 @@ from boebot.navigation.sweep import Sweep, TurretScan, laser_scan
 from boebot.navigation.tighten import tightened
 
 __all__ = [
-    "Cells",
-    "Coverage",
     "Estimate",
     "Estimator",
     "ExplorationGraph",

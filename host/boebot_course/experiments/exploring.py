@@ -17,8 +17,9 @@ from matplotlib.figure import Figure
 from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
 from boebot.description.robots import RobotDescription
-from boebot.navigation import Coverage, Explore, Lattice, LineMap, Placement
+from boebot.navigation import Explore, Lattice, LineMap, Placement
 from boebot.robot import Robot
+from boebot_course.coverage import Coverage
 from boebot_course.experiment import Floats, Measured, Outcome, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once

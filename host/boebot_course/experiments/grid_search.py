@@ -22,7 +22,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 
-from boebot.navigation import Cells, Found, Lattice, LineMap, search, tightened
+from boebot.navigation import Found, Lattice, LineMap, search, tightened
 from boebot.navigation.lattice import Cell
 from boebot.navigation.search import Method
 from boebot.navigation.tighten import length
@@ -451,6 +451,38 @@ def clearance(plan: LineMap, path: Sequence[Point]) -> float:
     return float(plan.distance(np.vstack(points)).min())
 
 
+Box = tuple[int, int, int, int]
+"""First and one beyond the last row, first and one beyond the last column."""
+
+
+def rectangles_of(free: NDArray[np.bool_]) -> list[Box]:
+    """Free cells merged into rectangles, which are convex: any straight way inside one is free. The greatest is taken
+    first, then the greatest of what is left, and so on."""
+    left, found = free.copy(), []
+    while left.any():
+        found.append(greatest_rectangle(left))
+        top, bottom, begin, end = found[-1]
+        left[top:bottom, begin:end] = False
+    return found
+
+
+def greatest_rectangle(free: NDArray[np.bool_]) -> Box:
+    """The rectangle of most free cells: under the histogram of free cells above each row, the greatest area."""
+    best, most = (0, 0, 0, 0), 0
+    heights = np.zeros(free.shape[1], dtype=np.intp)
+    for row in range(free.shape[0]):
+        heights = np.where(free[row], heights + 1, 0)
+        waiting: list[tuple[int, int]] = []  # first column and height, growing
+        for column, height in enumerate([*heights.tolist(), 0]):
+            first = column
+            while waiting and waiting[-1][1] >= height:
+                first, tall = waiting.pop()
+                if tall * (column - first) > most:
+                    most, best = tall * (column - first), (row - tall + 1, row + 1, first, column)
+            waiting.append((first, height))
+    return best
+
+
 @experiment("E46")
 def tightening(seed: int) -> Outcome:
     """A grid made from a map, and a path tightened in it
@@ -474,8 +506,8 @@ def tightening(seed: int) -> Outcome:
         tight.append(tightened(raw[-1], plan, RADIUS + MARGIN))
     shares = [length(after) / length(before) for before, after in zip(raw, tight, strict=True)]
     clear = [clearance(plan, path) for path in tight]
-    cells = Cells.of(lattice)
-    inside = sum((bottom - top) * (right - left) for top, bottom, left, right in cells.rectangles)
+    cells = rectangles_of(lattice.free)
+    inside = sum((bottom - top) * (right - left) for top, bottom, left, right in cells)
     measured = [
         Measured("longest of the tightened paths against its path on the lattice", max(shares), most=1.0),
         Measured("the same, mean", float(np.mean(shares)), most=0.98),
@@ -494,7 +526,7 @@ def tightening(seed: int) -> Outcome:
         figure.set_figheight(3.3)
         left, right = figure.subplots(1, 2)
         _draw_grid(left, plan, lattice, cells)
-        _draw_grid(right, plan, lattice, None)
+        _draw_grid(right, plan, lattice, [])
         right.plot(*np.array(raw[0]).T, color="#8a93a6", lw=1.6, label="as searched")
         right.plot(*np.array(tight[0]).T, "o-", color="#0072b2", lw=1.8, ms=4, label="tightened")
         figure.legend(loc="outside lower center", ncols=3, fontsize=9)
@@ -502,14 +534,13 @@ def tightening(seed: int) -> Outcome:
     return Outcome(measured, data, draw)
 
 
-def _draw_grid(axes: Axes, plan: LineMap, lattice: Lattice, cells: Cells | None) -> None:
-
+def _draw_grid(axes: Axes, plan: LineMap, lattice: Lattice, cells: list[Box]) -> None:
     low, high = plan.bounds
     frame(axes, low, high)
     reach = (lattice.x, lattice.x + lattice.columns * CELL, lattice.y, lattice.y + lattice.rows * CELL)
     axes.imshow(np.where(lattice.free, 1.0, 0.12), cmap="gray", vmin=0, vmax=1, origin="lower", extent=reach)
     axes.add_collection(LineCollection(list(plan.segments), colors="#35b36b", linewidths=1.0))
-    for top, bottom, begin, end in () if cells is None else cells.rectangles:
+    for top, bottom, begin, end in cells:
         corner = lattice.x + begin * CELL, lattice.y + top * CELL
         axes.add_patch(
             Rectangle(corner, (end - begin) * CELL, (bottom - top) * CELL, fill=False, edgecolor="#d1a800", lw=1.2)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from boebot.navigation import (
-    Cells,
     Estimate,
     Explore,
     Lattice,
@@ -185,7 +184,7 @@ NAVIGATION = [
     Mutant(
         "E46",
         "cells cover what is free",
-        put(Cells, "of", lambda old: lambda lattice: old(replace(lattice, free=lattice.free & False))),
+        put(grid_search, "rectangles_of", lambda old: lambda free: old(free & False)),
     ),
     Mutant("E47", "the potentials' directions", put(PotentialField, "gradient", slope_of(heading=0.0))),
     Mutant("E47", "the factor 2 of (6.3)", put(PotentialField, "gradient", lambda old: lambda *at: old(*at) / 2)),

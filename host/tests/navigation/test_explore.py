@@ -17,11 +17,12 @@ from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, 
 from boebot.brains import rounds
 from boebot.cognition import Odometry
 from boebot.errors import BrainError
-from boebot.navigation import Coverage, Explore, GoTo, LineMap, Localization, Scan, TurretScan
+from boebot.navigation import Explore, GoTo, LineMap, Localization, Scan, TurretScan
 from boebot.navigation.corridor import is_clear
 from boebot.navigation.explore import State
 from boebot.navigation.frames import Pose
 from boebot.navigation.scan_error import heard
+from boebot_course.coverage import Coverage
 from boebot_course.experiments import exploring
 from boebot_course.experiments.exploring import explored, explorer, starts
 from boebot_course.tests.navigation_figures.tasks import errand

@@ -13,7 +13,7 @@ from PIL import Image
 
 from boebot.arenas import load_arena
 from boebot.errors import BrainError
-from boebot.navigation import Cells, Lattice, LineMap, OccupancyMap, search
+from boebot.navigation import Lattice, LineMap, OccupancyMap, search
 from boebot.navigation.tighten import segment_distance
 
 RADIUS, MARGIN = 0.07, 0.05
@@ -91,25 +91,6 @@ def test_part_without_a_way_is_not_reachable() -> None:
     assert left.free.tolist() == [[True, True, False, False, False]] * 3
     corner = np.array([[True, False], [False, True]])
     assert Lattice(corner).reachable((0, 0)).free.sum() == 1, "no diagonal between two forbidden cells"
-
-
-def test_cells_are_convex_cover_all_and_give_a_path(office: LineMap, lattice: Lattice) -> None:
-    cells = Cells.of(lattice)
-    covered = np.zeros(lattice.free.shape, dtype=int)
-    for top, bottom, left, right in cells.rectangles:
-        covered[top:bottom, left:right] += 1
-    assert np.array_equal(covered, lattice.free), "each free cell once, and no other"
-    areas = [(bottom - top) * (right - left) for top, bottom, left, right in cells.rectangles]
-    assert areas == sorted(areas, reverse=True) and len(areas) < lattice.free.sum() / 50
-    ends = [lattice.centre(cell) for place in (BEGIN, END) if (cell := lattice.nearest_free(*place, within=0.2))]
-    placed, (start, target) = cells.with_places(*ends)
-    found = search(placed, start, target)
-    path = [placed.centre(node) for node in found.path]
-    assert [path[0], path[-1]] == ends
-    assert all(
-        segment_distance(office, one, other) >= RADIUS + MARGIN - 0.06 for one, other in itertools.pairwise(path)
-    )
-    assert cells.with_places((-10.0, 0.0))[1] == [-1]
 
 
 def test_segments_distance_agrees_with_shapely(office: LineMap) -> None:
@@ -194,14 +175,11 @@ def test_cells_that_are_none(office: LineMap) -> None:
 
 
 def test_no_path_begins_in_a_forbidden_cell(lattice: Lattice) -> None:
-    """Also not where a free cell is beside it; and a place in no rectangle is no node."""
+    """Also not where a free cell is beside it."""
     rows, columns = np.nonzero(~lattice.free[:, :-1] & lattice.free[:, 1:])
     forbidden = int(rows[0]), int(columns[0])
     free = forbidden[0], forbidden[1] + 1
     assert search(lattice, forbidden, free).path == search(lattice, free, forbidden).path == []
-    cells, (outside, inside) = Cells.of(lattice).with_places((9.0, 9.0), BEGIN)
-    assert outside == -1 < inside
-    assert search(cells, outside, inside).path == search(cells, inside, outside).path == []
 
 
 @pytest.mark.parametrize(

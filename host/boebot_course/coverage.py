@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from boebot.navigation.lattice import Lattice, cells_of
-
-if TYPE_CHECKING:
-    from boebot.navigation.line_map import LineMap
+from boebot.navigation.line_map import LineMap
 
 BEHIND_M = 0.04  # a cell whose centre lies so far behind the end of a ray still counts: its border is seen
 TURN_RAD, WAY_M = math.radians(15.0), 0.2  # from sweep to sweep
