@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import struct
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -179,37 +179,48 @@ def of_record(result: Run | Result) -> Iterator[None]:
 def end(result: Result, out: Path | None, wanted: Detail) -> None:
     """Prints the run's figures, writes its files to `out`, and raises why it ended before its time.
 
-    No error hides another: files are written even if nobody reads the table any more, and an error in writing them
-    follows the run's own.
+    No error hides another: an error in writing the files follows the run's own.
     """
     if wanted is not Detail.NOTHING:
         for notice in result.notices:
             output.say(notice)
     interrupted = isinstance(result.error, KeyboardInterrupt)
+    said = result.error is not None and not interrupted
+    unsaved = show(result, wanted, out, () if out is None else _files(result, out), is_said=said)
+    first = InterruptedRunError("interrupted") if interrupted else result.error
+    if first is not None and unsaved is not None:
+        first.add_note(str(unsaved))
+    if (error := first or unsaved) is not None:
+        raise error
+
+
+def _files(result: Result, out: Path) -> Iterator[list[Path]]:
+    yield [out / RECORD]
+    yield result.save(out)
+
+
+def show(
+    result: Result, wanted: Detail, folder: Path | None, made: Iterable[list[Path]], *, is_said: bool = False
+) -> BoebotError | None:
+    """Prints a run's figures and the files in `folder` that `made` makes, also if nobody reads the table any more;
+    returns why not all of them could be made. `is_said`: as of `print_run`."""
     files: list[Path] = []
     unsaved: BoebotError | None = None
     try:
-        print_run(result, wanted, is_said=result.error is not None and not interrupted)
+        print_run(result, wanted, is_said=is_said)
     finally:
-        if out is not None:
-            try:
-                files = [out / RECORD, *result.save(out)]
-            except BoebotError as error:
-                unsaved = error
-                files = [out / RECORD, *error.files] if isinstance(error, IncompleteError) else []
-            files = [path for path in files if path.exists()]  # a brain may have deleted them
+        try:
+            for paths in made:
+                files += paths
+        except BoebotError as error:
+            unsaved = error
+            files += error.files if isinstance(error, IncompleteError) else []
+    files = [path for path in files if path.exists()]  # a brain may have deleted them
     if wanted is Detail.JSON:
         output.print_json(result.table() | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]})
-    elif files and wanted is not Detail.NOTHING:
-        assert out is not None
-        output.line(files_in(out, files))
-    first = InterruptedRunError("interrupted") if interrupted else result.error
-    if first is not None:
-        if unsaved is not None:
-            first.add_note(str(unsaved))
-        raise first
-    if unsaved is not None:
-        raise unsaved
+    elif files and folder is not None and wanted is not Detail.NOTHING:
+        output.line(files_in(folder, files))
+    return unsaved
 
 
 def files_in(folder: Path, files: Sequence[Path]) -> str:

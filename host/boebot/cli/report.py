@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from boebot.cli import ending, options, output
-from boebot.cli.ending import Detail, detail, print_run
-from boebot.errors import BoebotError, did_you_mean
+from boebot.cli.ending import detail
+from boebot.errors import did_you_mean
 from boebot.guests import FORMATS, guests
 from boebot.record.reading import CutError, mend
 from boebot.record.run import Run
 from boebot.record.run_folder import RECORD, RunFolder
 from boebot.result import Result, read_run, robots_of
-from boebot.view import IncompleteError, save_for_foxglove
+from boebot.view import save_for_foxglove
 
 CSV, FOXGLOVE = "csv", "foxglove"
 _KINDS = (CSV, FOXGLOVE, *guests(FORMATS))
@@ -71,7 +71,10 @@ def report(
         if plot:
             _plot(robots_of(result, robot), columns or [], out)
         else:
-            _report(run, result, formats or [], mended, wanted)
+            folder = run if run.is_dir() else run.parent
+            unsaved = ending.show(result, wanted, folder, _files(run, folder, result, formats or [], mended))
+            if unsaved is not None:
+                raise unsaved
 
 
 def _plot(robots: Mapping[int, Run], columns: list[str], out: Path | None) -> None:
@@ -85,31 +88,15 @@ def _plot(robots: Mapping[int, Run], columns: list[str], out: Path | None) -> No
             output.line(name)
 
 
-def _report(run: Path, result: Result, formats: list[str], mended: bool, wanted: Detail) -> None:
-    folder = run if run.is_dir() else run.parent
-    robots = robots_of(result)
-    files: list[Path] = []
-    unsaved: BoebotError | None = None
+def _files(run: Path, folder: Path, result: Result, formats: list[str], mended: bool) -> Iterator[list[Path]]:
+    """Makes the files of a run anew, and those of further formats."""
     with RunFolder(folder):
-        try:
-            files += result.save(folder, csv=CSV in formats)
-            if FOXGLOVE in formats:
-                files.append(save_for_foxglove(result.robots, folder))
-            for name in formats:
-                if name not in (CSV, FOXGLOVE):
-                    write: Callable[[Mapping[int, Run], Path], list[Path]] = guests(FORMATS)[name].load()
-                    files += write(robots, folder)
-            if mended and isinstance(result.error, CutError):
-                files.append(mend(folder / RECORD if run.is_dir() else run, result.robots))
-        except BoebotError as error:  # the figures are printed all the same
-            unsaved = error
-            files += error.files if isinstance(error, IncompleteError) else []
-    if wanted is Detail.JSON:
-        table: dict[str, Any] = result.table()
-        output.print_json(table | {"wall_clock": result.wall_clock(), "files": [str(path) for path in files]})
-    elif wanted is not Detail.NOTHING:
-        print_run(result, wanted)
-        if files:
-            output.line(ending.files_in(folder, files))
-    if unsaved is not None:
-        raise unsaved
+        yield result.save(folder, csv=CSV in formats)
+        for name in formats:
+            if name == FOXGLOVE:
+                yield [save_for_foxglove(result.robots, folder)]
+            elif name != CSV:
+                write: Callable[[Mapping[int, Run], Path], list[Path]] = guests(FORMATS)[name].load()
+                yield write(robots_of(result), folder)
+        if mended and isinstance(result.error, CutError):
+            yield [mend(folder / RECORD if run.is_dir() else run, result.robots)]

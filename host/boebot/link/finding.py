@@ -76,10 +76,6 @@ class BoardSearch:
         self._change_s = now_s + _LISTEN_S
         return self.baud
 
-    def look_again_s(self, now_s: float) -> float:
-        """When to ask again."""
-        return min(now_s + _LOOK_S, self.end_s)
-
     def failure(self, hello: messages.Hello | None, whole: int, damaged: int) -> BoebotError:
         """Why there is no session: one sentence.
 

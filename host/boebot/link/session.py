@@ -136,7 +136,7 @@ class Session:
                     raise search.failure(self.hello, line.decoder.good, line.decoder.bad)
                 elif self.hello is None and (baud := search.next_baud(now)) is not None:
                     line.change_baud(baud)
-                self._wait(search.look_again_s(now) if self.hello is None else now + _LOOK_S)
+                self._wait(now + _LOOK_S)
         except BoardError as error:
             raise (search.explained(error, held) if self.hello is None else error) from None
         finally:
