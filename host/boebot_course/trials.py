@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan
-from boebot.brain import Brain, CognitiveProcess
-from boebot.description.robots import RobotDescription
+from boebot.brain import Brain, CognitiveProcess, MotorBehavior
+from boebot.description.equipment import Equipment
+from boebot.description.robots import RobotDescription, load_robot
+from boebot.link import messages
 from boebot.record.brain_record import BrainRecord
 from boebot.record.truth import Pose, truth_at
 from boebot.result import RunResult
-from boebot.robot import Robot
+from boebot.robot import Observation, Robot
 from boebot.running.runner import run
 from boebot_course.experiment import Floats
 
@@ -113,6 +115,28 @@ class Log(CognitiveProcess):
 
     def step(self, robot: Robot) -> None:
         self.rows.append(self.read(self, robot))
+
+
+class Alone:
+    """A behavior that runs by itself, on a robot whose readings never change."""
+
+    def __init__(self, behavior: MotorBehavior, step: float, seed: int = 0) -> None:
+        """It begins; `step` in s."""
+        self.robot, self._behavior, self._step, self._steps = Robot("none", step, seed), behavior, step, 0
+        self._equipment = Equipment(load_robot("shieldbot"), step)
+        behavior.join(step, self.robot.stream(behavior.name), lambda kind: behavior, lambda process, gamma: None)
+        self._see()
+        behavior.enter(self.robot)
+
+    def step(self) -> None:
+        """One step more."""
+        self._see()
+        self._behavior.step(self.robot)
+        self._steps += 1
+
+    def _see(self) -> None:
+        nothing = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
+        self.robot.observation = Observation(nothing, self._equipment, time=self._steps * self._step)
 
 
 def trial_seeds(seed: int, count: int) -> range:

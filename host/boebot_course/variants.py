@@ -21,7 +21,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import Device
 from boebot.devices.infrared import InfraredProximity
 from boebot.devices.motor import RegulatedMotor
-from boebot.navigation import LineMap
+from boebot.navigation import Lattice, LineMap
 
 SMALL_RADIUS, SMALL_SPEED = 0.07, 0.17  # m, of a Boe-Bot; m/s at motor signal 1, of its servos
 NARROW_RAD = 0.3324  # directions of IR sensors that also see what lies ahead; arsim's own ±0.7854 rad leave it out
@@ -91,6 +91,18 @@ def small_arsim(full_speed: float = SMALL_SPEED, **devices: Device) -> RobotDesc
         infrared_right=sensor(**at_angle(SMALL_RADIUS, -1.0472)),
         **devices,
     )
+
+
+def exact_roller() -> RobotDescription:
+    """The bundled robot, with odometry that does not drift."""
+    return varied("roller", "roller-exact", odometer={"sigma_step_m": 0.0})
+
+
+def poses_on(lattice: Lattice, chance: np.random.Generator, count: int) -> list[tuple[float, float, float]]:
+    """In free cells, under any heading (m, m, rad)."""
+    cells = np.argwhere(lattice.free)
+    places = [lattice.centre((int(row), int(column))) for row, column in cells[chance.integers(len(cells), size=count)]]
+    return [(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in places]
 
 
 @contextmanager

@@ -17,13 +17,11 @@ from matplotlib.figure import Figure
 from boebot import run
 from boebot.behaviors import RunAndTumble
 from boebot.brain import Brain
-from boebot.description.equipment import Equipment
-from boebot.description.robots import RobotDescription, load_robot
+from boebot.description.robots import RobotDescription
 from boebot.devices.motor import RegulatedMotor
-from boebot.link import messages
-from boebot.robot import Observation, Robot
+from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
-from boebot_course.trials import trial_seeds
+from boebot_course.trials import Alone, trial_seeds
 from boebot_course.variants import varied
 
 STEP = 0.01  # s
@@ -38,20 +36,15 @@ Attractant = Callable[[float, float, float], float]
 def utility_of(stimulus: Floats, a: float, b: float, step: float) -> Floats:
     """U = X - V, dV/dt + a V = b X  (4.1), with V(0) = (b/a) X(0), as the kit's behavior has it in its steps.
 
-    The behavior looks at nothing but X: a robot of which only the time goes on is enough.
+    The behavior looks at nothing but X.
     """
-    robot, equipment = Robot("none", step), Equipment(load_robot("shieldbot"), step)
-    sample = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
     smelled = [float(stimulus[0])]
     behavior = RunAndTumble(stimulus=lambda robot: smelled[0], a=a, b=b)
-    behavior.join(step, robot.stream(behavior.name), lambda kind: behavior, lambda process, gamma: None)
-    robot.observation = Observation(sample, equipment, time=0.0)
-    behavior.enter(robot)
+    alone = Alone(behavior, step)
     values = []
-    for index, x in enumerate(stimulus.tolist()):
-        robot.observation = Observation(sample, equipment, time=index * step)
+    for x in stimulus.tolist():
         smelled[0] = x
-        behavior.step(robot)
+        alone.step()
         values.append(behavior.value)
     return np.array(values)
 

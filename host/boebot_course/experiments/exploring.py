@@ -16,14 +16,13 @@ from matplotlib.figure import Figure
 
 from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
-from boebot.description.robots import RobotDescription
 from boebot.navigation import Explore, Lattice, LineMap, Placement
 from boebot.robot import Robot
 from boebot_course.coverage import Coverage
 from boebot_course.experiment import Floats, Measured, Outcome, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
-from boebot_course.variants import arena_file, varied
+from boebot_course.variants import arena_file, exact_roller, poses_on
 
 Pose = tuple[float, float, float]
 
@@ -33,11 +32,6 @@ RAYS, REACH = 120, 4.0  # reach in m
 LEAST = 0.995  # coverage, of Fig. 6.4
 SECONDS = 600.0
 STATUS_COLOURS = {"pending": "#999999", "completed": "#009e73", "unreachable": "#d55e00"}
-
-
-def roller() -> RobotDescription:
-    """The bundled robot, with odometry that does not drift."""
-    return varied("roller", "roller-exact", odometer={"sigma_step_m": 0.0})
 
 
 def explorer(*, second_pass: bool = True) -> Explore:
@@ -94,7 +88,7 @@ def explored(arena: str | Path, seen: LineMap, pose: Pose, seed: int, explore: E
         seen: what the laser can see of the arena: coverage is measured on it.
         pose: where it begins (m, m, rad).
     """
-    trial = try_once(Brain([Odometry(), explore]), roller(), arena, SECONDS, pose=pose, seed=seed)
+    trial = try_once(Brain([Odometry(), explore]), exact_roller(), arena, SECONDS, pose=pose, seed=seed)
     coverage = Coverage(seen)
     true = trial.result.true_pose
     assert true is not None
@@ -110,10 +104,7 @@ def starts(arena: str, seed: int, count: int) -> list[Pose]:
     lattice = Lattice.of(plan, RADIUS, 0.1, 0.05)
     first = lattice.nearest_free(1.0, 1.0, within=0.5)
     assert first is not None
-    cells = np.argwhere(lattice.reachable(first).free)
-    chance = np.random.default_rng(seed)
-    places = [lattice.centre((int(row), int(column))) for row, column in cells[chance.integers(len(cells), size=count)]]
-    return [(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in places]
+    return poses_on(lattice.reachable(first), np.random.default_rng(seed), count)
 
 
 # ---- E38: a low obstacle ---------------------------------------------------------------------------------------------
@@ -145,7 +136,7 @@ def low_obstacle(seed: int) -> Outcome:
     watch = Watch(explore=explore)
     with arena_file("low", LOW) as arena:
         brain = Brain([Odometry(), watch, explore])
-        trial = try_once(brain, roller(), arena, 250.0, pose=LOW_START, seed=seed)
+        trial = try_once(brain, exact_roller(), arena, 250.0, pose=LOW_START, seed=seed)
     assert explore.graph is not None
     nodes = explore.graph.nodes
     unreachable = [node for node in nodes if node.status == "unreachable"]

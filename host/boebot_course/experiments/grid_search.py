@@ -121,9 +121,6 @@ def _legend(figure: Figure, *, with_wall: bool) -> None:
     )  # fmt: skip
 
 
-BY_HAND = "By hand: the target lies 14 columns and one row from the start"
-
-
 @experiment("E41")
 def in_the_open(seed: int) -> Outcome:
     """Greedy search in the open
@@ -151,10 +148,6 @@ def in_the_open(seed: int) -> Outcome:
 
 
 BEST = {4: 21.0, 8: 9 + 6 * DIAGONAL}
-ROUND_THE_C = (
-    f"{BY_HAND}, and the way round the C-shaped wall is 6 rows longer: 21 with 4 neighbours; with 8 neighbours six of "
-    "its steps are diagonal, 9 + 6 √2."
-)
 
 
 @experiment("E42")

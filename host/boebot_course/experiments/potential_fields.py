@@ -24,18 +24,10 @@ from boebot.navigation.potential_field import waypoints
 from boebot.robot import Robot
 from boebot.view import style
 from boebot.view.painter import draw_robot
-from boebot_course.experiment import (
-    Floats,
-    Measured,
-    Outcome,
-    Variant,
-    about,
-    exactly,
-    experiment,
-)
+from boebot_course.experiment import Floats, Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
-from boebot_course.variants import scaled_arena, varied
+from boebot_course.variants import exact_roller, scaled_arena
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -166,7 +158,7 @@ PERIOD = 0.05  # s
 
 def roller() -> World:
     """The notes' size; V_nav = 0.2 m/s, V_rot = 0.1 m/s; odometry without noise."""
-    return World(varied("roller", "roller-exact", odometer={"sigma_step_m": 0.0}), None, 1.0, 0.2, 0.1, 1e-6)
+    return World(exact_roller(), None, 1.0, 0.2, 0.1, 1e-6)
 
 
 def shieldbot() -> World:

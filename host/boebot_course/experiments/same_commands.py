@@ -31,7 +31,6 @@ from boebot.robot import Command
 from boebot.running.replayed import replayed
 from boebot_course.experiment import Measured, Outcome, exactly, experiment
 from boebot_course.experiments import wall
-from boebot_course.variants import arena_file
 
 SECONDS = 20.0
 WALLS_SECONDS = 60.0
@@ -114,20 +113,6 @@ def disagreements(run: RunResult, brain: object) -> int:
     return sum(tuple(command) != step[1:] for command, step in pairs)
 
 
-def along_walls(on: str, seed: int) -> RunResult:
-    """A run of E35's brain along the walls of its room."""
-    with arena_file("room", wall.ROOM) as arena:
-        return boebot.run(
-            wall.follower(),
-            robot=wall.pinger(),
-            arena=arena,
-            on=on,
-            seconds=WALLS_SECONDS,
-            seed=seed,
-            pose=(0.8 * wall.LENGTH, wall.START, 0.0),
-        )
-
-
 # The set-points of one board may take hold a step of the brain (0.05 s) later where it turns on the spot: 8.4 mm at
 # 0.168 m/s, and 4.2 mm by phase. Nearness by Ping falls by 1 in 0.40 m, and is multiplied by k = 0.5 / 0.17.
 APART_M = 0.0126
@@ -204,7 +189,7 @@ def same_commands(seed: int) -> Outcome:
             data |= {f"{name}_{run.board}_left": [left for *_, left, _ in run.record.steps][:steps]}
             data |= {f"{name}_{run.board}_right": [right for *_, right in run.record.steps][:steps]}
         drawn.append((name, runs, [seen, looked_at, commanded]))
-    a, b = runs = [along_walls(on, seed) for on in ("native", "avr")]
+    a, b = runs = [wall.lap(wall.pinger(), on, seed, wall.START, WALLS_SECONDS) for on in ("native", "avr")]
     measured += judge_walls(runs)
     for run in runs:
         data |= {f"walls_{run.board}_left": [left for *_, left, _ in run.record.steps]}

@@ -27,6 +27,7 @@ from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, Variant, about, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
+from boebot_course.variants import poses_on
 
 ARENA = "blocks"
 HALF_TURN = (-math.pi / 2, math.pi / 2)
@@ -38,10 +39,7 @@ OFFSET = 0.1  # m, m, rad
 
 def poses_in(plan: LineMap, chance: np.random.Generator, count: int = POSES, radius: float = 0.15) -> list[Pose]:
     """Where a robot of that radius (m) can be (m, m, rad)."""
-    lattice = Lattice.of(plan, radius, 0.05, 0.05)
-    cells = np.argwhere(lattice.free)
-    places = [lattice.centre((int(row), int(column))) for row, column in cells[chance.integers(len(cells), size=count)]]
-    return [(x, y, float(chance.uniform(-math.pi, math.pi))) for x, y in places]
+    return poses_on(Lattice.of(plan, radius, 0.05, 0.05), chance, count)
 
 
 def scan_at(plan: LineMap, pose: Pose, chance: np.random.Generator, noise: float = NOISE) -> Scan:

@@ -38,7 +38,7 @@ def pinger() -> RobotDescription:
     return varied("shieldbot", "shieldbot-turret", turret={"on": True})
 
 
-def lap(robot: RobotDescription, on: str | None, seed: int, start: float) -> RunResult:
+def lap(robot: RobotDescription, on: str | None, seed: int, start: float, seconds: float = SECONDS) -> RunResult:
     """A run along the walls, which begins `start` metres from one."""
     with arena_file("room", ROOM) as arena:
         return run(
@@ -46,7 +46,7 @@ def lap(robot: RobotDescription, on: str | None, seed: int, start: float) -> Run
             robot=robot,
             arena=arena,
             on=on,
-            seconds=SECONDS,
+            seconds=seconds,
             seed=seed,
             pose=(0.8 * LENGTH, start, 0.0),
         )

@@ -15,15 +15,12 @@ from boebot import rates
 from boebot.behaviors import Avoid, Wander
 from boebot.brain import Brain, Utility
 from boebot.cognition import near
-from boebot.description.equipment import Equipment
-from boebot.description.robots import RobotDescription, load_robot
-from boebot.link import messages
-from boebot.robot import Observation, Robot
+from boebot.description.robots import RobotDescription
 from boebot.view import style
 from boebot.view.painter import draw_robot
 from boebot_course.experiment import Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.paths import draw_paths, floor
-from boebot_course.trials import Trial, trial_seeds, try_once
+from boebot_course.trials import Alone, Trial, trial_seeds, try_once
 from boebot_course.variants import narrow_arsim, scaled_arena
 
 STEP = 0.01  # s, the notes'
@@ -35,24 +32,20 @@ STEPS = 400_000
 def stays(wander: Wander, seed: int) -> tuple[list[int], list[int], list[bool]]:
     """Steps that each stay in state 1 (forward) and in state 2 (turning) lasted, and whether each turn was to the left.
 
-    The behavior looks at nothing: a robot whose readings never change is enough.
+    The behavior looks at nothing.
     """
-    robot = Robot("none", STEP, seed)
-    sample = messages.Telemetry(*(0,) * len(messages.Telemetry._fields))
-    robot.observation = Observation(sample, Equipment(load_robot("shieldbot"), STEP), time=0.0)
-    wander.join(STEP, robot.stream(wander.name), lambda kind: wander, lambda process, gamma: None)
-    wander.enter(robot)
+    alone = Alone(wander, STEP, seed)
     lengths: dict[str, list[int]] = {"time_to_turn": [], "time_to_stop_turning": []}
     lefts: list[bool] = []
     state, length = wander.machine.state, 0
     for _ in range(STEPS):
-        wander.step(robot)
+        alone.step()
         length += 1
         if wander.machine.state != state:
             if state in lengths:
                 lengths[state].append(length)
             if state == "time_to_turn":
-                left, right = robot.command[1:]
+                left, right = alone.robot.command[1:]
                 lefts.append(left < right)  # by (2.19): the right wheel ahead turns counter-clockwise
             state, length = wander.machine.state, 0
     return lengths["time_to_turn"], lengths["time_to_stop_turning"], lefts

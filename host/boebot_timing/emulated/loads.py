@@ -14,8 +14,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot_timing.emulated.world_access import WorldAccess
 from sim_bridge.boards import avr
-from sim_bridge.boards.board import LEVELS, Edge, Level
+from sim_bridge.boards.board import LEVELS, BoardAccess, Edge, Level
 
 CYCLES_PER_US = 16
 SLOT_CYCLES = 40_000  # 2.5 ms (tasks.def)
@@ -35,24 +36,6 @@ class Source(Protocol):
 
     def queue(self, bench: Bench, until: int) -> None:
         """Queues what it does up to that cycle; what happened up to now is known."""
-
-
-class Access(Protocol):
-    """A board as a bench uses it: BoardAccess, or whatever has these of its operations."""
-
-    @property
-    def now(self) -> int: ...
-    def advance(self, until: int) -> None: ...
-    def drive(self, pin: int, level: Level, at: int = 0) -> None: ...
-    def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None: ...
-    def output(self, pin: int) -> Level: ...
-    def send(self, data: bytes, at: int = 0) -> None: ...
-    def received(self) -> tuple[bytes, list[int]]: ...
-    def edges(self) -> NDArray[Any]: ...
-    def read_memory(self, address: int, count: int) -> bytes: ...
-    def counters(self) -> dict[str, int]: ...
-    def watchdog_log(self) -> list[tuple[int, int]]: ...
-    def close(self) -> None: ...
 
 
 class PinEdges:
@@ -81,11 +64,11 @@ class PinEdges:
 class Bench:
     """A board with an image, powered on. Time passes in slices; before each, all sources queue what they do in it."""
 
-    def __init__(self, elf: Path, access: Access | None = None) -> None:
+    def __init__(self, elf: Path, access: BoardAccess | WorldAccess | None = None) -> None:
         """`access`: to a board that runs the image, in place of a new one by itself. Raises BoardError where the image
         cannot be loaded."""
         self.elf = elf
-        self.access = avr.create(elf).access() if access is None else access
+        self.access: BoardAccess | WorldAccess = avr.create(elf).access() if access is None else access
         self.sources: list[Source] = []
         self.edges = PinEdges()
         self.after_slice: list[Callable[[], None]] = []

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from boebot.arenas import load_arena
 from boebot.description.robots import RobotDescription
 from sim_bridge.boards.avr import AvrBoard
-from sim_bridge.boards.board import Level
+from sim_bridge.boards.board import BoardMemory, EmulatedBoard, Level
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim
 
@@ -24,8 +24,8 @@ def with_all_devices(robot: RobotDescription) -> RobotDescription:
     return msgspec.structs.replace(robot, device=device)
 
 
-class WorldAccess:
-    """See `loads.Access`."""
+class WorldAccess(BoardMemory):
+    """What a bench uses of a BoardAccess."""
 
     def __init__(self, board: AvrBoard, robot: RobotDescription, seed: int) -> None:
         """Puts the board into a room, without noise."""
@@ -34,6 +34,11 @@ class WorldAccess:
         self._pins = BoardPins(self._robot)
         self._to_send: list[tuple[int, bytes]] = []
         self._edges_seen = 0
+
+    @property
+    def board(self) -> EmulatedBoard:
+        """The board itself."""
+        return self._robot.board
 
     @property
     def now(self) -> int:
@@ -50,10 +55,6 @@ class WorldAccess:
     def drive(self, pin: int, level: Level, at: int = 0) -> None:
         """Takes a pin from its part and drives it from cycle `at` on."""
         self._pins.drive(pin, int(level), at)
-
-    def output(self, pin: int) -> Level:
-        """What the firmware does to a pin now."""
-        return Level(self._pins.output(pin))
 
     def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None:
         """Drives a pin to `level` at cycle `first`, to the other level `half` cycles later, and so on."""
@@ -74,18 +75,6 @@ class WorldAccess:
         """The output edges since the last call."""
         seen, self._edges_seen = self._edges_seen, self._pins.edge_count
         return self._pins.pin_log(self._edges_seen - seen)
-
-    def read_memory(self, address: int, count: int) -> bytes:
-        """Bytes of the data space."""
-        return self._pins.read_memory(address, count)
-
-    def counters(self) -> dict[str, int]:
-        """What the board counted."""
-        return self._pins.counters()
-
-    def watchdog_log(self) -> list[tuple[int, int]]:
-        """Cycles and addresses at which its watchdog found the program."""
-        return self._pins.watchdog_log()
 
     def close(self) -> None:
         """Frees world and board."""
