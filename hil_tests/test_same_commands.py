@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 import boebot
+from boebot_course.experiments import wall
 from boebot_course.experiments.same_commands import (
     BRAINS,
-    along_walls,
+    WALLS_SECONDS,
     command_difference,
     disagreements,
     judge_walls,
@@ -33,5 +34,5 @@ def test_commands_differ_no_sooner_than_telemetry(board_url: str, name: str) -> 
 @pytest.mark.soak_on_avr
 def test_whole_runs_along_walls_are_alike(board_url: str) -> None:
     """E68's brain that its readings pull back: 60 s on both boards, step by step."""
-    measured = judge_walls([along_walls(on, seed=1) for on in ("native", board_url)])
+    measured = judge_walls([wall.lap(wall.pinger(), on, 1, wall.START, WALLS_SECONDS) for on in ("native", board_url)])
     assert [one.name for one in measured if not one.is_met] == []

@@ -26,6 +26,7 @@ from boebot_course.coverage import Coverage
 from boebot_course.experiments import exploring
 from boebot_course.experiments.exploring import explored, explorer, starts
 from boebot_course.tests.navigation_figures.tasks import errand
+from boebot_course.variants import exact_roller
 
 HALF_TURN = (-math.pi / 2, math.pi / 2)
 
@@ -131,7 +132,7 @@ def unrecorded(arena: str, start: Pose, seed: int, seconds: float) -> tuple[Expl
     """As `explored`, in half the time: the exploration, its coverage, its way (m)."""
     explore, poses = explorer(), Poses()
     brain = Brain([Odometry(), explore, poses])
-    boebot.run(brain, robot=exploring.roller(), arena=arena, pose=start, seed=seed, seconds=seconds, record=False)
+    boebot.run(brain, robot=exact_roller(), arena=arena, pose=start, seed=seed, seconds=seconds, record=False)
     coverage = Coverage(LineMap.of("exploration"))
     coverage.add_path(poses.seen, HALF_TURN, exploring.RAYS, exploring.REACH)
     return explore, coverage.share, float(np.hypot(*np.diff(np.array(poses.seen)[:, :2], axis=0).T).sum())
