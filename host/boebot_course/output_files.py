@@ -22,6 +22,7 @@ from boebot import resources
 from boebot.record.run_folder import write_whole
 from boebot.view import style
 from boebot_course.experiment import Experiment, Measured, Outcome
+from boebot_timing.plots import PLOTS
 
 HEIGHT_IN = 4.8  # of a figure, unless what draws it asks for another
 
@@ -47,7 +48,7 @@ def files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, byte
 def pictures(experiment: Experiment, outcome: Outcome, forms: dict[str, float]) -> list[bytes]:
     """The figure in those forms, "png" or "svg", with that many dots per inch."""
     found = []
-    with mpl.rc_context({**style.PLOTS, "svg.hashsalt": experiment.name}):
+    with mpl.rc_context({**PLOTS, "svg.hashsalt": experiment.name}):
         figure = Figure(figsize=(style.WIDTH_IN, HEIGHT_IN), layout="constrained")
         FigureCanvasAgg(figure)
         outcome.draw(figure)

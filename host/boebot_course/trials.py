@@ -21,7 +21,7 @@ from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.record.brain_record import BrainRecord
-from boebot.record.truth import Pose, truth_at
+from boebot.record.truth import Pose, interpolated
 from boebot.result import RunResult
 from boebot.robot import Observation, Robot
 from boebot.running.runner import run
@@ -162,4 +162,5 @@ def decisions(result: RunResult) -> BrainRecord:
 def true_pose(result: RunResult, times: Sequence[float] | Floats) -> Pose:
     """Where the robot really was at those times (s of the run)."""
     assert result.truth is not None
-    return truth_at(result.truth, np.asarray(times, dtype=np.float64) + result.clock_offset)
+    truth, at = result.truth, np.asarray(times, dtype=np.float64) + result.clock_offset
+    return interpolated(truth.time, Pose(truth.x, truth.y, truth.heading), at)

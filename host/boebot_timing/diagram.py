@@ -19,6 +19,7 @@ from boebot.view import style
 from boebot_timing.budget import Report
 from boebot_timing.costs import SLOT_BEGINS
 from boebot_timing.measured import Moment
+from boebot_timing.plots import PLOTS
 from boebot_timing.realisable import Event, Verdict
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def figure(report: Report, verdict: Verdict | None = None) -> Figure:
     events = verdict.events if verdict is not None else ()
     heights = [_LANE_IN * (len(events) + 2.5) + 0.5] if events else []
     heights.append(_SLOT_IN * report.schedule.slots_per_tick + 0.8)
-    with rc_context(style.PLOTS):
+    with rc_context(PLOTS):
         drawn = Figure(figsize=(style.WIDTH_IN, sum(heights) + _FRAME_IN), dpi=style.DPI, layout="constrained")
         FigureCanvasAgg(drawn)
         axes = drawn.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]

@@ -109,17 +109,11 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
         """See `Device`."""
         schedule, bit, tick_s = _schedule(place.devices), _bit(place), place.tick_s
         fresh = min(STALE_PERIODS * schedule.period_ticks, NEVER - 1)
-        # [detected][age in ticks] -> reading; without zones there are only 512
-        views = [
-            [
-                Infrared(detected, ticks * tick_s if ticks < NEVER else float("inf"), ticks <= fresh)
-                for ticks in range(NEVER + 1)
-            ]
-            for detected in (False, True)
-        ]
 
         def read(sample: Telemetry, _: Latest) -> Infrared:
-            return views[sample.infrared & bit != 0][sample.infrared_age]
+            ticks = sample.infrared_age
+            age = ticks * tick_s if ticks < NEVER else float("inf")
+            return Infrared(sample.infrared & bit != 0, age, ticks <= fresh)
 
         if not schedule.sweep:
             return read

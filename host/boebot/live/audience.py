@@ -6,7 +6,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, Moving
 from boebot.errors import BoebotError
@@ -142,14 +141,14 @@ class Audience:
                 if is_first:
                     self._begin_page(page)
                 else:
-                    self._send(page, _as_seen_by(page, chunk))
+                    self._send(page, chunk)
 
     def tell(self, message: Message) -> None:
         """A message for all pages; of those a page that comes later gets the newest state."""
         with self._lock:
             self._state = message.get("state", self._state)
             for page in self._pages.values():
-                self._send(page, _as_seen_by(page, message))
+                self._send(page, message)
 
     def end(self, message: Message) -> None:
         """The run has ended; pages that come later are told, too."""
@@ -174,8 +173,8 @@ class Audience:
         past[-1] = past[-1] | {"runs": [rows | {"layers": list(layers.values())} for rows, layers in newest]}
         first, *others = past
         runs = [known | {"rows": rows} for known, rows in zip(self._run["runs"], first["runs"], strict=True)]
-        begin = self._run | {"runs": runs, "moving": first["moving"]}
-        state = _as_seen_by(page, {"type": "state", "state": self._state})
+        begin = self._run | {"page": page.number, "runs": runs, "moving": first["moving"]}
+        state = {"type": "state", "state": self._state}
         page.begin(begin, [*others, state, *([] if self._end is None else [self._end])])
         self._server.wake(page)
 
@@ -195,13 +194,3 @@ def thinned(past: Iterable[Message]) -> deque[Message]:
         else:
             kept.append(chunk)
     return kept
-
-
-def _as_seen_by(page: Outbox, message: Message) -> Message:
-    """With who drives each robot by hand, who is a page's number so far, in that page's words."""
-    state: dict[str, Any] | None = message.get("state")
-    if state is None:
-        return message
-    words = {None: None, page.number: "you"}
-    robots = [robot | {"driver": words.get(robot["driver"], "another")} for robot in state["robots"]]
-    return message | {"state": state | {"robots": robots}}

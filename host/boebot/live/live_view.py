@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -33,8 +32,6 @@ from boebot.running.loop import gather_rows
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
 SHARE = 60  # of the time of a run that hurries a chunk takes this part at most
-_OUTPUT = threading.Lock()  # held while sys.stdout is put back
-RATE_S = 1.0  # over which the speed of a run is measured
 
 
 class RestartedError(BoebotError):
@@ -68,8 +65,6 @@ class LiveView:
         self._chunks: list[Chunks] = []
         self._plan = FloorPlan()
         self._due_s = 0.0  # when the next chunk is to be made
-        self._rates: deque[tuple[float, float]] = deque(maxlen=40)
-        self._told: Message = {}  # the newest state while time stood still
         self._printed = ""
         self._printing = threading.Lock()
         self._audience = Audience(self._asked, self._went, port=port)
@@ -109,7 +104,6 @@ class LiveView:
                 controls.restart = self.restart
             self._controls, self._has_ended = controls, False
         self._number += 1
-        self._rates.clear()
         self._due_s = 0.0
         if self._number == 1:
             self._show(self.url)
@@ -156,7 +150,6 @@ class LiveView:
         if not (any if self._audience.knows_run else all)([chunks.gather() for chunks in self._chunks]):
             return
         rows = [chunks.make() for chunks in self._chunks]
-        self._rates.append((time.perf_counter(), time_s))
         if not self._audience.knows_run:
             poses = [pose for pose in map(_pose_now, self._robots) if pose is not None] or [(0.0, 0.0, 0.0)]
             contents = [chunks.content for chunks in self._chunks if chunks.content is not None]
@@ -181,7 +174,6 @@ class LiveView:
         return {
             "paused": self._pace.paused,
             "speed": self._pace.speed,
-            "rate": self._rate(),
             "time": time_s,
             "touched": sum(robot.count for robot in self._robots),
             "robots": [
@@ -196,25 +188,14 @@ class LiveView:
             ],
         }
 
-    def _rate(self) -> float | None:
-        """Simulated seconds in one of the wall clock, of late."""
-        while len(self._rates) > 2 and self._rates[-1][0] - self._rates[0][0] > RATE_S:
-            self._rates.popleft()
-        if len(self._rates) < 2:
-            return None
-        (wall_0, time_0), (wall_1, time_1) = self._rates[0], self._rates[-1]
-        return round((time_1 - time_0) / max(wall_1 - wall_0, 1e-6), 3)
-
     def _show_standing(self, time_s: float) -> None:
-        """While time stands still: what has happened up to then, and the state whenever it has changed."""
+        """While time stands still: what has happened up to then, and the state."""
         if time.perf_counter() < self._due_s:
             return
         self._due_s = time.perf_counter() + EACH_S
         self._make_chunk(time_s)  # none, if there was one since
-        state = self._state(time_s)
-        if state != self._told and self._audience.knows_run:
-            self._told = state
-            self._audience.tell({"type": "state", "state": state})
+        if self._audience.knows_run:
+            self._audience.tell({"type": "state", "state": self._state(time_s)})
 
     def print(self, text: str) -> None:
         """The brain has printed something."""
@@ -253,28 +234,15 @@ class LiveView:
 
 
 class Heard:
-    """Standard output, that the live view hears, too, for as long as a `with` block lasts: of several in threads, that
-    end in any order, none stays."""
+    """Standard output that the live view hears, too."""
 
     def __init__(self, view: LiveView) -> None:
         self._own, self._view = sys.stdout, view
-        self._has_ended = False
-
-    def __enter__(self) -> None:
-        sys.stdout = self
-
-    def __exit__(self, *error: object) -> None:
-        self._has_ended = True
-        with _OUTPUT:
-            while isinstance(sys.stdout, Heard) and sys.stdout._has_ended:
-                sys.stdout = sys.stdout._own
 
     def write(self, text: str) -> int:
         """Both get it."""
-        count = self._own.write(text)
-        if not self._has_ended:
-            self._view.print(text)
-        return count
+        self._view.print(text)
+        return self._own.write(text)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._own, name)

@@ -145,5 +145,5 @@ class ServedView:
 
 def _state(time_s: float) -> dict[str, Any]:
     robot = {"parameters": {}, "latched": False, "driver": None, "pose": None, "link": None}
-    run = {"paused": False, "speed": 1.0, "rate": 1.0, "time": time_s, "touched": 0}
+    run = {"paused": False, "speed": 1.0, "time": time_s, "touched": 0}
     return run | {"robots": [robot]}

@@ -55,7 +55,7 @@ def run_viewed(
     result: Result | None = None
     while True:
         try:
-            with Heard(view):
+            with contextlib.redirect_stdout(Heard(view)):
                 result = execute(request, progress, folder, view)
         except BoebotError as error:
             if result is None:

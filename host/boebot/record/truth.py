@@ -125,11 +125,6 @@ def touch_indices(time: Floats, contact: Bools) -> NDArray[np.intp]:
     return touching[time[touching] - before > APART_S]
 
 
-def truth_at(truth: Truth, times: Floats) -> Pose:
-    """The true pose at these instants on the transport's clock, between rows by interpolation."""
-    return interpolated(truth.time, Pose(truth.x, truth.y, truth.heading), times)
-
-
 def plan_of(record: Record, arena: Arena) -> FloorPlan:
     """The arena, with its moving shapes where they were."""
     begin, end = record.span("truth")

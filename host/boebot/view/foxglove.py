@@ -38,12 +38,11 @@ from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorP
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from boebot.arenas.floor_plan import floor_plan, moving_solids
+from boebot.arenas.floor_plan import moving_solids
 from boebot.devices.laser import Laser
 from boebot.errors import brief
 from boebot.record.brain_record import each_switch, names_in, shown_in
 from boebot.record.columns import Columns, columns, events
-from boebot.record.truth import lateness, shifts
 from boebot.showing import VALUES
 from boebot.view import foxglove_scene, scene, style
 
@@ -55,7 +54,6 @@ if TYPE_CHECKING:
 
 WORLD = "world"
 FIELD = re.compile(r"\W|^(?=\d)", re.ASCII)  # what no name of a Protobuf field has
-MOVERS_AT_ONCE_S = 100.0  # of the moving shapes' ways
 SAME_S = 1e-6  # sweeps nearer in time than this are one
 
 
@@ -172,19 +170,14 @@ def _mover(number: int) -> str:
 
 def _movers(result: Run) -> Iterator[Entry]:
     """Where moving shapes are, over time."""
-    if not result.has_truth or result.world is None or not result.world.description.moving:
+    if not result.has_truth or not result.plan.moving:
         return
-    late, moved, offset_s = lateness(result.record), shifts(result.record), result.clock_offset
-    _, end_s = result.record.span("truth")
-    begin_s = offset_s
-    while begin_s < end_s:
-        until_s = min(begin_s + MOVERS_AT_ONCE_S, end_s)
-        moving = floor_plan(result.world, begin_s, until_s, late, moved).moving
-        for index, time_s in enumerate(moving[0].time[:-1].tolist()):
-            poses = [(float(one.x[index]), float(one.y[index]), float(one.heading[index])) for one in moving]
-            transforms = [_transform(time_s - offset_s, _mover(k), *pose) for k, pose in enumerate(poses)]
-            yield time_s - offset_s, "/tf", FrameTransforms(transforms=transforms)
-        begin_s = until_s
+    moving, offset_s = result.plan.moving, result.clock_offset
+    for index in np.flatnonzero(moving[0].time >= offset_s):
+        poses = [(float(one.x[index]), float(one.y[index]), float(one.heading[index])) for one in moving]
+        time_s = float(moving[0].time[index] - offset_s)
+        transforms = [_transform(time_s, _mover(k), *pose) for k, pose in enumerate(poses)]
+        yield time_s, "/tf", FrameTransforms(transforms=transforms)
 
 
 # ---- what happens at each tick ---------------------------------------------------------------------------------------

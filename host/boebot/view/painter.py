@@ -175,9 +175,8 @@ def draw_swept(axes: Axes, swept: Sequence[Swept], index: int, colour: str) -> N
     """The area that the sweep of that index covers, of each such sensor of a robot."""
     for one in swept:
         if len(one.time):
-            area = one.area(index)
-            axes.add_patch(Polygon(area, facecolor=colour, edgecolor="none", alpha=SWEPT_SHADE, zorder=1.4))
-            axes.add_patch(Polygon(area, facecolor="none", edgecolor=colour, alpha=SWEPT_EDGE, lw=0.7, zorder=1.6))
+            fill, edge = to_rgba(colour, SWEPT_SHADE), to_rgba(colour, SWEPT_EDGE)
+            axes.add_patch(Polygon(one.area(index), facecolor=fill, edgecolor=edge, lw=0.7, zorder=1.4))
 
 
 def draw_layers(axes: Axes, view: View, colour: str | None = None) -> None:

@@ -6,8 +6,6 @@ so that it survives a grey printer.
 
 from __future__ import annotations
 
-from typing import Any
-
 PAPER = "#fbfaf7"
 FLOOR = "#ffffff"
 INK = "#2e3440"
@@ -64,38 +62,6 @@ CELL = (0.05, 0.75)  # how opaque a cell of a sketched grid is: free, occupied
 
 WIDTH_IN = 8.4  # of a picture of a run; 1092 pixels
 DPI = 130
-
-PLOTS: dict[Any, Any] = {
-    "axes.axisbelow": True,
-    "axes.edgecolor": FAINT,
-    "axes.facecolor": FLOOR,
-    "axes.grid": True,
-    "axes.labelcolor": INK,
-    "axes.prop_cycle": f"cycler('color', {ROBOTS})",
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlecolor": INK,
-    "axes.titlesize": "medium",
-    "figure.constrained_layout.h_pad": 0.08,  # inches
-    "figure.constrained_layout.w_pad": 0.1,
-    "figure.facecolor": PAPER,
-    "font.family": "DejaVu Sans",  # comes with matplotlib: the same picture everywhere
-    "font.size": 10.0,
-    "grid.color": GRID,
-    "grid.linewidth": 0.8,
-    "image.cmap": PATH,
-    "legend.edgecolor": GRID,
-    "legend.framealpha": 0.9,
-    "lines.linewidth": 1.6,
-    "path.simplify_threshold": 0.2,
-    "savefig.facecolor": PAPER,
-    "text.color": INK,
-    "xtick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.color": FAINT,
-    "ytick.labelcolor": INK,
-}
-"""Settings of matplotlib for the figures of experiments, so that all look alike."""
 
 
 def paint(name: str, robot: str = END) -> str:

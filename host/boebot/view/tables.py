@@ -5,9 +5,9 @@ from __future__ import annotations
 import csv
 import heapq
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +30,6 @@ def columns(result: Run) -> dict[str, list[str]]:
 
 
 def _columns(part: Columns, names: Mapping[str, bool]) -> dict[str, list[str]]:
-    estimate, true = part.odometry, part.true_pose
     table: dict[str, list[str]] = {
         "time_s": _cells(part.time, 4),
         "tick": _cells(part.raw["tick"]),
@@ -42,18 +41,10 @@ def _columns(part: Columns, names: Mapping[str, bool]) -> dict[str, list[str]]:
     shown = shown_in(part.showing.rows(), names).at(part.time)
     table |= {f"shown_{name}": _cells(values, 6) for name, values in shown.numbers.items()}
     table |= {f"shown_{name}": texts for name, texts in shown.texts.items()}
-    if estimate is not None:
-        table |= {
-            "odometry_x_m": _cells(estimate.x, 5),
-            "odometry_y_m": _cells(estimate.y, 5),
-            "odometry_heading_rad": _cells(estimate.heading, 5),
-        }
-    if true is not None:
-        table |= {
-            "true_x_m": _cells(true.x, 5),
-            "true_y_m": _cells(true.y, 5),
-            "true_heading_rad": _cells(true.heading, 5),
-        }
+    for name, pose in (("odometry", part.odometry), ("true", part.true_pose)):
+        if pose is not None:
+            table[f"{name}_x_m"], table[f"{name}_y_m"] = _cells(pose.x, 5), _cells(pose.y, 5)
+            table[f"{name}_heading_rad"] = _cells(pose.heading, 5)
     if part.contact is not None:
         table["true_contact"] = _cells(part.contact)
     return table
@@ -61,14 +52,21 @@ def _columns(part: Columns, names: Mapping[str, bool]) -> dict[str, list[str]]:
 
 def write_run(result: Run, path: Path) -> None:
     """run.csv, part by part."""
+    names = names_in(result.record.each_row(VALUES))
+    _write(path, _rows((_columns(part, names), part.first) for part in pieces(result)))
+
+
+def _rows(tables: Iterable[tuple[dict[str, list[str]], int]]) -> Iterator[Iterable[str]]:
+    """The heading, and the rows of each table from that one on."""
+    for number, (table, first) in enumerate(tables):
+        if number == 0:
+            yield table
+        yield from islice(zip(*table.values(), strict=True), first, None)
+
+
+def _write(path: Path, rows: Iterable[Iterable[Any]]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        names = names_in(result.record.each_row(VALUES))
-        for part in pieces(result):
-            table = _columns(part, names)
-            if not part.first:
-                writer.writerow(table)
-            writer.writerows(islice(zip(*table.values(), strict=True), part.first, None))
+        csv.writer(file).writerows(rows)
 
 
 def write_bytes(result: Run, stream: str, path: Path) -> None:
@@ -90,21 +88,13 @@ def brain_columns(part: BrainRecord) -> dict[str, list[str]]:
 
 def write_steps(record: Record, names: BrainNames, path: Path) -> None:
     """brain.csv"""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        for number, part in enumerate(each_part(record, names)):
-            table = brain_columns(part)
-            if number == 0:
-                writer.writerow(table)
-            writer.writerows(zip(*table.values(), strict=True))
+    _write(path, _rows((brain_columns(part), 0) for part in each_part(record, names)))
 
 
 def write_switches(record: Record, path: Path) -> None:
     """switches.csv"""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(("time_s", "off", "on", "reason"))
-        writer.writerows((f"{one.time:.4f}", one.off, one.on, one.reason) for one in each_switch(record))
+    rows = ((f"{one.time:.4f}", one.off, one.on, one.reason) for one in each_switch(record))
+    _write(path, chain([("time_s", "off", "on", "reason")], rows))
 
 
 def write_summary(result: Run, path: Path) -> None:
@@ -120,10 +110,8 @@ def write_summary(result: Run, path: Path) -> None:
 def write_wire(result: Run, path: Path) -> None:
     """wire.csv: when which bytes of to_board.bin and to_host.bin were sent or read (transport's clock)."""
     rows = heapq.merge(*(_crossings(result, name) for name in ("to_board", "to_host")), key=lambda row: row[0])
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(("time_s", "file", "first_byte", "bytes"))
-        writer.writerows((f"{stamp:.6f}", name, first, count) for stamp, name, first, count in rows)
+    stamped = ((f"{stamp:.6f}", name, first, count) for stamp, name, first, count in rows)
+    _write(path, chain([("time_s", "file", "first_byte", "bytes")], stamped))
 
 
 def _crossings(result: Run, stream: str) -> Iterator[tuple[float, str, int, int]]:

@@ -169,7 +169,7 @@ def test_pause_step_and_speed(page: Page) -> None:
     page.click("#pause")
     wait_for(page, "state.speed === 0.5 && !state.paused")
     page.wait_for_timeout(1500)
-    assert page.evaluate("state.rate") == pytest.approx(0.5, abs=0.1)
+    assert page.evaluate("rateOfLate()[0]") == pytest.approx(0.5, abs=0.1)
     page.select_option("#speed", "1")
 
 
@@ -244,14 +244,15 @@ def test_robot_is_dragged_or_moved_by_keys(page: Page) -> None:
     page.keyboard.press("Escape")
     page.mouse.up()
     before = page.evaluate("placeOf(run)")
+    assert before[:2] == pytest.approx(goal, abs=0.02), "where it was"
     page.keyboard.press("m")
     assert page.inner_text("#event").startswith("Moving the robot: arrow keys")
-    for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp", "q", "Enter"):
+    for key in ("ArrowLeft", "ArrowLeft", "Shift+ArrowUp", "q", "Enter"):
         page.keyboard.press(key)
     wait_for(page, f"state.touched === {touched + 1}")
-    wait_for(page, f"placeOf(run)[0] > {before[0] + 0.05}")
+    wait_for(page, f"placeOf(run)[0] < {before[0] - 0.05}")
     after = page.evaluate("placeOf(run)")
-    assert after == pytest.approx([before[0] + 0.1, before[1] + 0.01, before[2] + 0.2618], abs=1e-3)
+    assert after == pytest.approx([before[0] - 0.1, before[1] + 0.01, before[2] + 0.2618], abs=1e-3)
     page.evaluate("act({ kind: 'place', x: -0.2, y: 1.05, heading: 0 })")  # an obstacle stands there
     wait_for(page, "!$('notice').hidden")
     assert "cannot stand" in page.inner_text("#notice")

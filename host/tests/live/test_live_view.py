@@ -181,15 +181,16 @@ def test_rubbish_and_floods_are_let_go_and_the_run_goes_on(endless: Run) -> None
         page = Page(stream)
         assert page.until("run")["live"]["can"] == ["drag", "hand", "pause", "restart", "speed", "step"]
         first = page.state()
-        assert page.state(lambda state: state["time"] > first["time"] + 0.5)["rate"] > 0
+        assert page.state(lambda state: state["time"] > first["time"] + 0.5)
 
 
 def test_two_pages_one_drives(endless: Run) -> None:
     with endless.stream() as one, endless.stream() as two:
         pages = Page(one), Page(two)
+        number = pages[0].until("run")["page"]
         pages[0].do("hand", left=0.4, right=0.4)
-        assert pages[0].state(lambda state: state["robots"][0]["driver"])["robots"][0]["driver"] == "you"
-        assert pages[1].state(lambda state: state["robots"][0]["driver"])["robots"][0]["driver"] == "another"
+        for page in pages:
+            assert page.state(lambda state: state["robots"][0]["driver"])["robots"][0]["driver"] == number
         pages[1].do("hand", left=-1, right=-1)
         assert "another page drives" in pages[1].until("refused")["sentence"]
         pages[0].do("release")
@@ -218,7 +219,7 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, caps
         assert later["paused"] and later["robots"][0]["parameters"]["wander.forward"] == 0.3
         page.do("hand", left=0.5, right=-0.5)
         page.say(type="resume")
-        page.state(lambda now: now["robots"][0]["driver"] == "you")
+        page.state(lambda now: now["robots"][0]["driver"])
         page.say(type="speed", speed=None)
         assert page.until("end")["ended"] == "complete"
     code, out, error = run.end()

@@ -13,7 +13,7 @@ import pytest
 import boebot
 from boebot.record import columns
 from boebot.record.overview import _Walk
-from boebot.record.truth import Pose, touch_indices, truth_at
+from boebot.record.truth import Pose, interpolated, touch_indices
 from boebot.result import RunResult
 from boebot.view import tables
 
@@ -80,7 +80,8 @@ def test_figures_are_those_of_the_whole_arrays(robot: str) -> None:
     begin, end = result.clock_offset, result.clock_offset + float(result.series.time[-1])
     inside = (truth.time >= begin) & (truth.time <= end)
     assert few.true_contacts == len(touch_indices(truth.time[inside], truth.contact[inside]))
-    assert few.true_distance == pytest.approx(truth_at(truth, result.series.time + begin).length)
+    way = interpolated(truth.time, Pose(truth.x, truth.y, truth.heading), result.series.time + begin)
+    assert few.true_distance == pytest.approx(way.length)
     assert few.columns.true_pose is not None and np.array_equal(few.columns.true_pose.x, result.true_pose.x)
 
 

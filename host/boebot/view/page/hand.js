@@ -85,16 +85,16 @@ function tellDrive() {
     "driver",
     latched
       ? "Stopped; its motors are off."
-      : driver === "you"
+      : driver === ownNumber
         ? "You drive."
-        : driver === "another"
+        : driver
           ? "Another page drives by hand."
           : "Its brain drives.",
   );
   $("driver").classList.toggle("alerted", !!latched);
   hide("arm", !latched);
   hide("release", !!latched); // one in the other's place
-  $("release").disabled = driver !== "you" || ended !== null;
+  $("release").disabled = driver !== ownNumber || ended !== null;
   $("arm").disabled = ended !== null;
 }
 
@@ -160,7 +160,7 @@ function grab(event) {
     y = backY(event.offsetY * ratio);
   const thing = canDrag() && event.button === 0 && things().find(one => isAt(one, x, y));
   if (!thing) return false;
-  const pose = placeOfThing(thing);
+  const pose = [...placeOfThing(thing)];
   grabbed = { ...thing, pose, offset: [pose[0] - x, pose[1] - y], byKeys: false, moved: false };
   return true;
 }
@@ -204,7 +204,7 @@ function pickUp() {
       ? all.findIndex(one => one.kind === grabbed.kind && one.index === grabbed.index) + 1
       : runs.indexOf(run);
   const thing = all[current % all.length];
-  grabbed = { ...thing, pose: placeOfThing(thing), byKeys: true, moved: false };
+  grabbed = { ...thing, pose: [...placeOfThing(thing)], byKeys: true, moved: false };
   say(
     "event",
     "Moving " +

@@ -3,6 +3,7 @@
 
 let socket = null;
 let live = null; // what can be done: see LiveView._live of boebot.live.live_view
+let ownNumber = 0; // of this page
 let can = new Set();
 let state = null; // how the run is now
 let ended = null; // why it has ended; null: it goes on
@@ -46,6 +47,7 @@ const act = (deed, robot = runs.indexOf(run)) => send({ type: "do", robot, deed 
 const receive = {
   run(content) {
     const chosen = run ? runs.indexOf(run) : 0;
+    ownNumber = content.page;
     live = content.live || { can: [], robots: [] };
     can = new Set(live.can);
     ended = null;
@@ -64,10 +66,6 @@ const receive = {
     spanBegin = 0;
     chooseRobot(runs.indexOf(run));
     setControls(true);
-    if (!ticking) {
-      ticking = true;
-      requestAnimationFrame(tick);
-    }
   },
   chunk(message) {
     message.runs.forEach((rows, k) => {
@@ -115,8 +113,6 @@ function endedText() {
 const TRACKS_MS = 120; // the lanes need not be drawn as often as the arena
 
 // ---- the newest moment, about a chunk behind what has come: so poses in between are known, and robots move evenly ----
-let ticking = false;
-let tickedAt = 0;
 let tracksAt = 0;
 // Simulated seconds per second of the wall clock, and seconds per chunk.
 function rateOfLate() {
@@ -124,19 +120,14 @@ function rateOfLate() {
   const [first, last] = [arrivals[0], arrivals.at(-1)];
   return [(last[1] - first[1]) / Math.max(1e-3, last[0] - first[0]), (last[1] - first[1]) / (arrivals.length - 1)];
 }
-function tick(stamp) {
-  requestAnimationFrame(tick);
-  const passed = Math.min(0.2, Math.max(0, (stamp - tickedAt) / 1000)),
-    before = now;
-  tickedAt = stamp;
-  if (!run || !run.time.length) return;
+function tellNewest(stamp, passed) {
+  const before = now;
   if (newest) now = nextMoment(passed);
   if (stamp - tracksAt > TRACKS_MS && (now !== before || !newest)) {
     tracksAt = stamp;
     tracksDirty ||= run.duration !== drawnDuration;
     tellTime();
   }
-  if (now !== before || drawAsked || tracksDirty) draw(true);
 }
 let drawnDuration = -1;
 function nextMoment(passed) {
@@ -265,11 +256,8 @@ function tellConnection(text, kind = "") {
 function tellState() {
   if (ended !== null) tellConnection(endedText(), "ended");
   else if (state) {
-    const rate = state.paused
-      ? "paused"
-      : state.rate === null
-        ? "live"
-        : "live, " + (state.rate < 9.95 ? state.rate.toFixed(1) : state.rate.toFixed(0)) + " × real time";
+    const times = rateOfLate()[0],
+      rate = state.paused ? "paused" : "live, " + times.toFixed(times < 9.95 ? 1 : 0) + " × real time";
     tellConnection(
       [rate, state.touched ? "touched: " + state.touched : ""].filter(Boolean).join("  ·  "),
       state.paused ? "paused" : "live",

@@ -1,17 +1,12 @@
 // The moment that is shown: playing, scrubbing, going from event to event, by mouse and by keys; and drawing it.
 
 let playing = false;
-let previous = null; // stamp of the last frame that was played
 let floorDirty = true;
 let drawAsked = false;
 
 // ---- drawing: each part only if it has changed ----
 function requestDraw() {
-  if (drawAsked) return;
   drawAsked = true;
-  requestAnimationFrame(() => {
-    if (drawAsked) draw();
-  });
 }
 function viewChanged() {
   floorDirty = true;
@@ -49,17 +44,20 @@ function draw(inMotion = false) {
 function setPlaying(on) {
   if (on && now >= run.duration) now = 0;
   playing = on;
-  previous = null;
   $("play").textContent = on ? "Pause" : "Play";
-  if (on) requestAnimationFrame(advance);
 }
-function advance(stamp) {
-  if (!playing) return;
-  if (previous !== null) now = Math.min(run.duration, now + ((stamp - previous) / 1000) * Number($("speed").value));
-  previous = stamp;
-  draw(now < run.duration);
-  if (now >= run.duration) setPlaying(false);
-  else requestAnimationFrame(advance);
+// Each frame: a replay that plays goes on, a live page to its newest moment.
+let tickedAt = 0;
+function tick(stamp) {
+  requestAnimationFrame(tick);
+  const passed = Math.min(0.2, Math.max(0, (stamp - tickedAt) / 1000)),
+    before = now;
+  tickedAt = stamp;
+  if (!run || !run.time.length) return;
+  if (playing) now = Math.min(run.duration, now + passed * Number($("speed").value));
+  if (playing && now >= run.duration) setPlaying(false);
+  if (pageIsLive) tellNewest(stamp, passed);
+  if (now !== before || drawAsked || tracksDirty) draw(playing || pageIsLive);
 }
 function seek(t) {
   if (pageIsLive) setNewest(false);
@@ -145,6 +143,7 @@ function start() {
       tracksChanged();
     }
   });
+  requestAnimationFrame(tick);
   if (pageIsLive) {
     listenToControls();
     listenToHand();

@@ -14,6 +14,7 @@ from boebot.navigation import LineMap
 from boebot.view import figure_file, style
 from boebot_course.tests.navigation_figures import kidnapping
 from boebot_course.tests.navigation_figures.figures import Progress, side_by_side
+from boebot_timing.plots import PLOTS
 
 COURSES = {
     "office, from a good start": ("office", False),
@@ -49,7 +50,7 @@ def medians(progress: Progress) -> Curves:
 
 def draw(curves: Curves, path: Path) -> None:
     """Into a PNG file."""
-    with mpl.rc_context(style.PLOTS):
+    with mpl.rc_context(PLOTS):
         figure = Figure(figsize=(style.WIDTH_IN, 3.4), dpi=style.DPI, layout="constrained")
         panels = figure.subplots(1, len(curves), sharex=True, sharey=True)
         for axes, (name, courses) in zip(panels, curves.items(), strict=True):
