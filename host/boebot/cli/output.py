@@ -1,4 +1,4 @@
-"""How sub-commands print: tables for people, JSON for programs, a progress bar for runs that take longer than 2 s.
+"""How sub-commands print: tables for people, JSON for programs, a progress bar for runs.
 
 All that they print goes through `line`, `say`, `print_json` or a `console`: names and errors come from files, boards
 and brains, and a control character in them would be an order to the terminal.
@@ -10,7 +10,6 @@ import contextlib
 import json
 import math
 import sys
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
     from rich.table import Table
-
-BAR_AFTER_S = 2.0
 
 
 def line(text: str = "", file: TextIO | None = None) -> None:
@@ -109,7 +106,7 @@ def print_columns(
 @contextlib.contextmanager
 def progress_bar(title: str, total: float, quiet: bool = False, unit: str = " s") -> Iterator[Progress]:
     """Gives a function to call with how much of the total is done, such as the seconds that have passed; shows a bar
-    once 2 s of wall time have gone by."""
+    meanwhile."""
     if quiet or not sys.stderr.isatty():
         yield lambda _: None
         return
@@ -124,18 +121,5 @@ def progress_bar(title: str, total: float, quiet: bool = False, unit: str = " s"
         transient=True,
     )
     task = bar.add_task(printable(title), total=None if math.isinf(total) else total)
-    begun = time.monotonic()
-    shown = False
-
-    def report(passed: float) -> None:
-        nonlocal shown
-        if not shown and time.monotonic() - begun > BAR_AFTER_S:
-            bar.start()
-            shown = True
-        bar.update(task, completed=passed)
-
-    try:
-        yield report
-    finally:
-        if shown:
-            bar.stop()
+    with bar:
+        yield lambda passed: bar.update(task, completed=passed)

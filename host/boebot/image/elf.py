@@ -18,6 +18,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from boebot.errors import AnalysisError
+from boebot.files import regular
 from boebot.image import section_of
 from boebot.image.chip import assumed_chip
 from boebot.image.source_lines import source_lines
@@ -81,9 +82,7 @@ class Image:
 def read_image(path: Path) -> Image:
     """Reads an ELF file. Raises AnalysisError when it is not a linked program for the ATmega328P, or is damaged."""
     try:
-        if path.is_fifo() or path.is_char_device():  # they have no end
-            raise OSError(0, "it is a pipe or a device, no file")
-        data = path.read_bytes()
+        data = regular(path).read_bytes()
     except OSError as error:
         raise AnalysisError(f"{path} cannot be read: {error.strerror or error}") from error
     return _read(path, data)

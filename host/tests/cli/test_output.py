@@ -57,7 +57,6 @@ def test_bars_show_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
             return True
 
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    monkeypatch.setattr(output, "BAR_AFTER_S", 0.0)
     with output.progress_bar(f"{RED} [bold]{{x}}[/]", 10) as report:
         report(5)
         report(10)
