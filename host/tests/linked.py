@@ -26,7 +26,7 @@ class Recorded(Link):
 
     def __init__(self, session: InProcess, **options: object) -> None:
         self.memory = Record()
-        super().__init__(session, self.memory.append, **options)  # type: ignore[arg-type]
+        super().__init__(session, self.memory.append, **options)
 
 
 def sent(link: Link) -> list[tuple[float, bytes]]:

@@ -70,14 +70,12 @@ class Link:
         self,
         transport: Transport,
         record: Append | None = None,
-        take_over: bool = False,
     ) -> None:
         """Nothing is sent yet: see `open`.
 
         Args:
             transport: where the board is.
             record: gets all that crosses the wire, as `Line` says.
-            take_over: take the board even if another host has it.
         """
         # in simulated time a run has to be the same each time; on a real line no session's seed may come again
         draw = random.Random(secrets.randbits(64) if transport.realtime else "link")
@@ -98,7 +96,6 @@ class Link:
             draw=draw,
             round_trips=self.clock.round_trips,
             notices=self.notices,
-            take_over=take_over,
         )
         self.telemetry = TelemetryBuffer(self.clock, counts)
         self.devices = SlowDevices(line.send, counts)

@@ -59,7 +59,6 @@ class Session:
         draw: random.Random,
         round_trips: RoundTrips,
         notices: list[str],
-        take_over: bool = False,
     ) -> None:
         """Sends nothing yet: see `open`.
 
@@ -72,7 +71,6 @@ class Session:
             draw: gives nonces.
             round_trips: on this line; questions wait for them.
             notices: gets sentences for the user.
-            take_over: take the board even if another host has it.
         """
         self.hello: messages.Hello | None = None
         self.is_open = False
@@ -84,7 +82,6 @@ class Session:
         self._draw = draw
         self._round_trips = round_trips
         self._notices = notices
-        self._take_over = take_over
         self._wanted = False
         self._refusing = False
         self._number = 0
@@ -131,7 +128,8 @@ class Session:
             while not self.is_open:
                 now = line.now()
                 if self._other_host_since is not None:
-                    self._wait_for_other_host(now)
+                    if now - self._other_host_since > self.time_out_s + _OTHER_HOST_S:  # it is still there
+                        raise TakenOverError(f"the board at {transport.name} is busy: another program drives it")
                 elif now >= search.end_s:
                     raise search.failure(self.hello, line.decoder.good, line.decoder.bad)
                 elif self.hello is None and (baud := search.next_baud(now)) is not None:
@@ -210,14 +208,6 @@ class Session:
     def _end(self) -> None:
         self.is_open = False
         self._ended()
-
-    def _wait_for_other_host(self, now_s: float) -> None:
-        """Another host has the board: takes it over if so wished, or gives up when that one is still there."""
-        assert self._other_host_since is not None
-        if self._take_over:
-            self._begin(now_s)
-        elif now_s - self._other_host_since > self.time_out_s + _OTHER_HOST_S:
-            raise TakenOverError(f"the board at {self._line.transport.name} is busy: another program drives it")
 
     def _report_baud(self, search: finding.BoardSearch) -> None:
         """The board was found at another rate than asked for."""
