@@ -94,35 +94,14 @@ class Moving:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Patch:
-    """A part of the floor with another friction coefficient."""
-
-    corners: Floats
-    grip: float
-    name: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Line:
-    """A line that is painted on the floor."""
-
-    points: Floats
-    width: float
-    is_dark: bool
-    """darker than the floor"""
-
-
-@dataclass(frozen=True, kw_only=True)
 class FloorPlan:
-    """An arena from above; `grip`: of tyres on the floor outside of all patches."""
+    """An arena from above: as it is described, what keeps robots out, and what moves.
 
-    name: str = "arena"
-    title: str = ""
+    `grip`: of tyres on the floor outside of all patches.
+    """
+
+    described: description.ArenaDescription = field(default=description.ArenaDescription("arena"), repr=False)
     solids: Sequence[Solid] = field(default=(), repr=False)
-    patches: Sequence[Patch] = field(default=(), repr=False)
-    lines: Sequence[Line] = field(default=(), repr=False)
-    lamps: Sequence[description.Light] = field(default=(), repr=False)
-    charger: description.Charger | None = None
     moving: Sequence[Moving] = field(default=(), repr=False)
     grip: float = 0.7
 
@@ -183,24 +162,9 @@ def plan_of_poses(arena: Arena, time: Floats, poses: Floats) -> FloorPlan:
     Args:
         poses: x, y (m), cosine and sine of the heading of each shape: shape (shapes, 4, times).
     """
-    described = arena.description
     return FloorPlan(
-        name=arena.name,
-        title=described.title,
+        described=arena.description,
         solids=list(_solids(arena)),
-        patches=[
-            Patch(corners=np.array(patch.corners_m), grip=patch.grip, name=patch.name) for patch in described.patch
-        ],
-        lines=[
-            Line(
-                points=np.array(line.points_m),
-                width=line.width_m,
-                is_dark=line.floor_reflectance < described.floor_reflectance,
-            )
-            for line in described.line
-        ],
-        lamps=described.light,
-        charger=described.charger,
         moving=[
             Moving(solid=solid, time=time, x=x, y=y, heading=np.unwrap(np.arctan2(sine, cosine)))
             for solid, (x, y, cosine, sine) in zip(moving_solids(arena), poses, strict=True)

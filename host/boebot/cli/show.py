@@ -13,7 +13,6 @@ import typer
 from boebot.cli import options, output
 
 if TYPE_CHECKING:
-    from boebot.arenas.description import Moving
     from boebot.arenas.floor_plan import FloorPlan, Solid
     from boebot.description.wiring import Connection
 
@@ -61,9 +60,9 @@ def show_arena(
         out = Path(f"arena-{Path(arena).stem}.png")
     picture = None if out is None else str(arena_picture.write(loaded, out))
     x, y, heading = loaded.start
-    shapes = list(_shapes(plan, loaded.description.moving))
+    shapes = list(_shapes(plan))
     size = _size(plan)
-    named = {"name": loaded.name, "title": plan.title}
+    named = {"name": loaded.name, "title": plan.described.title}
     if json:
         start = {"x_m": x, "y_m": y, "heading_rad": heading}
         reflectance = {"floor_reflectance": loaded.description.floor_reflectance}
@@ -160,25 +159,27 @@ def _size(plan: FloorPlan) -> list[float] | None:
     ]
 
 
-def _shapes(plan: FloorPlan, described_moving: Sequence[Moving]) -> Iterator[dict[str, Any]]:
+def _shapes(plan: FloorPlan) -> Iterator[dict[str, Any]]:
     """A row for each thing in the arena: kind, name, middle and size of the box about it (m), height (m), remarks."""
+    import numpy as np
+
+    described = plan.described
     for solid in plan.solids:
         yield _solid(solid.kind, solid)
-    for moving, described in zip(plan.moving, described_moving, strict=True):
-        way = f"moves: {described.path[-1].time_s:g} s, {described.repeat.replace('_', ' ')}; here at its start"
+    for moving, shape in zip(plan.moving, described.moving, strict=True):
+        way = f"moves: {shape.path[-1].time_s:g} s, {shape.repeat.replace('_', ' ')}; here at its start"
         yield _solid(f"moving {moving.solid.kind}", moving.at(0.0), way)
-    for patch in plan.patches:
-        yield _row(
-            "patch", patch.name, patch.corners.min(axis=0), patch.corners.max(axis=0), None, [f"grip {patch.grip:g}"]
-        )
-    for line in plan.lines:
-        half = line.width / 2
-        said = f"{'dark' if line.is_dark else 'bright'}, {line.width * 100:g} cm wide"
-        yield _row("line", "", line.points.min(axis=0) - half, line.points.max(axis=0) + half, None, [said])
-    for lamp in plan.lamps:
-        place = (lamp.x_m, lamp.y_m)
-        yield _row("lamp", lamp.name, place, place, lamp.height_m, [f"{lamp.power_w:g} W"])
-    if (charger := plan.charger) is not None:
+    for patch in described.patch:
+        corners = np.array(patch.corners_m)
+        yield _row("patch", patch.name, corners.min(axis=0), corners.max(axis=0), None, [f"grip {patch.grip:g}"])
+    for line in described.line:
+        points, half = np.array(line.points_m), line.width_m / 2
+        is_dark = line.floor_reflectance < described.floor_reflectance
+        said = f"{'dark' if is_dark else 'bright'}, {line.width_m * 100:g} cm wide"
+        yield _row("line", "", points.min(axis=0) - half, points.max(axis=0) + half, None, [said])
+    for lamp in described.light:
+        yield _row("lamp", lamp.name, (at := (lamp.x_m, lamp.y_m)), at, lamp.height_m, [f"{lamp.power_w:g} W"])
+    if (charger := described.charger) is not None:
         x, y, radius = charger.x_m, charger.y_m, charger.radius_m
         yield _row("charger", "", (x - radius, y - radius), (x + radius, y + radius), None, [])
 

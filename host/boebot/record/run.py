@@ -289,7 +289,7 @@ class Run:
             "brain": self.brain,
             "robot": self.robot.name,
             "board": self.board,
-            "arena": self.arena if self.world is None else self.plan.name,
+            "arena": self.arena if self.world is None else self.plan.described.name,
             "seed": self.seed,
             "without": ", ".join(self.without) or None,
             "imperfections": ", ".join(f"{name} {size:.10g}" for name, size in self.imperfections.items()) or None,

@@ -41,7 +41,7 @@ def write(arena: Arena, path: Path) -> Path:
     draw_arena(axes, plan)
     _draw_start(axes, arena)
     frame(axes, low, high)
-    title = printable(f"{plan.name}: {plan.title}" if plan.title else plan.name)
+    title = printable(f"{arena.name}: {arena.description.title}" if arena.description.title else arena.name)
     axes.set_title(title, fontsize=12, color=style.INK, parse_math=False)
     return figure_file.save(figure, path, title)
 

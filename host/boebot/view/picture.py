@@ -133,7 +133,7 @@ def _draw_marks(axes: Axes, few: Overview) -> None:
 
 
 def _title(result: Run, view: scene.View) -> str:
-    where = f" in {view.plan.name}" if view.known else ""
+    where = f" in {view.plan.described.name}" if view.known else ""
     return result.title + where
 
 

@@ -172,9 +172,9 @@ def plan_bounds(plan: FloorPlan, places: Sequence[tuple[float, float]]) -> tuple
     corners = [corner for solid in solids for corner in solid.box]
     if not plan.outlines:
         corners += [np.array(place) for place in places]
-        corners += [point for patch in plan.patches for point in patch.corners]
-        corners += [point for line in plan.lines for point in line.points]
-        corners += [np.array((lamp.x_m, lamp.y_m)) for lamp in plan.lamps]
+        corners += [np.array(point) for patch in plan.described.patch for point in patch.corners_m]
+        corners += [np.array(point) for line in plan.described.line for point in line.points_m]
+        corners += [np.array((lamp.x_m, lamp.y_m)) for lamp in plan.described.light]
         corners += [point for moving in plan.moving for point in np.column_stack((moving.x, moving.y))]
     points = np.array(corners)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -251,16 +251,16 @@ def arena_items(plan: FloorPlan) -> list[Item]:
         items.append(Item(outline.points.tolist(), fill="floor", closed=True, layer=0.2))
         edge = Item(outline.points.tolist(), ink="edge", closed=True, width=2.8, layer=2.0, height=_height(outline))
         items.append(edge._replace(dashes=(4.0, 1.5)) if outline.is_low else edge)
-    for patch in plan.patches:
-        corners = patch.corners.tolist()
+    for patch in plan.described.patch:
+        corners = list(patch.corners_m)
         colour = "rough" if patch.grip > plan.grip else "smooth"
         items.append(Item(corners, ink="faint", fill=colour, closed=True, width=0.5, dashes=(1.0, 1.65), layer=0.6))
-        middle = ((patch.corners.min(axis=0) + patch.corners.max(axis=0)) / 2).tolist()
+        middle = ((np.min(corners, axis=0) + np.max(corners, axis=0)) / 2).tolist()
         items.append(Item([middle], text=f"grip {patch.grip:g}", layer=WORDS))
-    for line in plan.lines:
-        colour = "paint-dark" if line.is_dark else "paint-bright"
-        items.append(Item(line.points.tolist(), ink=colour, wide_m=line.width, layer=0.65))
-    if (charger := plan.charger) is not None:
+    for line in plan.described.line:
+        colour = "paint-dark" if line.floor_reflectance < plan.described.floor_reflectance else "paint-bright"
+        items.append(Item(list(line.points_m), ink=colour, wide_m=line.width_m, layer=0.65))
+    if (charger := plan.described.charger) is not None:
         there = (charger.x_m, charger.y_m)
         disc = circle(there, charger.radius_m)
         items.append(Item(disc, ink="charger", fill="charger", closed=True, width=1.2, alpha=0.35, layer=0.7))
@@ -268,7 +268,7 @@ def arena_items(plan: FloorPlan) -> list[Item]:
     for solid in plan.obstacles:
         items.append(solid_item(solid))
         items += _remarks(solid, plan)
-    for lamp in plan.lamps:
+    for lamp in plan.described.light:
         star = _star((lamp.x_m, lamp.y_m))
         items.append(
             Item(star, ink="edge", fill="lamp", closed=True, width=0.8, layer=4.5, height=lamp.height_m, says="lamp")

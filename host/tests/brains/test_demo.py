@@ -55,8 +55,8 @@ def test_it_charges_on_the_station_and_leaves_it_full(result: RunResult, record:
     """Charging begins to count in the argument 1.5 - 3.2 E + 1.9 once the voltage has risen: then the robot's centre is
     on the station (the noticing lags its arrival). It leaves when the argument falls below 0.5: E = 2.9 / 3.2 or more,
     for the utility lags behind, and E grows meanwhile."""
-    assert result.true_pose is not None and result.truth is not None and result.truth.plan.charger is not None
-    charger, low = result.truth.plan.charger, variable(record, "low")
+    assert result.true_pose is not None and result.truth is not None and result.truth.plan.described.charger is not None
+    charger, low = result.truth.plan.described.charger, variable(record, "low")
     behavior = [record.names.behaviors[index] for index in record.motor]
     on = np.flatnonzero(variable(record, "charging") > 0)
     assert len(on)

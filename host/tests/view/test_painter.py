@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 import boebot
-from boebot.arenas.description import Charger, Light
-from boebot.arenas.floor_plan import FloorPlan, Moving, Patch, Solid
+from boebot.arenas.description import ArenaDescription, Charger, Light, Patch
+from boebot.arenas.floor_plan import FloorPlan, Moving, Solid
 from boebot.description.outlines import way_out
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.record import overview
@@ -45,7 +45,12 @@ def obstacle(x: float, y: float, **said: float) -> Solid:
 
 WAY = {"time": np.array([0.0, 1.0]), "x": np.array([1.0, 3.0]), "y": np.zeros(2), "heading": np.zeros(2)}
 PLAN = FloorPlan(
-    name="plan",
+    described=ArenaDescription(
+        "plan",
+        patch=[Patch(corners_m=box(-1, -1).tolist(), grip=0.9), Patch(corners_m=box(0, -1).tolist(), grip=0.2)],
+        light=[Light(x_m=1.0, y_m=-1.0, height_m=0.1, power_w=1.0)],
+        charger=Charger(x_m=1.6, y_m=-1.6, radius_m=0.2),
+    ),
     solids=[
         Solid(kind="outline", points=box(0, 0, 4.0)),
         obstacle(-1, 1),
@@ -54,9 +59,6 @@ PLAN = FloorPlan(
         Solid(kind="disc", points=np.array([(-1.0, 0.0)]), radius=0.2),
         Solid(kind="wall", points=np.array([(0.0, -0.3), (0.0, 0.3)])),
     ],
-    patches=[Patch(corners=box(-1, -1), grip=0.9), Patch(corners=box(0, -1), grip=0.2)],
-    lamps=[Light(x_m=1.0, y_m=-1.0, height_m=0.1, power_w=1.0)],
-    charger=Charger(x_m=1.6, y_m=-1.6, radius_m=0.2),
     moving=[Moving(solid=Solid(kind="disc", points=np.zeros((1, 2)), radius=0.15), **WAY)],
 )
 # where, and what colour is there; off the middle, where a word may stand
@@ -149,7 +151,7 @@ def run_of(robot: str, monkeypatch: pytest.MonkeyPatch, plan: FloorPlan | None =
 def test_open_field_is_framed_by_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """An obstacle is no floor, and one far away does not make the path small."""
     far = obstacle(50, 50)
-    result = run_of("shieldbot", monkeypatch, FloorPlan(name="open", solids=[far]))
+    result = run_of("shieldbot", monkeypatch, FloorPlan(solids=[far]))
     view = scene.view(result)
     low, high = scene.bounds(view)
     assert view.plan.outlines == [] and view.plan.obstacles == [far]

@@ -20,7 +20,7 @@ from sim_bridge.vehicle import Vehicle, arsim
 
 def test_showcase_is_told_whole() -> None:
     plan = floor_plan(load_arena("showcase"), 0.0, 10.0)
-    assert plan.name == "showcase" and plan.title == "one of everything"
+    assert plan.described.name == "showcase" and plan.described.title == "one of everything"
     assert [(solid.kind, solid.name) for solid in plan.solids] == [
         ("outline", "walls"),
         ("obstacle", "crate"),
@@ -34,9 +34,15 @@ def test_showcase_is_told_whole() -> None:
     assert by_name["cushion"].is_dull and by_name["cushion"].infrared_reflectance == 0.1
     assert np.array_equal(by_name["screen"].points, [(0.6, 0.4), (0.9, 0.7), (0.9, 1.1)])
     assert np.array_equal(by_name["pillar"].points, [(0.2, -0.9)]) and by_name["pillar"].radius == 0.15
-    assert [(patch.name, patch.grip) for patch in plan.patches] == [("carpet", 0.9), ("wet floor", 0.15)]
-    assert [(lamp.x_m, lamp.y_m, lamp.power_w, lamp.height_m) for lamp in plan.lamps] == [(1.6, 1.2, 5.0, 0.25)]
-    assert plan.charger is not None and (plan.charger.x_m, plan.charger.y_m, plan.charger.radius_m) == (1.6, 1.2, 0.15)
+    assert [(patch.name, patch.grip) for patch in plan.described.patch] == [("carpet", 0.9), ("wet floor", 0.15)]
+    assert [(lamp.x_m, lamp.y_m, lamp.power_w, lamp.height_m) for lamp in plan.described.light] == [
+        (1.6, 1.2, 5.0, 0.25)
+    ]
+    assert plan.described.charger is not None and (
+        plan.described.charger.x_m,
+        plan.described.charger.y_m,
+        plan.described.charger.radius_m,
+    ) == (1.6, 1.2, 0.15)
     assert [moving.solid.name for moving in plan.moving] == ["cart", "ball"]
 
 
@@ -69,7 +75,7 @@ def test_a_run_tells_of_its_own_time() -> None:
         truth = session.truth()
     finally:
         session.close()
-    assert truth is not None and truth.plan.name == "showcase"
+    assert truth is not None and truth.plan.described.name == "showcase"
     cart = truth.plan.moving[0]
     assert (cart.time[0], cart.time[-1]) == (truth.time[0], truth.time[-1]) and cart.time[-1] > 1.9
     vehicle = direct_world([BoardRequest(robot=load_robot("arsim"), arena="showcase")]).sessions[0]
