@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from boebot.result import RunResult, read_run
-from tools import resident
+from tools.tests import resident
 
 SECONDS = 24 * 3600
 GROWTH_MB = 1_000  # packed rows of a day

@@ -16,7 +16,7 @@ from boebot_timing.emulated.measure import measure
 from boebot_timing.loads import LOADS
 from boebot_timing.realisable import judge
 from sim_bridge.boards.emulated import avr_image
-from tools.timing_promises import PROMISES
+from tools.tests.timing_promises import PROMISES
 
 DOCS = Path(__file__).resolve().parents[1]
 

@@ -16,8 +16,8 @@ import boebot.brain
 import boebot.cognition
 import boebot.navigation
 from boebot.robot import Observation
-from tools import imports
-from tools.imports import c_code, imported, included
+from tools.tests import imports
+from tools.tests.imports import c_code, imported, included
 
 ROOT = Path(__file__).resolve().parents[2]
 

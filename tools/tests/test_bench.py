@@ -14,10 +14,10 @@ import pytest
 from rich.console import Console
 
 import copied_process
-from tools.printed import MARK
 from tools.tests.bench import report, scene
 from tools.tests.bench.__main__ import figures
 from tools.tests.bench.figures import Figure, Peer, figure
+from tools.tests.printed import MARK
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -17,7 +17,7 @@ from collections.abc import Hashable
 
 from avr_timing.bounds import loop_counts
 from avr_timing.flow.constants import Known
-from avr_timing.flow.loops import IrreducibleError, Loop, loops_of
+from avr_timing.flow.loops import Loop, with_parents
 from avr_timing.flow.paths import Mark
 from avr_timing.program import Block, Function, Program
 from boebot.errors import AnalysisError
@@ -29,13 +29,13 @@ _Found = list[tuple[Loop[int], Loop[int] | None]]
 def marks_of(program: Program, function: Function, known: Known) -> _Marks:
     """The bounds of a function's loops, by the blocks whose runs they count, in the context of `known`."""
     result = _said(program, function)
-    whole = _with_parents(function)
+    whole = with_parents(function)
     for loop, parent in whole:
         if parent is not None:
             _move_out(result, loop, parent)
     for loop, _ in whole:
         _drop_unrolled(result, loop, function)
-    loops = _with_parents(known.function)
+    loops = with_parents(known.function)
     _drop_others(result, whole, loops)
     for loop, _ in loops:
         shown = loop_counts.by_counter(loop, known, program)
@@ -57,7 +57,7 @@ def check_sleep(program: Program, function: Function, marks: _Marks) -> None:
     """Raises AnalysisError where a function waits asleep, which takes no time that its instructions show, but for a
     loop of which the source says the time."""
     timed: set[int] = set()
-    for loop, _ in _with_parents(function):
+    for loop, _ in with_parents(function):
         rows = [mark for node in _own(loop) for mark in marks.get(node, ())]
         if rows and all(mark.passes is None for mark in rows):
             timed |= _own(loop)
@@ -141,15 +141,3 @@ def _move_out(marks: _Marks, loop: Loop[int], parent: Loop[int]) -> None:
 def _own(loop: Loop[int]) -> frozenset[int]:
     """Its blocks that are in no loop within it."""
     return loop.nodes.difference(*(inner.nodes for inner in loop.inner))
-
-
-def _with_parents(function: Function) -> _Found:
-    """All loops, inner ones before those around them."""
-
-    try:
-        found: _Found = [(loop, None) for loop in loops_of(function)]
-    except IrreducibleError:
-        return []  # the search for the longest walk refuses it
-    for loop, _ in found:  # grows meanwhile
-        found += [(inner, loop) for inner in loop.inner]
-    return found[::-1]

@@ -8,9 +8,9 @@ count are bounded by the language: a count of at least the width of the operand 
 
 from __future__ import annotations
 
-from avr_timing.flow.constants import Known, State, once_round
+from avr_timing.flow.constants import KEEPS, Known, State, once_round
 from avr_timing.flow.loops import Loop
-from avr_timing.flow.registers import KEEPS_FLAGS, before, is_call, written
+from avr_timing.flow.registers import is_call, written
 from avr_timing.program import Block, Function, Instruction, Program
 
 MOST = 1 << 16  # passes that are tried; longer loops have other counters
@@ -53,8 +53,9 @@ def _executed(loop: Loop[int], function: Function, state: State) -> int | None:
 
 def _entering(loop: Loop[int], known: Known) -> list[State]:
     """What is known on each way into a loop."""
-    blocks = before(known.function)[loop.header]
-    found = [known.behind(block, loop.header) for block in blocks if block.start not in loop.nodes]
+    blocks = [block for start, block in known.function.blocks.items() if start not in loop.nodes]
+    entering = [block for block in blocks if any(edge.to == loop.header for edge in block.edges)]
+    found = [known.behind(block, loop.header) for block in entering]
     if loop.header == known.function.entry:
         found.append(State(dict(known.context)))
     return found
@@ -111,7 +112,7 @@ def _counting(
     """The counter whose flags the branch behind these instructions reads: its registers, the lowest first, which need
     not stand together; its step; its instructions."""
     rest = list(instructions)
-    while rest and rest[-1].mnemonic in KEEPS_FLAGS:
+    while rest and rest[-1].mnemonic in KEEPS:
         rest.pop()
     if not rest:
         return None

@@ -124,6 +124,18 @@ def loops_of(function: Function) -> list[Loop[int]]:
     return natural_loops(reverse_postorder(function.entry, successors), successors)
 
 
+def with_parents(function: Function) -> list[tuple[Loop[int], Loop[int] | None]]:
+    """All loops, each with the one around it, inner ones before those around them; none where a cycle has two entries:
+    the search for the longest walk refuses it."""
+    try:
+        found: list[tuple[Loop[int], Loop[int] | None]] = [(loop, None) for loop in loops_of(function)]
+    except IrreducibleError:
+        return []
+    for loop, _ in found:  # grows meanwhile
+        found += [(inner, loop) for inner in loop.inner]
+    return found[::-1]
+
+
 def _dominates(one: N, other: N, above: Mapping[N, N]) -> bool:
     while other != one:
         if above[other] == other:

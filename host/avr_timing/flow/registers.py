@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from avr_timing.program import Block, Function, Instruction
+from avr_timing.program import Instruction
 
 
 def _words(text: str) -> frozenset[str]:
@@ -24,7 +24,6 @@ NO_RESULT = _words(
 )
 PRODUCTS = _words("mul muls mulsu fmul fmuls fmulsu")
 PAIRS = _words("movw adiw sbiw")
-KEEPS_FLAGS = _words("movw mov ldi ld ldd lds lpm st std sts in out push pop nop sbi cbi sei cli swap bld jmp rjmp")
 
 
 def written(instruction: Instruction) -> frozenset[int]:
@@ -58,12 +57,3 @@ def is_call(instruction: Instruction) -> bool:
 def pushes_only(instruction: Instruction) -> bool:
     """`rcall .+0`: calls the next instruction, so that two bytes are on the stack."""
     return instruction.mnemonic == "rcall" and instruction.operands[0] == instruction.address + instruction.size
-
-
-def before(function: Function) -> dict[int, list[Block]]:
-    """Of each block, those that lead to it."""
-    result: dict[int, list[Block]] = {start: [] for start in function.blocks}
-    for block in function.blocks.values():
-        for to in dict.fromkeys(edge.to for edge in block.edges):
-            result[to].append(block)
-    return result

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from avr_timing.bounds.stack import VECTORS
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.flow.flag import SREG, Flag, State, after
-from avr_timing.flow.loops import IrreducibleError, loops_of
+from avr_timing.flow.loops import with_parents
 from avr_timing.flow.paths import Graph, Way, longest
 from avr_timing.program import REFUSED, Block, Function, Instruction, Program
 from boebot.errors import AnalysisError
@@ -209,17 +209,8 @@ class InterruptsOff:
 
     def _around(self, entry: int, start: Node) -> dict[int, frozenset[int]]:
         """The loops that a node is in the midst of: headers and blocks."""
-        try:
-            loops = loops_of(self.worst_case.inside(entry).function)
-        except IrreducibleError:  # the search for the longest walk refuses it
-            return {}
-        found = {}
-        while loops:
-            loop = loops.pop()
-            loops += loop.inner
-            if start[0] in loop.nodes and start[:2] != (loop.header, 0):
-                found[loop.header] = loop.nodes
-        return found
+        loops = (loop for loop, _ in with_parents(self.worst_case.inside(entry).function))
+        return {loop.header: loop.nodes for loop in loops if start[0] in loop.nodes and start[:2] != (loop.header, 0)}
 
     def flow(self, entry: int, on: bool) -> Flow:
         """All ways through a function that is called with interrupts on or off."""

@@ -23,7 +23,7 @@ from boebot_timing.realisable import CLOCK_HZ, judge
 from command import boebot as command
 from sim_bridge.boards.emulated import avr_image
 from tools import avr_program
-from tools.timing_promises import PROMISES, reports
+from tools.tests.timing_promises import PROMISES, reports
 
 pytestmark = pytest.mark.emulated
 

@@ -19,9 +19,9 @@ from typing import Any
 
 from rich.console import Console
 
-from tools.printed import reprint
 from tools.tests.bench import report
 from tools.tests.bench.figures import FIGURES, Figure
+from tools.tests.printed import reprint
 
 RESULT = Path("build/bench.json")
 MODULES = (

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
-from tools import resident
+from tools.tests import resident
 from tools.tests.bench.figures import figure
 
 SECONDS = 300.0

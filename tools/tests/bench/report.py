@@ -12,8 +12,8 @@ from typing import Any
 
 from rich.table import Table
 
-from tools.printed import markdown
 from tools.tests.bench.figures import Figure
+from tools.tests.printed import markdown
 
 COLUMNS = ("name", "value", "spread", "unit", "target", "peers and how many times as much")
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from rich.console import Console
 
 from boebot.errors import BoebotError
-from tools.printed import reprint
 from tools.tests.calibration import board, emulator, table
+from tools.tests.printed import reprint
 
 
 def measured(port: str | None, flash: bool) -> table.Calibration:

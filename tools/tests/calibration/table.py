@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from rich.table import Table
 
-from tools.printed import markdown
 from tools.tests.calibration.emulator import Measured
 from tools.tests.calibration.program import ROWS
 from tools.tests.calibration.rows import Row
+from tools.tests.printed import markdown
 
 COLUMNS = ("what", "unit", "data sheet", "where", "emulator", "board")
 NOT_CONNECTED, NOT_REACHED = "not connected", "–"

@@ -17,11 +17,11 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from tools.printed import markdown, reprint
 from tools.tests.error_rates import library, wrong_bits
 from tools.tests.error_rates.image import Image
 from tools.tests.error_rates.statistics import RATE_ALLOWED, trials_needed
 from tools.tests.error_rates.streams import FAULTS, Tally, pooled, through_c
+from tools.tests.printed import markdown, reprint
 
 RECEIVERS = ("bits", "c", "image")
 PART = 100_000  # rounds in one go; of the image IMAGE_PART
