@@ -149,11 +149,11 @@ def test_noise_on_a_pseudo_terminal_ends_with_its_client(tmp_path: Path) -> None
     server = Server(tmp_path, "--pty")
     try:
         port = os.open(server.url, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        sent, end = 0, time.monotonic() + 0.4
-        while time.monotonic() < end:
+        sent, end = 0, time.monotonic() + 30.0
+        while sent < 100_000 and time.monotonic() < end:
             with contextlib.suppress(BlockingIOError):
                 sent += os.write(port, NOISE[:4096])
-        assert sent > 70_000, "more than the line carries in that time"
+        assert sent >= 100_000, "as fast as it takes it: the line carries 50,000 in a second"
         os.close(port)
         server.said(f"process {os.getpid()} ({Path('/proc/self/comm').read_text().strip()}) went")
         drives(server)

@@ -154,5 +154,5 @@ def test_one_that_does_not_end_is_left_to_itself_in_time() -> None:
     thread.resume()
     begun = time.monotonic()
     thread.end(within_s=0.2)
-    assert 0.15 < time.monotonic() - begun < 5 and not thread.is_done
+    assert 0.15 < time.monotonic() - begun < 60 and not thread.is_done
     release.set()

