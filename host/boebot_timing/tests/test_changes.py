@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avr_timing.interrupts.response import Piece, Schedule, Source, load
-from boebot import resources
 from boebot_timing import budget, loads
 from boebot_timing.changes import most_waiting
 from boebot_timing.costs import Costs
@@ -145,17 +144,6 @@ def test_no_simulation_holds_more(
 
 
 # ---- of an image ---------------------------------------------------------------------------------------------------
-
-
-def test_ring_that_is_too_small_is_a_fault() -> None:
-    """64 places, of which one stays free."""
-    report = budget.prove(resources.folder("images") / "shieldbot-quad.elf", LOADS["figures"])
-    as_dict = report.as_dict()
-    assert (as_dict["changes_ring_needed_entries"], as_dict["changes_ring_entries"]) == (report.changes, 64 - 1)
-    assert report.changes is not None and 0 < report.changes < 63
-    full = replace(report, changes_held=report.changes - 1)
-    sentence = f"ring of changes: {report.changes} may wait to be worked off; it holds {report.changes - 1}"
-    assert [fault for fault in full.faults if fault not in report.faults] == [sentence]
 
 
 def test_image_without_encoders_has_no_changes(tmp_path: Path) -> None:

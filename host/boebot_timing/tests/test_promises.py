@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,20 @@ def test_every_row_was_measured(judged: dict[str, Report]) -> None:
     basic = judged["figures"].path.endswith("basic.elf")
     missing = {row.name for one in judged.values() for row in one.rows if row.emulator is None}
     assert missing == {"watchdog"} | ({"changes"} if basic else set())
+
+
+def test_ring_that_is_too_small_is_a_fault(judged: dict[str, Report]) -> None:
+    """64 places, of which one stays free."""
+    report = judged["figures"]
+    if report.changes is None:
+        assert report.path.endswith("basic.elf"), "no pin of port C is watched"
+        return
+    as_dict = report.as_dict()
+    assert (as_dict["changes_ring_needed_entries"], as_dict["changes_ring_entries"]) == (report.changes, 64 - 1)
+    assert 0 < report.changes < 63
+    full = replace(report, changes_held=report.changes - 1)
+    sentence = f"ring of changes: {report.changes} may wait to be worked off; it holds {report.changes - 1}"
+    assert [fault for fault in full.faults if fault not in report.faults] == [sentence]
 
 
 def test_promises_are_kept(judged: dict[str, Report]) -> None:
