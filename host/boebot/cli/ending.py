@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from boebot.cli import output
-from boebot.errors import BoebotError, InterruptedRunError, brief
+from boebot.errors import BoebotError, InterruptedRunError
 from boebot.record import figures
 from boebot.record.reading import CutError
 from boebot.record.record_file import NoRecordError
@@ -39,9 +39,6 @@ ZERO = (
 )
 """Figures that should be zero, or nothing."""
 
-HEADER = ("robot", "true distance (m)", "true contacts", "whisker touches", "brain")
-
-
 _EARLY = "early, by an error"
 
 
@@ -66,30 +63,24 @@ def print_run(result: Result, wanted: Detail, *, is_said: bool = False) -> None:
     """The table of a run, if any time has passed in it. JSON is for the caller, who knows its files. `is_said`: the
     sentence of the error that has ended it follows, and is not printed here."""
     robots = result.robots
-    several = len(robots) > 1
-    if is_said and not any(robot.run_time for robot in robots):
+    if wanted not in (Detail.FEW, Detail.ALL) or (is_said and not any(robot.run_time for robot in robots)):
         return
-    if wanted is Detail.ALL:
-        for number, robot in enumerate(robots, 1):
-            if several:
-                output.line(f"robot {number}")
+    for number, robot in enumerate(robots, 1):
+        if len(robots) > 1:
+            output.line(f"robot {number}")
+        if wanted is Detail.ALL:
             output.print_table(robot.table() | ({"ended": _EARLY} if is_said else {}))
             output.line("by this computer's clock:")
             output.print_table(robot.wall_clock())
-    elif wanted is Detail.FEW:
-        if several:
-            rows = (_row(number, robot) for number, robot in enumerate(robots, 1))
-            output.print_columns(HEADER, rows, numbers=(1,), whole=1)
-        else:
-            table = output.empty_table(show_header=False)
-            table.add_column(style="dim")
-            table.add_column(overflow="fold")
-            for name, words in five_rows(robots[0]):
-                table.add_row(name, _EARLY if is_said and name == "ended" else words)
-            output.console().print(table)
-        for number, robot in enumerate(robots, 1):
-            if wrong := not_zero(robot):
-                output.line(f"{f'robot {number}: ' if several else ''}{', '.join(wrong)}; expected 0 of each")
+            continue
+        table = output.empty_table(show_header=False)
+        table.add_column(style="dim")
+        table.add_column(overflow="fold")
+        for name, words in five_rows(robot):
+            table.add_row(name, _EARLY if is_said and name == "ended" else words)
+        output.console().print(table)
+        if wrong := not_zero(robot):
+            output.line(f"{', '.join(wrong)}; expected 0 of each")
 
 
 def five_rows(result: RunResult) -> list[tuple[str, str]]:
@@ -137,15 +128,6 @@ def _brain(result: RunResult, table: dict[str, Any]) -> str:
         parts.append(figures.counted(record.behavior_switches, "switch", "switches"))
         parts.append(", ".join(f"{name} {share:.0%}" for name, share in shares.items() if share > 0))
     return "; ".join(parts)
-
-
-def _row(number: int, robot: RunResult) -> tuple[str, ...]:
-    """Of one of several, under `HEADER`."""
-    table = robot.table()
-    ended = (brief(robot.error) or ["complete"])[0]
-    values = (table[name] for name in ("true_distance_m", "true_contacts", "whisker_touches"))
-    cells = ("-" if value is None else figures.text(value) for value in values)
-    return f"{number}  {robot.robot.name}", *cells, f"{robot.brain}, {ended}{_changed(table)}"
 
 
 # ---- its end ---------------------------------------------------------------------------------------------------------

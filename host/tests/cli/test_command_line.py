@@ -191,11 +191,12 @@ def test_mistakes_end_in_one_sentence(
         assert err.startswith("boebot: ") and err.count("\n") == 1
 
 
-def test_several_robots_print_a_row_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_several_robots_print_a_table_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     arguments = ("run", "wander", "--robots", "3", "--seconds", "1", "--arena", "room")
     code, out, err = boebot(capsys, *arguments, "--out", str(tmp_path))
     assert (code, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines() if "shieldbot" in line] == ["1", "2", "3"]
+    assert [line for line in out.splitlines() if line.startswith("robot")] == ["robot 1", "robot 2", "robot 3"]
+    assert out.count("wander on shieldbot (native) in room, seed") == 3
     assert f"files in {tmp_path}: record.mcap, run.png, replay.html, robot-1/, robot-2/, robot-3/" in out
     code, out, _ = boebot(capsys, *arguments, "--json")
     values = json.loads(out)
