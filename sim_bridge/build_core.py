@@ -16,8 +16,8 @@ from cffi import FFI
 
 # What headers cannot say in a form that cffi reads.
 BEFORE = """
-typedef struct part_kind part_kind;
-typedef struct sensor_kind sensor_kind;
+typedef struct { ...; } part_kind;
+typedef struct { ...; } sensor_kind;
 """
 AFTER = """
 static const double WHISKER_HEIGHT_M, SUPPLY_NOMINAL_V;

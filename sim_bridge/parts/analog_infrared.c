@@ -28,5 +28,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(analog_infrared), .noise = 66, .pins = 1, .init = init};
-const part_kind *const analog_infrared_kind = &KIND;
+const part_kind analog_infrared_kind = {.size = sizeof(analog_infrared), .noise = 66, .pins = 1, .init = init};

@@ -15,7 +15,7 @@ typedef struct {
 
 /* python: begin */
 /* Parameters: sharp_infrared_parameters. Pin: an analog one. */
-extern const part_kind *const analog_infrared_kind;
+extern const part_kind analog_infrared_kind;
 /* python: end */
 
 #endif

@@ -78,5 +78,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(buzzer), .noise = 86, .pins = 1, .init = init};
-const part_kind *const buzzer_kind = &KIND;
+const part_kind buzzer_kind = {.size = sizeof(buzzer), .noise = 86, .pins = 1, .init = init};

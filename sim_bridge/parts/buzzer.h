@@ -23,7 +23,7 @@ typedef struct {
 
 /* python: begin */
 /* Without parameters. Pin: the signal. */
-extern const part_kind *const buzzer_kind;
+extern const part_kind buzzer_kind;
 /* python: end */
 
 #endif

@@ -53,12 +53,9 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
 
 static const part_operations OPERATIONS = {.edge = edge};
 
-int capacitor_init(capacitor *self, const part_place *place, uint8_t pin, const capacitor_parameters *parameters,
-                   capacitor_decay decay_time) {
-  if (!(parameters->charge_s >= 0.0)) return -1;
-  if (!(parameters->threshold_v > 0.0 && parameters->threshold_v < BOARD_NOMINAL_VOLTS)) return -1;
+void capacitor_init(capacitor *self, const part_place *place, uint8_t pin, const capacitor_parameters *parameters,
+                    capacitor_decay decay_time) {
   part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS | PART_DRIVES}, 1);
   self->parameters = *parameters;
   self->decay_time = decay_time;
-  return 0;
 }

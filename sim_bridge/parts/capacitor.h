@@ -31,8 +31,8 @@ struct capacitor {
   double decay_per_s; /* volts that the decay under way takes per second */
 };
 
-/* A part that begins with a capacitor, at that pin. Returns 0, or -1 for bad parameters. */
-int capacitor_init(capacitor *self, const part_place *place, uint8_t pin, const capacitor_parameters *parameters,
-                   capacitor_decay decay_time);
+/* A part that begins with a capacitor, at that pin. */
+void capacitor_init(capacitor *self, const part_place *place, uint8_t pin, const capacitor_parameters *parameters,
+                    capacitor_decay decay_time);
 
 #endif

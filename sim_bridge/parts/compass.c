@@ -161,11 +161,8 @@ static const part_operations OPERATIONS = {.edge = two_wire_edge, .step = step};
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   compass *self = (compass *)base;
   const hmc5883l_parameters *p = parameters;
-  const double fields = p->horizontal_gauss + p->down_gauss;
-  if (compass_check(&p->field) != 0 || !isfinite(fields) || p->horizontal_gauss < 0.0) return -1;
-  if (two_wire_init(&self->bus, &OPERATIONS, place, pins) != 0) return -1;
+  if (two_wire_init(&self->bus, &OPERATIONS, place, pins, &self->device) != 0) return -1;
   self->device = (two_wire_device){.op = &CHIP, .address = COMPASS_ADDRESS};
-  two_wire_attach(&self->bus, &self->device);
   self->parameters = *p;
   self->registers[CONFIGURATION_A] = 0x10;
   self->registers[CONFIGURATION_B] = 0x20;
@@ -175,5 +172,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(compass), .noise = 61, .pins = 2, .init = init};
-const part_kind *const compass_kind = &KIND;
+const part_kind compass_kind = {.size = sizeof(compass), .noise = 61, .pins = 2, .init = init};

@@ -38,7 +38,7 @@ typedef struct {
 
 /* python: begin */
 /* Parameters: hmc5883l_parameters. Pins: SDA and SCL. */
-extern const part_kind *const compass_kind;
+extern const part_kind compass_kind;
 /* python: end */
 
 #endif

@@ -83,5 +83,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(encoder), .noise = 11, .pins = 2, .init = init};
-const part_kind *const encoder_kind = &KIND;
+const part_kind encoder_kind = {.size = sizeof(encoder), .noise = 11, .pins = 2, .init = init};

@@ -36,7 +36,7 @@ typedef struct {
 
 /* python: begin */
 /* At a wheel; parameters: encoder_parameters. Pins: channels A and B, or PART_NO_PIN. */
-extern const part_kind *const encoder_kind;
+extern const part_kind encoder_kind;
 /* python: end */
 
 #endif

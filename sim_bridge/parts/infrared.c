@@ -112,5 +112,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(infrared), .noise = 31, .pins = 2, .init = init};
-const part_kind *const infrared_kind = &KIND;
+const part_kind infrared_kind = {.size = sizeof(infrared), .noise = 31, .pins = 2, .init = init};

@@ -41,7 +41,7 @@ typedef struct {
 
 /* python: begin */
 /* Parameters: infrared_pair_parameters. Pins: LED and receiver. */
-extern const part_kind *const infrared_kind;
+extern const part_kind infrared_kind;
 /* python: end */
 
 /* The pair that this part is, or NULL. */

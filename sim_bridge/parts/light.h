@@ -14,7 +14,7 @@ typedef struct {
 } light_sensor_parameters;
 
 /* Parameters: light_sensor_parameters. Pin: the capacitor. */
-extern const part_kind *const light_kind;
+extern const part_kind light_kind;
 /* python: end */
 
 #endif

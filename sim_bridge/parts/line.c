@@ -1,8 +1,6 @@
 /* line.c: see line.h. */
 #include "line.h"
 
-#include <math.h>
-
 typedef struct {
   capacitor capacitor;
   double decay_s;
@@ -19,10 +17,9 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   line_part *self = (line_part *)base;
   const line_part_parameters *p = parameters;
   if (reflectance_init(&self->sensor, &p->floor) != 0) return -1;
-  if (!(p->decay_s > 0.0 && isfinite(p->decay_s))) return -1;
   self->decay_s = p->decay_s;
-  return capacitor_init(&self->capacitor, place, pins[0], &p->capacitor, decay_time);
+  capacitor_init(&self->capacitor, place, pins[0], &p->capacitor, decay_time);
+  return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(line_part), .noise = 96, .pins = 1, .init = init};
-const part_kind *const line_kind = &KIND;
+const part_kind line_kind = {.size = sizeof(line_part), .noise = 96, .pins = 1, .init = init};

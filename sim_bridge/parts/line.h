@@ -14,7 +14,7 @@ typedef struct {
 } line_part_parameters;
 
 /* Parameters: line_part_parameters. Pin: the capacitor. */
-extern const part_kind *const line_kind;
+extern const part_kind line_kind;
 /* python: end */
 
 #endif

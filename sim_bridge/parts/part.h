@@ -126,6 +126,20 @@ void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
 /* Pulls its plug out (1) or puts it in again (0). */
 void part_unplug(part *self, int unplugged);
 
+/* Pulses at a pin that a part hears. */
+typedef struct {
+  uint8_t high;
+  uint64_t rise; /* of the last pulse */
+} part_pulse;
+
+/* The board does `level` to the pin. 1: a pulse has ended. */
+static inline int part_pulse_ends(part_pulse *self, uint64_t cycle, uint8_t level) {
+  const uint8_t before = self->high;
+  self->high = level == BOARD_HIGH;
+  if (self->high && !before) self->rise = cycle;
+  return before && !self->high;
+}
+
 /* End of the world's step under way. */
 static inline uint64_t part_step_end(const part *self) { return self->chassis->since + self->chassis->step_cycles; }
 

@@ -34,15 +34,9 @@ static void answer(ping *self, uint64_t cycle, uint8_t pin) {
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   ping *self = (ping *)base;
-  const uint8_t high = level == BOARD_HIGH;
-  if (high == self->high) return;
-  self->high = high;
-  if (high) {
-    self->rise = cycle;
-    return;
-  }
-  const uint64_t width = cycle - self->rise;
-  if (width < TRIGGER_CYCLES || width > TRIGGER_MAXIMUM || self->rise < self->ready) return;
+  if (!part_pulse_ends(&self->pulse, cycle, level)) return;
+  const uint64_t width = cycle - self->pulse.rise;
+  if (width < TRIGGER_CYCLES || width > TRIGGER_MAXIMUM || self->pulse.rise < self->ready) return;
   answer(self, cycle, pin);
 }
 
@@ -61,5 +55,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(ping), .noise = 41, .pins = 1, .init = init};
-const part_kind *const ping_kind = &KIND;
+const part_kind ping_kind = {.size = sizeof(ping), .noise = 41, .pins = 1, .init = init};

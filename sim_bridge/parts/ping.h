@@ -15,8 +15,7 @@ typedef struct {
   part part;
   beam_parameters mount;
   sonar sonar;
-  uint8_t high;
-  uint64_t rise;
+  part_pulse pulse;
   uint64_t ready;      /* triggers before this cycle are not heard */
   int64_t answer;      /* length of every echo pulse, cycles; PING_ANSWER_WORLD, PING_ANSWER_NONE: no pulse at all */
   double distance;     /* of the last reading, m; -1: none */
@@ -26,7 +25,7 @@ typedef struct {
 
 /* python: begin */
 /* Parameters: sonar_parameters. Pin: the signal. */
-extern const part_kind *const ping_kind;
+extern const part_kind ping_kind;
 /* python: end */
 
 /* The Ping that this part is, or NULL. */

@@ -3,14 +3,8 @@
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   servo *self = (servo *)base;
-  const uint8_t high = level == BOARD_HIGH;
-  if (high == self->high) return;
-  self->high = high;
-  if (high) {
-    self->rise = cycle;
-    return;
-  }
-  const double width = (double)(cycle - self->rise) * (1e6 / BOARD_CLOCK_HZ);
+  if (!part_pulse_ends(&self->pulse, cycle, level)) return;
+  const double width = (double)(cycle - self->pulse.rise) * (1e6 / BOARD_CLOCK_HZ);
   if (servo_motor_pulse(&self->parameters, &self->motor, width)) self->pulses++;
 }
 
@@ -34,5 +28,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(servo), .noise = 1, .pins = 1, .init = init};
-const part_kind *const servo_kind = &KIND;
+const part_kind servo_kind = {.size = sizeof(servo), .noise = 1, .pins = 1, .init = init};

@@ -13,14 +13,13 @@ typedef struct {
   int side; /* 0 left, 1 right */
   servo_motor_parameters parameters;
   servo_motor motor;
-  uint8_t high;
-  uint64_t rise;
+  part_pulse pulse;
   uint32_t pulses; /* since power-on */
 } servo;
 
 /* python: begin */
 /* Turns a wheel; parameters: servo_motor_parameters. Pin: the signal. */
-extern const part_kind *const servo_kind;
+extern const part_kind servo_kind;
 /* python: end */
 
 #endif

@@ -5,14 +5,8 @@
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   turret *self = (turret *)base;
-  const uint8_t high = level == BOARD_HIGH;
-  if (high == self->high) return;
-  self->high = high;
-  if (high) {
-    self->rise = cycle;
-    return;
-  }
-  const double width = (double)(cycle - self->rise) * (1e6 / BOARD_CLOCK_HZ);
+  if (!part_pulse_ends(&self->pulse, cycle, level)) return;
+  const double width = (double)(cycle - self->pulse.rise) * (1e6 / BOARD_CLOCK_HZ);
   motor_position_pulse(&self->parameters, &self->motor, width);
 }
 
@@ -39,5 +33,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(turret), .noise = 76, .pins = 1, .init = init};
-const part_kind *const turret_kind = &KIND;
+const part_kind turret_kind = {.size = sizeof(turret), .noise = 76, .pins = 1, .init = init};

@@ -14,8 +14,7 @@ typedef struct {
   motor_position_parameters parameters;
   motor_position motor;
   part_turret carried; /* what mounted parts look at */
-  uint8_t high;
-  uint64_t rise;
+  part_pulse pulse;
 } turret;
 
 /* python: begin */
@@ -25,7 +24,7 @@ typedef struct {
 } turret_parameters;
 
 /* It looks straight ahead at first. Parameters: turret_parameters. Pin: the signal. */
-extern const part_kind *const turret_kind;
+extern const part_kind turret_kind;
 /* python: end */
 
 /* The turret that this part is, or NULL. */

@@ -7,29 +7,21 @@ static void pull(two_wire *self, int low, uint64_t cycle) {
   part_drive(&self->part, cycle + TWO_WIRE_DELAY_CYCLES, self->sda_pin, low ? BOARD_LOW : BOARD_HIGH);
 }
 
-static two_wire_device *find(const two_wire *self, uint8_t address) {
-  for (int i = 0; i < self->count; i++) {
-    if (self->devices[i]->address == address) return self->devices[i];
-  }
-  return NULL;
-}
-
 /* The eight bits of an address are in: 1 if somebody has it. */
 static int take_address(two_wire *self, uint64_t cycle) {
-  self->spoken_to = find(self, self->shift >> 1);
-  if (self->spoken_to == NULL) {
+  if (self->device->address != self->shift >> 1) {
     self->phase = TWO_WIRE_IGNORE;
     return 0;
   }
   const int reading = self->shift & 1;
   self->phase = reading ? TWO_WIRE_READ : TWO_WIRE_WRITE;
-  self->spoken_to->op->begin(self->spoken_to, reading, cycle);
+  self->device->op->begin(self->device, reading, cycle);
   return 1;
 }
 
 static void next_byte(two_wire *self, uint64_t cycle) {
   self->bit = 0;
-  self->shift = self->phase == TWO_WIRE_READ ? self->spoken_to->op->read(self->spoken_to, cycle) : 0;
+  self->shift = self->phase == TWO_WIRE_READ ? self->device->op->read(self->device, cycle) : 0;
 }
 
 /* SCL has fallen: the next bit is put on SDA, whose clock is to come. */
@@ -39,7 +31,7 @@ static void on_fall(two_wire *self, uint64_t cycle) {
     return;
   }
   if (self->bit == 8 && self->phase == TWO_WIRE_WRITE) {
-    pull(self, self->spoken_to->op->write(self->spoken_to, self->shift, cycle), cycle);
+    pull(self, self->device->op->write(self->device, self->shift, cycle), cycle);
     return;
   }
   if (self->bit == 9) next_byte(self, cycle);
@@ -81,16 +73,12 @@ void two_wire_edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
 }
 
-int two_wire_attach(two_wire *self, two_wire_device *device) {
-  if (self->count == TWO_WIRE_DEVICES || find(self, device->address) != NULL) return -1;
-  self->devices[self->count++] = device;
-  return 0;
-}
-
-int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins) {
+int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins,
+                  two_wire_device *device) {
   const uint8_t role = PART_HEARS | PART_DRIVES | PART_PULLED_UP;
   if (pins[0] == pins[1] || pins[1] == PART_NO_PIN) return -1;
   part_join(&self->part, op, place, (part_pin[]){{pins[0], role}, {pins[1], role}}, 2);
+  self->device = device;
   self->sda_pin = pins[0];
   self->scl_pin = pins[1];
   self->sda = self->scl = 1;

@@ -1,8 +1,8 @@
-/* two_wire.h: the two-wire bus (I2C) with its devices, seen from the devices' side: START, bytes, acknowledgement, STOP.
+/* two_wire.h: the two-wire bus (I2C) with a device, seen from the device's side: START, bytes, acknowledgement, STOP.
  *
  * Both lines are open drain with pull-ups on the devices' boards. The bus watches the board's edges and moves SDA
  * TWO_WIRE_DELAY_CYCLES after SCL has fallen, at once, inside the board's run. A device never stretches the clock. The line
- * logic is here; a chip (compass.h) is a `two_wire_device` behind it, and several may share one bus.
+ * logic is here; a chip (compass.h) is the `two_wire_device` behind it.
  */
 #ifndef PART_TWO_WIRE_H
 #define PART_TWO_WIRE_H
@@ -10,7 +10,6 @@
 #include "part.h"
 
 #define TWO_WIRE_DELAY_CYCLES 5u /* 0.3 us, as the specification of the bus asks for */
-#define TWO_WIRE_DEVICES 4
 
 typedef struct two_wire_device two_wire_device;
 
@@ -33,22 +32,18 @@ typedef enum { TWO_WIRE_IDLE, TWO_WIRE_ADDRESS, TWO_WIRE_WRITE, TWO_WIRE_READ, T
 
 typedef struct {
   part part;
-  two_wire_device *devices[TWO_WIRE_DEVICES];
-  int count;
+  two_wire_device *device;
   uint8_t sda_pin, scl_pin;
   uint8_t sda, scl; /* what the board does: 0 low, 1 let go */
   uint8_t pulling;  /* 1: a device holds SDA low */
   two_wire_phase phase;
-  two_wire_device *spoken_to;
   uint8_t bit; /* of the byte under way: 0..7 data, 8 acknowledgement */
   uint8_t shift;
 } two_wire;
 
 /* A part that begins with a bus, whose `edge` is two_wire_edge; pins: SDA, SCL. Returns 0, or -1: no such pins. */
-int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins);
+int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins,
+                  two_wire_device *device);
 void two_wire_edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level);
-
-/* Returns 0, or -1 if the bus is full or the address taken. */
-int two_wire_attach(two_wire *self, two_wire_device *device);
 
 #endif

@@ -45,5 +45,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-static const part_kind KIND = {.size = sizeof(whisker), .noise = 21, .pins = 1, .init = init};
-const part_kind *const whisker_kind = &KIND;
+const part_kind whisker_kind = {.size = sizeof(whisker), .noise = 21, .pins = 1, .init = init};

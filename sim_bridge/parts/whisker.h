@@ -24,7 +24,7 @@ typedef struct {
 
 /* python: begin */
 /* Parameters: whisker_parameters. Pin: the switch. */
-extern const part_kind *const whisker_kind;
+extern const part_kind whisker_kind;
 /* python: end */
 
 #endif

@@ -11,7 +11,7 @@ from boebot.devices.device import pin_number
 from boebot.devices.ping import PingSensor
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError
-from sim_bridge._core import lib
+from sim_bridge._core import ffi, lib
 from sim_bridge.devices.battery import battery_parameters
 from sim_bridge.devices.catalogue import At, Part, part_of
 from sim_bridge.robots import imperfections
@@ -51,7 +51,7 @@ def join(robot: Any, description: robots.RobotDescription, draw: imperfections.D
 def add_part(robot: Any, part: Part) -> int:
     """Joins a part to a robot of a simulation; a status of loop.h."""
     pins = [pin if pin == NO_PIN else pin_number(pin) for pin in part.pins]
-    status: int = lib.robot_add_part(robot, getattr(lib, part.kind), part.number, pins, part.parameters)
+    status: int = lib.robot_add_part(robot, ffi.addressof(getattr(lib, part.kind)), part.number, pins, part.parameters)
     return status
 
 

@@ -44,9 +44,9 @@ static int add_sensors(vehicle_model *m) {
   for (int side = 0; side < 2; side++) {
     const infrared_proximity_parameters ir = {
         .beam = side ? right : look, .range = 1.0, .c1 = 0.03, .c2 = 0.1, .sigma = 0.01};
-    bad |= vehicle_model_add(m, infrared_proximity_sensor, &ir, 0.0) < 0;
+    bad |= vehicle_model_add(m, &infrared_proximity_sensor, &ir, 0.0) < 0;
   }
-  bad |= vehicle_model_add(m, sonar_sensor,
+  bad |= vehicle_model_add(m, &sonar_sensor,
                            &(sonar_parameters){.beam = look,
                                                .range_minimum = 0.02,
                                                .range_maximum = 3.0,
@@ -55,21 +55,21 @@ static int add_sensors(vehicle_model *m) {
                                                .grazing_cosine = 0.7},
                            0.05) < 0;
   bad |=
-      vehicle_model_add(m, sharp_infrared_sensor,
+      vehicle_model_add(m, &sharp_infrared_sensor,
                         &(sharp_infrared_parameters){
                             .beam = look, .reach = 1.5, .sigma = 0.01, .gain = 1.0, .period = 0.0383, .late = 0.0076},
                         0.0) < 0;
-  bad |= vehicle_model_add(m, laser_sensor,
+  bad |= vehicle_model_add(m, &laser_sensor,
                            &(laser_parameters){.first = -2.0, .step = 0.05, .rays = 80, .range = 4.0, .sigma = 0.01},
                            0.1) < 0;
-  bad |= vehicle_model_add(m, compass_sensor, &(compass_parameters){.sigma = 0.05, .iron_x = 0.1, .current_y = 0.01},
+  bad |= vehicle_model_add(m, &compass_sensor, &(compass_parameters){.sigma = 0.05, .iron_x = 0.1, .current_y = 0.01},
                            0.0) < 0;
-  bad |= vehicle_model_add(m, accelerometer_sensor, &(accelerometer_parameters){1e-3, 10.0, 0.1, 20.0, 0.05, 0.1},
+  bad |= vehicle_model_add(m, &accelerometer_sensor, &(accelerometer_parameters){1e-3, 10.0, 0.1, 20.0, 0.05, 0.1},
                            0.0) < 0;
   bad |= vehicle_model_add(
-             m, phototransistor_sensor,
+             m, &phototransistor_sensor,
              &(phototransistor_parameters){.near_distance = 0.05, .gain = 1.0, .sigma = 0.01, .height = 0.09}, 0.0) < 0;
-  bad |= vehicle_model_add(m, odometer_sensor,
+  bad |= vehicle_model_add(m, &odometer_sensor,
                            &(odometer_parameters){.half_track = 0.05,
                                                   .wheel_radius = 0.033,
                                                   .factor_left = 1.01,
@@ -80,14 +80,14 @@ static int add_sensors(vehicle_model *m) {
                                                   .slip_share = 1.0},
                            0.0) < 0;
   /* As the notes have them: what a row reads at once. */
-  bad |= vehicle_model_add(m, compass_sensor, &(compass_parameters){.sigma = 0.05, .bias = 0.2}, 0.0) < 0;
+  bad |= vehicle_model_add(m, &compass_sensor, &(compass_parameters){.sigma = 0.05, .bias = 0.2}, 0.0) < 0;
   bad |=
       vehicle_model_add(
-          m, odometer_sensor,
+          m, &odometer_sensor,
           &(odometer_parameters){
               .half_track = 0.05, .wheel_radius = 0.033, .factor_left = 1.01, .factor_right = 0.99, .sigma_step = 1e-4},
           0.0) < 0;
-  bad |= vehicle_model_add(m, touch_sensor, &(touch_parameters){0.05, 0.03, 0.12, 0.06}, 0.0) < 0;
+  bad |= vehicle_model_add(m, &touch_sensor, &(touch_parameters){0.05, 0.03, 0.12, 0.06}, 0.0) < 0;
   return bad;
 }
 
@@ -130,7 +130,7 @@ static vehicle_model *model(int servos, const double notes[BODY]) {
   const charge_parameters gauge = {.empty = 5.0, .full = 7.75, .sigma = 0.005};
   const energy_parameters energy = {0.002, 0.004, 0.1};
   const int bad = add_sensors(m) || vehicle_model_battery(m, &energy) != VEHICLE_OK ||
-                  vehicle_model_add(m, charge_sensor, &gauge, 0.0) < 0 || driven != VEHICLE_OK;
+                  vehicle_model_add(m, &charge_sensor, &gauge, 0.0) < 0 || driven != VEHICLE_OK;
   vehicle_model_switch(m, 1, 0);
   if (bad) printf("bad model\n");
   return m;

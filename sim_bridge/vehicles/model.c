@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 vehicle_model *vehicle_model_new(const body_parameters *parameters, double dt) {
   vehicle_model *self = calloc(1, sizeof *self);
@@ -102,7 +103,8 @@ int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *
   self->sensors = sensors;
   void *made = calloc(1, kind->size);
   if (made == NULL) return VEHICLE_NO_MEMORY;
-  const size_t readings = kind->make(made, parameters);
+  if (kind->make == NULL) memcpy(made, parameters, kind->size);
+  const size_t readings = kind->make == NULL ? kind->readings : kind->make(made, parameters);
   if (readings == 0) {
     free(made);
     return VEHICLE_BAD_NUMBER;

@@ -205,7 +205,7 @@ class VehicleModel:
         if wrong := what.wrong(values_of(given)):
             raise RobotError(f"{where}: {wrong}")
         time = number(where, "period", period, NOT_NEGATIVE)
-        first = lib.vehicle_model_add(self._open, getattr(lib, f"{what.name}_sensor"), given, time)
+        first = lib.vehicle_model_add(self._open, ffi.addressof(getattr(lib, f"{what.name}_sensor")), given, time)
         if first == lib.VEHICLE_NO_MEMORY:
             raise RobotError(f"{where}: there is no memory for it")
         if first < 0:

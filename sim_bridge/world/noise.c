@@ -4,6 +4,8 @@
 
 #include "geometry/numbers.h"
 
+#define UNITS UINT64_C(0x756e697473000000) /* the seed of units' peculiarities: no run has it by chance */
+
 /* Edge 1 is where the tail begins, edge 0 is so wide that layer 0, a rectangle and the tail, has the area of the others.
  * The test of this table derives it anew. */
 /* clang-format off */
@@ -83,6 +85,10 @@ uint64_t noise_bits(uint64_t seed, uint32_t robot, uint32_t device, uint64_t ste
 
 double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step) {
   return noise_normal_of(noise_bits(seed, robot, device, step));
+}
+
+double unit_normal(uint64_t serial, uint32_t kind, uint32_t what) {
+  return serial == 0 ? 0.0 : noise_normal(UNITS ^ serial, kind, what, 0);
 }
 
 /* Beyond edge 1: the tail's exponential bound, thinned out to the bell. */

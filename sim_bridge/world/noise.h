@@ -22,6 +22,10 @@ uint64_t noise_bits(uint64_t seed, uint32_t robot, uint32_t device, uint64_t ste
 /* Normal with mean 0 and standard deviation 1. */
 double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step);
 
+/* What a device keeps from run to run, keyed by its serial number and not by the run's seed: standard normal draw of quantity
+ * `what` of unit `serial` of a kind of device; 0 for serial 0, the nominal unit. */
+double unit_normal(uint64_t serial, uint32_t kind, uint32_t what);
+
 /* Layer i of the bell is as wide as edge i, [0, 256]; edge 256 is 0. */
 double noise_layer_edge(int i);
 

@@ -106,14 +106,6 @@ def test_charging_again_takes_back_the_decay() -> None:
     assert lows == pytest.approx([4 * MS + 1500 * US], abs=20)
 
 
-def test_bad_light_parameters_are_refused() -> None:
-    for name, value in (("decay_s", 0.0), ("threshold_v", 6.0), ("maximum_s", math.nan)):
-        parameters = light_model.light_parameters(LIGHT_SENSOR, 0, OFF)
-        setattr(parameters if hasattr(parameters, name) else parameters.capacitor, name, value)
-        robot = scripted()
-        assert add_part(robot.robot.handle, Part("light_kind", 0, [LIGHT], parameters)) == lib.SIM_BAD_ARGUMENT
-
-
 # ---- analog infrared -------------------------------------------------------------------------------------
 
 

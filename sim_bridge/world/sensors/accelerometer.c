@@ -21,11 +21,6 @@ double accelerometer_read(const accelerometer_parameters *p, const accelerometer
 
 /* ---- of a robot without a board ----------------------------------------------------------------------------------- */
 
-static size_t make(void *self, const void *parameters) {
-  *(accelerometer_parameters *)self = *(const accelerometer_parameters *)parameters;
-  return 1;
-}
-
 static void step(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise) {
   accelerometer_step(self, (accelerometer_state *)memory->numbers, s->acceleration, s->dt);
 }
@@ -34,6 +29,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = accelerometer_read(self, (const accelerometer_state *)memory->numbers, noise);
 }
 
-static const sensor_kind KIND = {
-    .noise = 6, .size = sizeof(accelerometer_parameters), .numbers = 2, .make = make, .step = step, .read = read};
-const sensor_kind *const accelerometer_sensor = &KIND;
+const sensor_kind accelerometer_sensor = {
+    .noise = 6, .size = sizeof(accelerometer_parameters), .numbers = 2, .readings = 1, .step = step, .read = read};

@@ -29,7 +29,7 @@ void accelerometer_step(const accelerometer_parameters *self, accelerometer_stat
 /* k z / m with bias and noise, m/s^2. */
 double accelerometer_read(const accelerometer_parameters *self, const accelerometer_state *state, noise_source *noise);
 
-extern const sensor_kind *const accelerometer_sensor;
+extern const sensor_kind accelerometer_sensor;
 /* python: end */
 
 #endif

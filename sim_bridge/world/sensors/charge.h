@@ -11,7 +11,7 @@ typedef struct {
   double sigma;       /* V; 0: no noise */
 } charge_parameters;
 
-extern const sensor_kind *const charge_sensor;
+extern const sensor_kind charge_sensor;
 /* python: end */
 
 #endif

@@ -17,9 +17,6 @@ typedef struct {
   double current_x, current_y; /* the same for each ampere of motor current; 0: none */
 } compass_parameters;
 
-/* 0, or -1: a number is not finite, or sigma negative. */
-int compass_check(const compass_parameters *parameters);
-
 /* The field in the body's frame, x forward, y left, in parts of the earth's horizontal field, which points along the
  * world's x axis; `current` in A is the sum of the motors'. */
 void compass_field(const compass_parameters *self, const viewpoint *from, double current, double *x, double *y);
@@ -27,7 +24,7 @@ void compass_field(const compass_parameters *self, const viewpoint *from, double
 /* Heading, rad in (-pi, pi]. */
 double compass_read(const compass_parameters *self, const viewpoint *from, double current, noise_source *noise);
 
-extern const sensor_kind *const compass_sensor;
+extern const sensor_kind compass_sensor;
 /* python: end */
 
 #endif

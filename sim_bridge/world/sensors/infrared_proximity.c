@@ -52,5 +52,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = infrared_proximity_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {.noise = 1, .size = sizeof(infrared_proximity), .make = make, .read = read};
-const sensor_kind *const infrared_proximity_sensor = &KIND;
+const sensor_kind infrared_proximity_sensor = {
+    .noise = 1, .size = sizeof(infrared_proximity), .make = make, .read = read};

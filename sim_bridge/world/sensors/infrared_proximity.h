@@ -30,7 +30,7 @@ int infrared_proximity_init(infrared_proximity *self, const infrared_proximity_p
 /* S in [0, 1]. */
 double infrared_proximity_read(const infrared_proximity *self, const viewpoint *from, noise_source *noise);
 
-extern const sensor_kind *const infrared_proximity_sensor;
+extern const sensor_kind infrared_proximity_sensor;
 /* python: end */
 
 #endif

@@ -71,6 +71,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   laser_scan(memory->work, &s->from, noise, readings);
 }
 
-static const sensor_kind KIND = {
+const sensor_kind laser_sensor = {
     .noise = 4, .size = sizeof(laser_parameters), .make = make, .work = work, .free_work = free_work, .read = read};
-const sensor_kind *const laser_sensor = &KIND;

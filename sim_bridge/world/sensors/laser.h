@@ -31,7 +31,7 @@ void laser_destroy(laser *self);
 /* One scan into `distances`, as many as there are rays. */
 void laser_scan(laser *self, const viewpoint *from, noise_source *noise, double *distances);
 
-extern const sensor_kind *const laser_sensor;
+extern const sensor_kind laser_sensor;
 /* python: end */
 
 #endif

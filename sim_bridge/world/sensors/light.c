@@ -50,5 +50,4 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = phototransistor_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {.noise = 7, .size = sizeof(phototransistor), .make = make, .read = read};
-const sensor_kind *const phototransistor_sensor = &KIND;
+const sensor_kind phototransistor_sensor = {.noise = 7, .size = sizeof(phototransistor), .make = make, .read = read};

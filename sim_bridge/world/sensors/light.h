@@ -31,7 +31,7 @@ double phototransistor_read(const phototransistor *self, const viewpoint *from, 
 /* Time of the capacitor's decay, s: `scale` s at L = 1, never above `maximum`. */
 double phototransistor_decay_time(double irradiance, double scale, double maximum);
 
-extern const sensor_kind *const phototransistor_sensor;
+extern const sensor_kind phototransistor_sensor;
 /* python: end */
 
 #endif

@@ -39,5 +39,4 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = reflectance_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {.noise = 12, .size = sizeof(reflectance), .make = make, .read = read};
-const sensor_kind *const reflectance_sensor = &KIND;
+const sensor_kind reflectance_sensor = {.noise = 12, .size = sizeof(reflectance), .make = make, .read = read};

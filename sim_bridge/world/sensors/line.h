@@ -26,7 +26,7 @@ int reflectance_init(reflectance *self, const reflectance_parameters *parameters
 /* Share of the light that comes back, above 0. */
 double reflectance_read(const reflectance *self, const viewpoint *from, noise_source *noise);
 
-extern const sensor_kind *const reflectance_sensor;
+extern const sensor_kind reflectance_sensor;
 /* python: end */
 
 #endif

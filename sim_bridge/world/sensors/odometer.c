@@ -57,11 +57,6 @@ void odometer_step(const odometer_parameters *p, odometer_state *s, double wheel
 
 /* ---- of a robot without a board ----------------------------------------------------------------------------------- */
 
-static size_t make(void *self, const void *parameters) {
-  *(odometer_parameters *)self = *(const odometer_parameters *)parameters;
-  return 3;
-}
-
 static void start(const void *self, sensor_memory *memory, const sensing *s) {
   const body_state *b = &s->body->state;
   odometer_calibrate((odometer_state *)memory->numbers, b->x, b->y, b->heading, b->wheel_left, b->wheel_right);
@@ -79,11 +74,10 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   readings[2] = state->heading;
 }
 
-static const sensor_kind KIND = {.noise = 8,
-                                 .size = sizeof(odometer_parameters),
-                                 .numbers = 8,
-                                 .make = make,
-                                 .start = start,
-                                 .step = step,
-                                 .read = read};
-const sensor_kind *const odometer_sensor = &KIND;
+const sensor_kind odometer_sensor = {.noise = 8,
+                                     .size = sizeof(odometer_parameters),
+                                     .numbers = 8,
+                                     .readings = 3,
+                                     .start = start,
+                                     .step = step,
+                                     .read = read};

@@ -42,7 +42,7 @@ void odometer_advance(const odometer_parameters *self, odometer_state *state, do
 void odometer_step(const odometer_parameters *self, odometer_state *state, double wheel_left, double wheel_right,
                    double dt, noise_source *noise);
 
-extern const sensor_kind *const odometer_sensor;
+extern const sensor_kind odometer_sensor;
 /* python: end */
 
 #endif

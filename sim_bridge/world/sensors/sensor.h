@@ -36,8 +36,10 @@ typedef struct sensor_kind {
   size_t size;    /* bytes of a made sensor */
   size_t numbers; /* that it keeps */
 
+  size_t readings; /* that it gives, where it is its parameters; else `make` says */
+
   /* Makes it of parameters within the ranges of its file in sim_bridge/devices, which the caller has checked; returns
-   * how many readings it gives, or 0: they do not fit together. */
+   * how many readings it gives, or 0: they do not fit together. NULL: it is a copy of them. */
   size_t (*make)(void *self, const void *parameters);
 
   /* NULL where there is nothing to do. */

@@ -58,5 +58,5 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = sharp_infrared_read(self, (sharp_infrared_state *)memory->numbers, &s->from, s->time, noise);
 }
 
-static const sensor_kind KIND = {.noise = 2, .size = sizeof(sharp_infrared), .numbers = 4, .make = make, .read = read};
-const sensor_kind *const sharp_infrared_sensor = &KIND;
+const sensor_kind sharp_infrared_sensor = {
+    .noise = 2, .size = sizeof(sharp_infrared), .numbers = 4, .make = make, .read = read};

@@ -40,7 +40,7 @@ double sharp_infrared_volts(double distance);
 double sharp_infrared_read(const sharp_infrared *self, sharp_infrared_state *state, const viewpoint *from, double time,
                            noise_source *noise);
 
-extern const sensor_kind *const sharp_infrared_sensor;
+extern const sensor_kind sharp_infrared_sensor;
 /* python: end */
 
 #endif

@@ -68,5 +68,4 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = sonar_read(self, &s->from, noise);
 }
 
-static const sensor_kind KIND = {.noise = 3, .size = sizeof(sonar), .make = make, .read = read};
-const sensor_kind *const sonar_sensor = &KIND;
+const sensor_kind sonar_sensor = {.noise = 3, .size = sizeof(sonar), .make = make, .read = read};

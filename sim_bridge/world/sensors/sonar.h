@@ -43,7 +43,7 @@ double sonar_read(const sonar *self, const viewpoint *from, noise_source *noise)
 double sonar_speed_of_sound(double temperature);
 double sonar_echo_time(const sonar *self, double distance);
 
-extern const sensor_kind *const sonar_sensor;
+extern const sensor_kind sonar_sensor;
 /* python: end */
 
 #endif

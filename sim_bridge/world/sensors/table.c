@@ -39,5 +39,4 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
   *readings = nearest < 0.0 ? t->none : table_noise_read(t->table, nearest, angle, noise);
 }
 
-static const sensor_kind KIND = {.noise = 9, .size = sizeof(table), .make = make, .read = read};
-const sensor_kind *const table_sensor = &KIND;
+const sensor_kind table_sensor = {.noise = 9, .size = sizeof(table), .make = make, .read = read};

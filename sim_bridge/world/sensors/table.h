@@ -15,7 +15,7 @@ typedef struct {
   double none;              /* the reading where nothing is nearer */
 } table_parameters;
 
-extern const sensor_kind *const table_sensor;
+extern const sensor_kind table_sensor;
 /* python: end */
 
 #endif

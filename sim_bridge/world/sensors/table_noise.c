@@ -1,7 +1,6 @@
 /* table_noise.c: see table_noise.h. */
 #include "table_noise.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 struct table_noise {
@@ -12,41 +11,28 @@ struct table_noise {
   double *means;
 };
 
-static int increasing(const double *values, int count) {
-  for (int i = 0; i < count; i++) {
-    if (!isfinite(values[i]) || (i > 0 && !(values[i] > values[i - 1]))) return 0;
-  }
-  return count > 0;
-}
-
 static double *copied(const double *values, size_t count) {
   double *copy = malloc(count * sizeof *copy);
   for (size_t i = 0; copy != NULL && i < count; i++) copy[i] = values[i];
   return copy;
 }
 
-/* Fills the bins' borders and means. 0, or -1 where a bin is empty or a sample not finite. */
-static int fill(table_noise *self, const int *counts) {
+/* Fills the bins' borders and means. */
+static void fill(table_noise *self, const int *counts) {
   const size_t bins = (size_t)self->rows * (size_t)self->columns;
   for (size_t bin = 0; bin < bins; bin++) {
     self->first[bin + 1] = self->first[bin] + (size_t)counts[bin];
     double sum = 0.0;
     for (size_t i = self->first[bin]; i < self->first[bin + 1]; i++) sum += self->samples[i];
     self->means[bin] = sum / (double)counts[bin];
-    if (!isfinite(sum)) return -1;
   }
-  return 0;
 }
 
 table_noise *table_noise_new(const double *distances, int distances_count, const double *angles, int angles_count,
                              const int *counts, const double *samples) {
-  if (!increasing(distances, distances_count) || !increasing(angles, angles_count)) return NULL;
   const size_t bins = (size_t)distances_count * (size_t)angles_count;
   size_t total = 0;
-  for (size_t bin = 0; bin < bins; bin++) {
-    if (counts[bin] < 1) return NULL;
-    total += (size_t)counts[bin];
-  }
+  for (size_t bin = 0; bin < bins; bin++) total += (size_t)counts[bin];
   table_noise *self = calloc(1, sizeof *self);
   if (self == NULL) return NULL;
   self->rows = distances_count;
@@ -58,13 +44,15 @@ table_noise *table_noise_new(const double *distances, int distances_count, const
   self->means = calloc(bins, sizeof *self->means);
   const int complete = self->distances != NULL && self->angles != NULL && self->samples != NULL &&
                        self->first != NULL && self->means != NULL;
-  if (complete && fill(self, counts) == 0) return self;
-  table_noise_destroy(self);
-  return NULL;
+  if (!complete) {
+    table_noise_destroy(self);
+    return NULL;
+  }
+  fill(self, counts);
+  return self;
 }
 
 void table_noise_destroy(table_noise *self) {
-  if (self == NULL) return;
   free(self->distances);
   free(self->angles);
   free(self->samples);

@@ -13,8 +13,7 @@
 typedef struct table_noise table_noise;
 
 /* Bins at increasing distances (m) and angles (rad); bin (i, j) holds counts[i * angles_count + j] >= 1 samples, which
- * follow each other in `samples`. NULL without memory, without bins, or where a number is not finite, a bin is empty or the
- * bins do not increase. */
+ * follow each other in `samples`. Numbers are finite. NULL without memory. */
 table_noise *table_noise_new(const double *distances, int distances_count, const double *angles, int angles_count,
                              const int *counts, const double *samples);
 void table_noise_destroy(table_noise *self);

@@ -8,17 +8,10 @@ static double reach(const void *self) {
   return sqrt(fmax(p->root_x * p->root_x + p->root_y * p->root_y, p->tip_x * p->tip_x + p->tip_y * p->tip_y));
 }
 
-static size_t make(void *self, const void *parameters) {
-  const touch_parameters *p = parameters;
-  *(touch_parameters *)self = *p;
-  return 1;
-}
-
 static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
   const touch_parameters *p = self;
   *readings = body_segment_touches(s->body, s->from.around, p->root_x, p->root_y, p->tip_x, p->tip_y, WHISKER_HEIGHT_M);
 }
 
-static const sensor_kind KIND = {
-    .noise = 10, .size = sizeof(touch_parameters), .make = make, .reach = reach, .read = read};
-const sensor_kind *const touch_sensor = &KIND;
+const sensor_kind touch_sensor = {
+    .noise = 10, .size = sizeof(touch_parameters), .readings = 1, .reach = reach, .read = read};

@@ -12,7 +12,7 @@ typedef struct {
   double root_x, root_y, tip_x, tip_y; /* in the body's frame, m */
 } touch_parameters;
 
-extern const sensor_kind *const touch_sensor;
+extern const sensor_kind touch_sensor;
 /* python: end */
 
 #endif

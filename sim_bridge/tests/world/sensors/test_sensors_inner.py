@@ -154,15 +154,6 @@ def test_table_interpolates_bilinearly(along: float, across: float) -> None:
     assert lib.table_noise_read(sampler, 9.0, 5.0, source()) == 20.0
 
 
-def test_bad_tables_are_refused() -> None:
-    assert table([1.0, 1.0], [0.0], [[[1.0]], [[1.0]]]) == ffi.NULL
-    assert table([1.0], [0.0], [[[math.nan]]]) == ffi.NULL
-    assert (
-        lib.table_noise_new(ffi.new("double[]", [1.0]), 1, ffi.new("double[]", [1.0]), 0, ffi.NULL, ffi.NULL)
-        == ffi.NULL
-    )
-
-
 def test_sample_and_hold_keeps_its_own_grid() -> None:
     hold = ffi.new("sample_hold *", {"period": 0.04})
     due = []
