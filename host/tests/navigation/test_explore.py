@@ -144,6 +144,7 @@ def test_rooms_are_explored() -> None:
     assert explore.complete and share >= 0.995 and way <= 45
 
 
+@pytest.mark.soak
 def test_way_and_coverage_by_an_exact_odometry_are_the_true_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exploring, "SECONDS", 120.0)
     (start,) = starts("exploration", 5, 1)

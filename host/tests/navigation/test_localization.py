@@ -144,7 +144,7 @@ def test_particle_filter_finds_itself_again(office: LineMap, places: list[Pose])
         estimator.begin(office, places[2 * number], random.Random(number))
         estimator.correct(scan_at(office, places[2 * number]))
         after = places[2 * number + 1]
-        found = [estimator.correct(scan_at(office, after, seed=k)) for k in range(20)]
+        found = (estimator.correct(scan_at(office, after, seed=k)) for k in range(20))
         again += any(one.found and math.dist(one.pose[:2], after[:2]) < 0.1 for one in found)
     assert again >= 6
 
