@@ -345,6 +345,6 @@ def test_every_pin_map_is_compiled_by_the_check_of_warnings(tmp_path: Path) -> N
     macros = [pin_headers.pin_map_macro(robot) for robot in maps]
     flags = "".join(f"build_flags = ${{avr.flags}} -D{macro} -O1\n" for macro in macros)
     (tmp_path / "platformio.ini").write_text(flags)
-    command = f'{line} echo "$pin_map"; done'
-    found = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=True)
+    command = ["sh", "-c", f'{line}\necho "$pin_maps"', "warnings.sh", "all"]
+    found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert found.stdout.split() == macros

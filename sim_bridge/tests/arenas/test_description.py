@@ -73,11 +73,11 @@ def error_of(folder: Path, text: str | bytes) -> str:
         (MOVING + "path = []", "mine.toml:4: moving[0].path: expected array of length >= 1"),
         (
             MOVING + "path = [\n{ time_s = 1, x_m = 0, y_m = 0 } ]",
-            "mine.toml:5: moving[0].path[0].time_s is 1; expected 0 for the first waypoint",
+            "mine.toml:4: moving[0].path[0].time_s is 1; expected 0 for the first waypoint",
         ),
         (
             MOVING + "path = [ { time_s = 0, x_m = 0, y_m = 0 },\n{ time_s = 0, x_m = 0, y_m = 0 } ]",
-            "mine.toml:5: moving[0].path[1].time_s is 0; expected more than 0",
+            "mine.toml:4: moving[0].path[1].time_s is 0; expected more than 0",
         ),
         (
             MOVING + "repeat = 'loop'\n[[moving.path]]\ntime_s = 0\nx_m = 0\ny_m = 0\n"
