@@ -220,7 +220,7 @@ def test_a_run_of_both_kinds_is_told_and_saved(tmp_path: Path) -> None:
             and robot.true_pose is not None
         )
     assert (tmp_path / "run.png").is_file()
-    assert all((tmp_path / f"robot-{number}" / "run.csv").is_file() for number in (1, 2, 3))
+    assert all((tmp_path / f"robot-{number}" / "summary.json").is_file() for number in (1, 2, 3))
 
 
 def test_one_that_is_done_stands_still() -> None:
