@@ -2,7 +2,7 @@
 # All tests, after `make` has built what they need: tools/test.sh [ARGUMENT OF PYTEST...]
 # Four parts side by side, each into build/test-PART.log: Python's tests of host without the timing, and of the rest; the
 # firmware's units; the simulator under sanitizers. Then, when nothing else computes, the tests that look at the wall
-# clock, six files at a time, as they mostly wait.
+# clock, four files at a time, as they mostly wait.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -25,9 +25,9 @@ run() {
     # A unit that waits for what does not come would do it for ever.
     units) timeout 1200 tools/pio test -e native_sanitized -e native_boebot -e native_line ;;
     sanitized) tools/test_sanitized.sh ;;
-    # Each of the six reads all files of tests that it is given, so it is given those that have such tests.
+    # Each of the four reads all files of tests that it is given, so it is given those that have such tests.
     wall_clock)
-      build/venv/bin/python -m pytest -n 6 --dist loadfile -m "wall_clock and not soak" \
+      build/venv/bin/python -m pytest -n 4 --dist loadfile -m "wall_clock and not soak" \
         $(grep -rl --include='test_*.py' 'mark.wall_clock' docs hil_tests host protocol sim_bridge tools) "$@"
       ;;
   esac
