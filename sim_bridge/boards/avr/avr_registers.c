@@ -91,6 +91,7 @@ static void write_reserved(avr_board *b, uint16_t address, uint8_t value, uint64
 }
 
 void on_read(avr_board *b, uint16_t address, register_read *read) {
+  // cppcheck-suppress AssignmentAddressToInteger  // a function's type is taken for what it returns
   b->reads[address] = read;
   avr_register_io_read(b->avr, address, read_register, b);
 }
