@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.startswith("sim_bridge/" if os.environ.get("BOEBOT_SANITIZED") == "all" else UNUSUAL_INPUT):
             item.add_marker("simulator")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """A command that runs in this process leaves its handlers of signals, as its process would end with it."""
+    from boebot.running import interrupts
+
+    before = {number: signal.getsignal(number) for number in interrupts.SIGNALS}
+    try:
+        return (yield)
+    finally:
+        interrupts.first = None
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
