@@ -31,7 +31,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make run       build everything, let the demonstration brain drive the emulated robot, write build/run"
-	@echo "make test      all tests: Python, firmware units, whole circle, sanitizers, wheel"
+	@echo "make test      all tests: Python, firmware units, whole circle, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
 	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the longest tasks of many seeds, other compilers and emulators, tests with each protection left out, error rates"
@@ -79,7 +79,7 @@ soak: experiments
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
 	@$(PYTHON_VENV) -m tools.qemu
 	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
-	@PYTHONMALLOC=malloc tools/test_sanitized.sh all
+	@PYTHONMALLOC=malloc tools/test_sanitized.sh
 	@tools/pio test -e native_quad
 	@tools/warnings.sh all
 	@tools/pio check -e native --fail-on-defect low --fail-on-defect medium --fail-on-defect high
@@ -89,6 +89,7 @@ EXAMPLES ?= 5000
 FUZZ_SECONDS ?= 60
 fuzz:
 	@$(SIDE_BY_SIDE) ready-test
+	@tools/test_sanitized.sh
 	@$(PYTHON_VENV) -m tools.fuzz --seconds $(FUZZ_SECONDS)
 	@$(PYTHON_VENV) host/fuzz/damaged_records.py
 	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis -o faulthandler_timeout=1800

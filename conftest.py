@@ -22,21 +22,6 @@ if not MADE and GENERATOR.is_file() and subprocess.run([sys.executable, GENERATO
 EXAMPLES = os.environ.get("BOEBOT_EXAMPLES")
 SANITIZED = "BOEBOT_SANITIZED" in os.environ
 
-# What `make test` runs under sanitizers: the C that takes what programs, files, wires and people give it. `make soak`,
-# which sets BOEBOT_SANITIZED to "all", runs the rest of the simulator's tests so, too.
-UNUSUAL_INPUT = tuple(
-    f"sim_bridge/tests/{part}"
-    for part in (
-        "arenas/",
-        "boards/",
-        "loop/",
-        "parts/",
-        "vehicles/test_bad_input",
-        "world/sensors/",
-        "world/test_contact.py",
-    )
-)
-
 # Sanitizers make each example some five times as slow; what they look for shows in a few. `make fuzz` tries thousands.
 settings.register_profile("same every time", max_examples=8 if SANITIZED else 30, deadline=None, derandomize=True)
 settings.register_profile("fuzz", max_examples=int(EXAMPLES or 100), deadline=None, print_blob=True)
@@ -47,13 +32,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 _seconds: Counter[str] = Counter()
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Marks the tests which are run under sanitizers."""
-    for item in items:
-        if item.nodeid.startswith("sim_bridge/" if os.environ.get("BOEBOT_SANITIZED") == "all" else UNUSUAL_INPUT):
-            item.add_marker("simulator")
 
 
 @pytest.hookimpl(wrapper=True)

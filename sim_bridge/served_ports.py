@@ -24,6 +24,7 @@ else:
     HAS_PTY = True
 
 BACKLOG = 65536  # bytes that wait in each direction: for the line, and for a client that does not read
+READ = 4096  # bytes that are read at once
 TCGETS2 = 0x802C542A
 TERMIOS2_SIZE = 44  # Linux: the settings of a terminal with its bit rates as numbers, the last one that of the output
 NO_PAGE = "this port is a robot's serial line, no web page"
@@ -126,9 +127,10 @@ class PtyPort(Port):
     def _look(self) -> None:
         is_open = self._is_open()
         if is_open and not self._client:
-            while self._read():  # of the client before
-                pass
-            self._came(holder_of(self.url) or "a program")
+            client = holder_of(self.url) or "a program"
+            for _ in range(BACKLOG // READ):  # what the client before has sent; this one may send without a pause
+                self._read()
+            self._came(client)
             return
         while len(self._received) < BACKLOG and (data := self._read()):
             self._received += data
@@ -137,7 +139,7 @@ class PtyPort(Port):
 
     def _read(self) -> bytes:
         try:
-            return os.read(self._master, 4096)
+            return os.read(self._master, READ)
         except OSError:  # nothing there, or nobody
             return b""
 

@@ -1,5 +1,5 @@
 #!/bin/sh
-# One part of all tests (tools/test.sh): tools/test_part.sh host|others|units|sanitized|wall_clock [ARGUMENT OF PYTEST...].
+# One part of all tests (tools/test.sh): tools/test_part.sh host|others|units|wall_clock [ARGUMENT OF PYTEST...].
 # Says how it ended, and what each folder's tests took; more only if it failed.
 set -eu
 cd "$(dirname "$0")/.."
@@ -7,14 +7,12 @@ part=$1
 shift
 log=build/test-$part.log
 
-# Python's tests in those folders. The simulator's run under sanitizers; here are the rest of them, and those with random
-# input, which get more. Each process reads all files that it is given, so there are two halves with a process each,
-# and with more only where there are more than three processors.
+# Python's tests in those folders. Each process reads all files that it is given, so there are two halves with a process
+# each, and with more only where there are more than three processors.
 python() {
   processes=$(($(nproc) / 2))
   [ "$processes" -gt 1 ] || processes=0
-  build/venv/bin/python -m pytest -n "$processes" --dist loadfile \
-    -m "not wall_clock and not soak and (not simulator or unsanitized or hypothesis)" "$@"
+  build/venv/bin/python -m pytest -n "$processes" --dist loadfile -m "not wall_clock and not soak" "$@"
 }
 
 run() {
@@ -24,7 +22,6 @@ run() {
     # All units for one pin map, and for two others what only they have. Quadrature encoders: hil_tests, and `make soak`.
     # A unit that waits for what does not come would do it for ever.
     units) timeout 1200 tools/pio test -e native_sanitized -e native_boebot -e native_line ;;
-    sanitized) tools/test_sanitized.sh ;;
     # Each of the four reads all files of tests that it is given, so it is given those that have such tests.
     wall_clock)
       build/venv/bin/python -m pytest -n 4 --dist loadfile -m "wall_clock and not soak" \

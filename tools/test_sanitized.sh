@@ -1,6 +1,5 @@
 #!/bin/sh
-# The simulator's tests of unusual input, or with the argument `all` each of its tests, with all C built under the address
-# and undefined-behaviour sanitizers.
+# The simulator's tests with all C built under the address and undefined-behaviour sanitizers: `make fuzz`, `make soak`.
 # Builds a second copy of the packages under build/sanitized.
 set -eu
 cd "$(dirname "$0")/.."
@@ -32,6 +31,6 @@ ubsan=$(cc -print-file-name=libubsan.so)
 echo "Simulator under sanitizers"
 root=$PWD
 cd build/sanitized/lib
-LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0:malloc_context_size=4 BOEBOT_SANITIZED="${1:-some}" \
+LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0:malloc_context_size=4 BOEBOT_SANITIZED=1 \
   "$root/$python" -m pytest -q -c "$root/pyproject.toml" --rootdir "$PWD" sim_bridge/tests \
-  -m "simulator and not unsanitized and not soak and not wall_clock"
+  -m "not unsanitized and not soak and not wall_clock"

@@ -277,8 +277,10 @@ def holder_of(port: str) -> str | None:
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):  # it has ended, or is another user's
-            if device in map(os.readlink, (process / "fd").iterdir()):
-                found.append(int(process.name))
+            for file in (process / "fd").iterdir():
+                with contextlib.suppress(OSError):  # closed meanwhile
+                    if os.readlink(file) == device:
+                        found.append(int(process.name))
     if not found:
         return None
     if (number := next((other for other in found if other != os.getpid()), None)) is None:
