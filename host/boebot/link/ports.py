@@ -279,7 +279,7 @@ def holder_of(port: str) -> str | None:
         with contextlib.suppress(OSError):  # it has ended, or is another user's
             for file in (process / "fd").iterdir():
                 with contextlib.suppress(OSError):  # closed meanwhile
-                    if os.readlink(file) == device:
+                    if str(file.readlink()) == device:
                         found.append(int(process.name))
     if not found:
         return None
