@@ -74,6 +74,7 @@ class Guest(NamedTuple):
             ) from error
 
 
+@cache
 def guests(group: str) -> Mapping[str, Guest]:
     """The entry points of a group by name, in the order of their names."""
     found = sorted(Guest(one.name, one.value) for one in _all().select(group=group))
