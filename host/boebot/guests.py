@@ -77,8 +77,7 @@ class Guest(NamedTuple):
 @cache
 def guests(group: str) -> Mapping[str, Guest]:
     """The entry points of a group by name, in the order of their names."""
-    found = sorted(Guest(one.name, one.value) for one in _all().select(group=group))
-    return {guest.name: guest for guest in found}
+    return {one.name: Guest(one.name, one.value) for one in sorted(_all().select(group=group))}
 
 
 _all = cache(entry_points)
