@@ -19,9 +19,12 @@ def _broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     text += "[boebot.checks]\nsick = a_module_that_is_not_there:CHECK\n"
     (tmp_path / "sick-1.0.dist-info" / "entry_points.txt").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
-    guests._all.cache_clear()
+    caches = (guests._all, guests.guests)
+    for one in caches:
+        one.cache_clear()
     yield
-    guests._all.cache_clear()
+    for one in caches:
+        one.cache_clear()
 
 
 @pytest.mark.usefixtures("_broken")
