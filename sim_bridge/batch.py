@@ -274,7 +274,7 @@ class Batch:
         return self._of_all("state", "step", kind=np.uint64)[:, 0]
 
     def _of_all(self, *place: str, kind: type[Any], numbers: int = 1) -> NDArray[Any]:
-        """Shape (N, numbers): what stands in each world at that place of C struct vehicle; a copy."""
+        """A field of C struct vehicle, of each world: a copy of shape (N, numbers)."""
         each, size = ffi.sizeof("vehicle"), np.dtype(kind).itemsize
         room = ffi.buffer(self.handle.worlds, each * (self.count + 1))  # there is room for one more
         at = ffi.offsetof("vehicle", *place)

@@ -14,6 +14,7 @@ from boebot.description import robots
 from boebot.devices.uart import Uart
 from boebot.errors import BoardError
 from boebot.record.blocks import Group
+from boebot.record.truth import as_truth
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.pins import BoardPins, PinRecorder
 from sim_bridge.sim import Floats, SimRobot
@@ -55,16 +56,7 @@ class InWorld:
         if not len(columns["time"]):
             return None
         begin, end = float(columns["time"][0]), float(columns["time"][-1])
-        return Truth(
-            time=columns["time"],
-            x=columns["x"],
-            y=columns["y"],
-            heading=columns["heading"],
-            contact=columns["contact"] > 0,
-            left_speed=columns["left"],
-            right_speed=columns["right"],
-            plan=floor_plan(sim.arena, begin, end, sim.lateness(), sim.shifts()),
-        )
+        return as_truth(columns["time"], columns, floor_plan(sim.arena, begin, end, sim.lateness(), sim.shifts()))
 
     def drain(self, *, ended: bool = False) -> Group:
         """See `boebot.boards.Session`. What belongs to the world goes with its first robot."""

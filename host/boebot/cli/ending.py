@@ -184,8 +184,8 @@ def _files(result: Result, out: Path) -> Iterator[list[Path]]:
 def show(
     result: Result, wanted: Detail, folder: Path | None, made: Iterable[list[Path]], *, is_said: bool = False
 ) -> BoebotError | None:
-    """Prints a run's figures and the files in `folder` that `made` makes, also if nobody reads the table any more;
-    returns why not all of them could be made. `is_said`: as of `print_run`."""
+    """Prints a run's figures and the files in `folder` that `made` makes; a closed standard output
+    stops no file. Returns why not all of them could be made. `is_said`: as of `print_run`."""
     files: list[Path] = []
     unsaved: BoebotError | None = None
     try:

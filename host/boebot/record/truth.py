@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +133,11 @@ def plan_of(record: Record, arena: Arena) -> FloorPlan:
 
 def truth_of(record: Record, plan: FloorPlan) -> Truth | None:
     """All of it; None where none was recorded."""
-    time, rows = record.times_of("truth"), record.table("truth", _ROW)
+    return as_truth(record.times_of("truth"), record.table("truth", _ROW), plan)
+
+
+def as_truth(time: Floats, rows: Any, plan: FloorPlan) -> Truth | None:
+    """Rows of the truth at those times (s), by the names of their columns; None where there are none."""
     if not len(time):
         return None
     return Truth(

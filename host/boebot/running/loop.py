@@ -239,8 +239,8 @@ class _Robot:
         return RunResult(**about(driver, task), **ending)
 
     def go_on(self) -> str:
-        """Goes on until its brain is to step, it waits for time to pass (one of several), or is done. Where nobody
-        waits for the wall clock, what the board has sent is not torn by Ctrl-C.
+        """Goes on until its brain is to step, it waits for time to pass (one of several), or is done. In
+        unpaced simulation Ctrl-C does not cut what the board has sent.
 
         Raises:
             KeyboardInterrupt: Ctrl-C.

@@ -44,7 +44,7 @@ def test_run_over_a_port() -> None:
 
 def test_leftovers_of_an_earlier_run_do_no_harm() -> None:
     with pty(Peer()) as served:
-        time.sleep(0.3)  # telemetry heaps up that nobody reads
+        time.sleep(0.3)  # unread telemetry heaps up
         result = boebot.run(straight, on=served.path, seconds=0.3)
     assert result.lost_frames == result.bad_frames == result.resets == 0
 

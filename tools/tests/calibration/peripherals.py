@@ -105,7 +105,7 @@ UART = [
     ),
     *(
         uart(
-            what=f"{count} bytes that nobody reads for 20 ms: {'DOR0' if flag else 'bytes kept'}",
+            what=f"{count} bytes left unread for 20 ms: {'DOR0' if flag else 'bytes kept'}",
             expected=int(count > 3) if flag else 3,
             source="20.7.4: 2 in the buffer, 1 in the shift register",
             code=f"{overrun(count)}\nmov r24, {'r21' if flag else 'r20'}",

@@ -287,7 +287,7 @@ def test_interrupts_off_for_1100_cycles_always_lose_a_byte() -> None:
 
 
 def test_full_receiver_waits_for_the_next_start_bit() -> None:
-    # three bytes stay readable however long nobody reads: two in the buffer, one in the shift register
+    # three bytes stay readable however long they wait: two in the buffer, one in the shift register
     machine = Machine(RECEIVE.format(setup=SETUP, off=off_for(5000)))
     machine.board.drive(12, Level.LOW)
     machine.board.drive(12, Level.HIGH, at=500)
