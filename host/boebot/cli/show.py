@@ -78,6 +78,8 @@ def show_arena(
             "picture": picture,
         }
     )
+    if shapes:
+        output.line("what is in it, lengths in m:")
     output.print_columns(SHAPES, ([_cell(value) for value in row.values()] for row in shapes), numbers=range(2, 7))
 
 

@@ -56,7 +56,7 @@ LINE_IN, ROW_IN = 0.22, 0.205  # of the caption, of the legend
 CAPTION_COLUMNS, TITLE_COLUMNS = 126, 68
 PANEL_IN, PANEL_BELOW_IN = 1.5, 0.5  # of the panel below the field, and for the words below it
 ENTRY_IN, LETTER_IN = 0.5, 0.062  # of the legend: handle and gaps, one letter
-POINTS_AT_ONCE = 500  # of a line: the dashes of a long one at once take 100 MB
+POINTS_AT_ONCE = 5000  # of a line, which has a gap after them; the dashes of a long one at once take 100 MB
 PARTING = "   ·   "
 TOUCH: dict[str, Any] = {
     "ls": "", "marker": "o", "mfc": style.FLOOR, "mec": style.TOUCH, "mew": 1.6, "ms": 5.5, "zorder": 9
