@@ -398,7 +398,7 @@ class SimRobot:
     @property
     def handle(self) -> Any:
         """The robot in C; raises as that of the simulation."""
-        assert self.sim.handle  # raises where it is closed
+        _ = self.sim.handle  # raises where it is closed
         return self._robot
 
     def receive(self) -> bytes:
