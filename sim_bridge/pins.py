@@ -35,6 +35,12 @@ class BoardPins(BoardMemory):
         return self._robot.board
 
     @property
+    def _with_board(self) -> Any:
+        """The robot in C; raises BoardError where it has no board."""
+        _ = self.board
+        return self._robot.handle
+
+    @property
     def reset_cycle(self) -> int:
         """At which the program was last started by `reset`; 0 before."""
         return int(self._robot.handle.reset_at)
@@ -60,11 +66,11 @@ class BoardPins(BoardMemory):
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:
         """Takes a pin from its part and drives it from `at_cycle` on (now)."""
         at = self._sim.cycle + 64 if at_cycle is None else at_cycle
-        self._check(lib.robot_drive(self._robot.handle, max(0, at), pin, level), f"pin {pin}, level {level}")
+        self._check(lib.robot_drive(self._with_board, max(0, at), pin, level), f"pin {pin}, level {level}")
 
     def square_wave(self, pin: int, period: int, seconds: float) -> None:
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
-        status = lib.robot_wave(self._robot.handle, pin, period // 2, round(seconds * CLOCK_HZ))
+        status = lib.robot_wave(self._with_board, pin, period // 2, round(seconds * CLOCK_HZ))
         self._check(status, f"square wave of {period} cycles on pin {pin}")
 
     def answer_ping(self, echo_us: float | None) -> None:
@@ -96,7 +102,7 @@ class BoardPins(BoardMemory):
         held = (
             0.0 if volts is None else number("supply: the voltage", volts, BoardError, least=0, most=SUPPLY_MAXIMUM_V)
         )
-        self._robot.handle.held_supply = held / lib.SUPPLY_NOMINAL_V
+        self._with_board.held_supply = held / lib.SUPPLY_NOMINAL_V
         lib.robot_update_supply(self._robot.handle)
 
     def brown_out(self, **changes: float) -> None:
@@ -111,7 +117,7 @@ class BoardPins(BoardMemory):
             values[name] = number(f"brown_out: {name}", value, BoardError, least=0)
         if values["reset_v"] >= values["erratic_v"]:
             raise BoardError(f"brown_out: reset_v is {values['reset_v']:g}; expected less than erratic_v")
-        self._robot.handle.brown_out.parameters = values
+        self._with_board.brown_out.parameters = values
 
     def brown_outs(self) -> tuple[int, int]:
         """Resets by the brown-out detector so far, and upsets above its voltage."""

@@ -105,6 +105,11 @@ class EmulatedBoard:
         return self._board
 
     @property
+    def is_closed(self) -> bool:
+        """It was freed."""
+        return not self._free.alive
+
+    @property
     def address(self) -> int:
         """Of the board in C; raises as `handle`."""
         return int(self.ffi.cast("uintptr_t", self.handle))
@@ -343,7 +348,8 @@ class BoardAccess(BoardMemory):
     def close(self) -> None:
         """Lets go of the board."""
         if self._listens_to is not None:
-            self._listens_to.lib.board_access_close(self._access)
+            if not self._listens_to.is_closed:  # it would be written to
+                self._listens_to.lib.board_access_close(self._access)
             self._listens_to = None
 
 

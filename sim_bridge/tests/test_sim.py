@@ -161,3 +161,23 @@ def test_a_bodys_state_is_of_its_moment() -> None:
     before = robot.body()
     BoardPins(robot).place(0.5, -0.2, 0.0)
     assert before.x == ROOM.start[0] and robot.body().x == 0.5
+
+
+def test_pins_of_a_robot_without_a_board_are_refused() -> None:
+    description = load_robot("arsim")
+    pins = BoardPins(Sim(ROOM).add(None, description))
+    for act in (
+        lambda: pins.drive(3, 1),
+        lambda: pins.square_wave(3, 100, 1.0),
+        lambda: pins.supply(3.0),
+        lambda: pins.brown_out(reset_v=1.0),
+    ):
+        refused(act, "has no board")
+
+
+def test_a_board_may_be_closed_before_its_access() -> None:
+    board = native_board(native_library("boebot"))
+    access = board.access()
+    board.close()
+    access.close()
+    refused(lambda: access.now, "closed")
