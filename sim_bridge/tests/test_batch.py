@@ -214,6 +214,8 @@ def test_where_no_start_is_free_or_poses_are_none_is_one_sentence() -> None:
         arena.free_start(5.0, 1)
     with pytest.raises(ArenaError, match=r"seed is 1\.5; expected a whole number"):
         arena.free_start(0.1, 1.5)  # type: ignore[arg-type]
+    with pytest.raises(ArenaError, match="no shape that stays"):
+        arena_of().free_start(0.1, 1)
     with pytest.raises(RobotError, match=r"poses are 'free'; expected numbers of shape \(N, 3\), or \"random\""):
         Batch(arsim(), arena, "free", [1])
 

@@ -179,6 +179,8 @@ class Arena:
         """
         key = arguments.whole("arena: seed", seed, ArenaError, least=-(2**63), most=2**64 - 1) % 2**64
         chance = np.random.default_rng((key, 1))  # 1: not what others draw by this seed
+        if not self._polygons:
+            raise ArenaError(f"arena {self.name} has no shape that stays; expected one beside which a place can be")
         points = np.vstack(self._polygons[: len(self.description.outline) or None])
         edge = 0.0 if self.description.outline else 1.0
         for _ in range(START_TRIES):
