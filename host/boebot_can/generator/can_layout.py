@@ -34,7 +34,6 @@ CLASSES = (
     "parameters",
     "heartbeat, session",
 )
-_MESSAGE_BITS = 0x1F
 
 # What is added behind the payload before bytes are chosen from both: see `Frame.choice`.
 ROUND, SESSION, SEQUENCE, TIME_TO_LIVE, PART = range(5)
