@@ -97,7 +97,7 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
         ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{_changed(table)}"),
         ("time", f"{result.run_time:g} s{faster}"),
         ("way", ", ".join(way)),
-        ("brain", _brain(result, table)),
+        ("brain", _brain(result)),
         ("ended", table["ended"] + _touched(result)),
     ]
 
@@ -120,7 +120,7 @@ def not_zero(result: RunResult) -> list[str]:
     return [f"{name} {value}" for name, value, _ in figures.rows(wrong)]
 
 
-def _brain(result: RunResult, table: dict[str, Any]) -> str:
+def _brain(result: RunResult) -> str:
     parts = [f"{figures.counted(result.steps, 'step', 'steps')}, {result.period:g} s apart"]
     record = result.overview.brain
     if record is not None:
