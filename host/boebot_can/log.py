@@ -231,11 +231,11 @@ def _sent(path: Path) -> Iterator[tuple[str, Sent]]:
                 raise EOFError("it is shorter than it says")
     except OSError as error:
         raise BoebotError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}") from None
-    except Exception as error:  # each format has its own
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    except Exception as error:  # each format has its own, in words of Python's
+        expected = f"expected a *{path.suffix.lower()} log as python-can writes it"
         if count:
-            raise CutError(f"{path} breaks off after {count:,} frames: {reason}") from None
-        raise BoebotError(f"{path} is no log of CAN frames: {reason}") from None
+            raise CutError(f"{path} breaks off after {count:,} frames; {expected}, to its end") from error
+        raise BoebotError(f"{path} is no log of CAN frames; {expected}") from error
 
 
 def _chosen(path: Path, readers: dict[tuple[str, int], _LogReader], node: str | None) -> _LogReader:
