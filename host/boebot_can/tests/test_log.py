@@ -485,10 +485,10 @@ def test_log_that_breaks_off_is_replayed_up_to_there(
     ("name", "data", "sentence"),
     [
         ("text.asc", b"Hello, world\n" * 9, "{} has no hello of a board; expected a log from before the run began"),
-        ("picture.asc", b"\x89PNG\r\n", "{} is no log of CAN frames; expected a *.asc log as python-can writes it"),
-        ("text.log", b"Hello, world\n", "{} is no log of CAN frames; expected a *.log log as python-can writes it"),
-        ("text.blf", b"Hello, world\n" * 99, "{} is no log of CAN frames; expected a *.blf log as python-can writes it"),
-        ("empty.blf", b"", "{} is no log of CAN frames; expected a *.blf log as python-can writes it"),
+        ("picture.asc", b"\x89PNG\r\n", "{} is no log of CAN frames; expected a *.asc log"),
+        ("text.log", b"Hello, world\n", "{} is no log of CAN frames; expected a *.log log"),
+        ("text.blf", b"Hello, world\n" * 99, "{} is no log of CAN frames; expected a *.blf log"),
+        ("empty.blf", b"", "{} is no log of CAN frames; expected a *.blf log"),
         ("absent.log", None, "{} cannot be read: no such file or directory"),
     ],
 )
