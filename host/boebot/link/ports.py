@@ -46,6 +46,7 @@ BAUD_MIN, BAUD_MAX = 9_600, 1_000_000
 CONNECT_S = 1.8  # for a TCP connection; pyserial gives an RFC 2217 server 5 s
 _NEGOTIATION_S = 1.2  # pyserial's wait for an RFC 2217 server's consent, in each of two steps
 _WRITE_S = 1.0
+_STILL_S = 0.05  # longer than a wait for a port ends late
 _LOOK_S = 0.005  # how long a wait for bytes may last too long
 _DTR_OFF_S = 0.01  # the board's capacitor needs microseconds
 _TIOCGICOUNT = 0x545D  # Linux: struct serial_icounter_struct, 20 ints
@@ -86,10 +87,14 @@ class _Port:
         return data
 
     def write(self, data: bytes) -> None:
-        """Sends bytes; gives up when the other side takes none for a second."""
+        """Sends bytes; gives up when the other side takes none for a second. Not so where that second was much longer:
+        then this program stood still, as when a computer sleeps, and a loss of bytes shows in the frames."""
+        begun = time.monotonic()
         try:
             self._send(data)
         except (serial.SerialTimeoutException, TimeoutError):
+            if time.monotonic() - begun > _WRITE_S + _STILL_S:
+                return
             raise BoardError(f"{self.name} takes no bytes: its other side does not read") from None
         except _FAILURES:
             raise self._gone() from None

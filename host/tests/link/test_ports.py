@@ -195,6 +195,24 @@ def test_unplugging_is_noticed_at_once_by_reader_and_writer(board: Line, use: st
     transport.close()
 
 
+def test_a_sleep_in_the_midst_of_sending_is_no_fault_of_the_other_side(
+    board: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    transport = ports.open_serial(board.path, 500_000)
+    write, slept = os.write, threading.Event()
+
+    def sleepy(file: int, data: bytes) -> int:
+        if file == transport._device.fileno() and not slept.is_set():
+            slept.set()
+            time.sleep(1.1)
+        return write(file, data)
+
+    monkeypatch.setattr(os, "write", sleepy)
+    transport.write(b"hello")
+    assert slept.is_set() and board.receive(5) == b"hello"
+    transport.close()
+
+
 def test_other_side_that_does_not_read_is_an_error_in_time(board: Line) -> None:
     transport = ports.open_serial(board.path, 500_000)
     with refused("takes no bytes: its other side does not read"):
