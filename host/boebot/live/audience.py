@@ -173,7 +173,7 @@ class Audience:
         past[-1] = past[-1] | {"runs": [rows | {"layers": list(layers.values())} for rows, layers in newest]}
         first, *others = past
         runs = [known | {"rows": rows} for known, rows in zip(self._run["runs"], first["runs"], strict=True)]
-        begin = self._run | {"page": page.number, "runs": runs, "moving": first["moving"]}
+        begin = self._run | {"page": page.number, "runs": runs, "moving": first["moving"], "printed": first["printed"]}
         state = {"type": "state", "state": self._state}
         page.begin(begin, [*others, state, *([] if self._end is None else [self._end])])
         self._server.wake(page)

@@ -79,7 +79,7 @@ def merged(old: Message, new: Message) -> Message:
 def _merged_rows(old: Message, new: Message) -> Message:
     layers = {layer["name"]: layer for layer in (*old["layers"], *new["layers"])}
     rows = new | {"events": (old["events"] + new["events"])[-EVENTS:], "layers": list(layers.values())}
-    if old["mind"] is not None and new["mind"] is not None:
-        switches = (old["mind"]["switches"] + new["mind"]["switches"])[-EVENTS:]
-        rows["mind"] = new["mind"] | {"switches": switches}
+    minds = [one["mind"] for one in (old, new) if one["mind"] is not None]  # none where the brain did not step
+    if minds:
+        rows["mind"] = minds[-1] | {"switches": [one for mind in minds for one in mind["switches"]][-EVENTS:]}
     return rows

@@ -141,10 +141,14 @@ def legend_entries(plan: FloorPlan) -> list[Artist]:
     """What the plan has that wants a word: entries for a legend."""
     items = [*scene.arena_items(plan), *(scene.moving_item(moving.solid) for moving in plan.moving)]
     found = {item.says: item for item in items if item.says}
-    return [
-        Patch(fc=style.paint(item.fill), ec=style.EDGE, lw=0.8, hatch=HATCH if item.hatch else None, label=says)
-        for says, item in found.items()
-    ]
+    entries: list[Artist] = []
+    for says, item in found.items():
+        fill = style.paint(item.fill)
+        if says in scene.STARS:
+            entries.append(Line2D([], [], ls="", marker="*", mfc=fill, mec=style.EDGE, mew=0.8, ms=11, label=says))
+        else:
+            entries.append(Patch(fc=fill, ec=style.EDGE, lw=0.8, hatch=HATCH if item.hatch else None, label=says))
+    return entries
 
 
 def draw_robot(

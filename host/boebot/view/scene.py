@@ -197,6 +197,7 @@ WHEEL_M = 0.012  # width of a wheel
 BODY_HEIGHT_M = 0.08  # as drawn: descriptions do not say it
 HIGH_M = 0.2  # what has no height is drawn this high
 LAMP_M = 0.05  # of a lamp's star
+STARS = ("lamp",)  # `Item.says` of things that a legend shows as a star
 ROOMY_SHARE = 0.09  # of the arena's width: what is as large has its label inside
 TOP_SHARE = 0.07  # what reaches higher within the outline has its label below
 WORDS = 5.5  # layer of labels: above the arena, below robots

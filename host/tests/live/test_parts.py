@@ -174,6 +174,13 @@ def test_slow_page_gets_the_newest_and_what_must_not_be_lost() -> None:
     assert box.take() == []
 
 
+def test_switches_outlast_a_stretch_without_a_step_of_the_brain() -> None:
+    box = Outbox()
+    box.put(chunk(1, mind={"switches": [[0.1, "avoid", "near"]]}))
+    box.put(chunk(2))
+    assert "avoid" in box.take()[0]
+
+
 def test_outbox_is_bounded() -> None:
     box = Outbox()
     for number in range(5_000):

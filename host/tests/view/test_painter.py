@@ -119,6 +119,7 @@ def test_words_say_what_cannot_be_seen() -> None:
 def test_legend_has_only_kinds_that_are_drawn() -> None:
     words = [str(entry.get_label()) for entry in legend_entries(PLAN)]
     assert words == ["throws back less", "low: some sensors look over it", "lamp", "moves, shown at the start"]
+    assert legend_entries(PLAN)[2].get_marker() == "*", "a lamp is a star there, too"  # type: ignore[attr-defined]
     assert legend_entries(FloorPlan(solids=[Solid(kind="outline", points=box(0, 0))])) == []
 
 

@@ -195,10 +195,8 @@ function letGoOfDrag() {
 }
 // The next thing after the one that is picked up, at first the chosen robot.
 function pickUp() {
-  if (!canDrag()) {
-    if (!newest) setNewest(true);
-    else return;
-  }
+  if (!newest) setNewest(true);
+  if (!canDrag()) return;
   const all = things(),
     current = grabbed
       ? all.findIndex(one => one.kind === grabbed.kind && one.index === grabbed.index) + 1

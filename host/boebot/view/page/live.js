@@ -51,15 +51,15 @@ const receive = {
     live = content.live || { can: [], robots: [] };
     can = new Set(live.can);
     ended = null;
-    newest = true;
     arrivals.length = 0;
     $("print").textContent = "";
     hide("printed", true);
+    tellPrinted(content.printed);
     say("event", "");
     begin(content);
     document.body.classList.remove("waiting");
     run = runs[Math.min(chosen, runs.length - 1)];
-    now = run.duration;
+    setNewest(true);
     makeControls();
     fitted = true;
     spanLength ??= 20;
@@ -313,7 +313,7 @@ function makeParameters() {
 }
 function makeSlider(parameter) {
   const output = element("span", { className: "value" }),
-    input = element("input", { type: "range", min: parameter.least, max: parameter.most, step: "any" });
+    input = element("input", { type: "range", min: parameter.least, max: parameter.most, step: "any", disabled: ended !== null });
   const one = { parameter, input, output, changed: -Infinity, due: null };
   input.value = parameter.value;
   input.ariaLabel = parameter.name;

@@ -14,7 +14,7 @@ function makePanels() {
   hide("truth", !run.known);
   hide("estimateRow", !run.estimate);
   hide("errorRow", !run.estimate);
-  cells.lamps = run.signs.map(({ device }) => element("div", { className: "lamp", textContent: device.replace("_", " ") }));
+  cells.lamps = run.signs.map(({ device }) => element("div", { className: "lamp", textContent: device.replaceAll("_", " ") }));
   cells.lamps.forEach(lamp => lamp.setAttribute("role", "img"));
   $("lamps").replaceChildren(...cells.lamps);
   hide("sensors", !run.signs.length);

@@ -32,7 +32,10 @@ function draw(inMotion = false) {
   keepCursorInside();
   if (tracksDirty) drawTracks();
   drawCursor();
-  if (inMotion && performance.now() - toldAt < TELL_MS) return;
+  if (inMotion && performance.now() - toldAt < TELL_MS) {
+    drawAsked = true; // the last of the frames is told, too
+    return;
+  }
   toldAt = performance.now();
   tellMoment();
   $("slider").value = tickOf(run);
