@@ -196,12 +196,5 @@ def runner(*, view: bool, speed: float | None, port: int | None, waits: bool) ->
     from boebot.live.controls import usual_speed
     from boebot.live.session import opened, run_viewed
 
-    with opened(say_where, port=port or 0, speed=1.0 if speed is None else usual_speed(speed)) as page:
+    with opened(port=port or 0, speed=1.0 if speed is None else usual_speed(speed)) as page:
         yield functools.partial(run_viewed, page, waits=waits)
-
-
-def say_where(url: str) -> None:
-    """Where a live view is."""
-    from boebot.cli import output
-
-    output.say(f"watch it: {url}")

@@ -65,6 +65,8 @@ def serve(
             output.line(f"drive it:  boebot run wander --on {url}        end it:  Ctrl-C")
 
     def visit(event: Visit) -> None:
+        if page is not None:
+            page.visit(event)
         try:
             if json:
                 output.print_json({"event": event.what, "client": event.client, "why": event.why}, indent=None)
@@ -74,14 +76,8 @@ def serve(
             streams.discard()
 
     with contextlib.suppress(KeyboardInterrupt), _view(request, on, view=view, port=view_port) as page:
-
-        def heard(event: Visit) -> None:
-            visit(event)
-            if page is not None:
-                page.visit(event)
-
         look = None if page is None else page.look
-        find_server()(on, request, tcp=tcp, announce=announce, visit=heard, running=lambda: True, look=look)
+        find_server()(on, request, tcp=tcp, announce=announce, visit=visit, running=lambda: True, look=look)
 
 
 @contextlib.contextmanager
@@ -101,7 +97,7 @@ def _view(request: BoardRequest, kind: str, *, view: bool, port: int | None) -> 
 
     page = ServedView(request, kind, port=port or 0)
     try:
-        show(page.url, options.say_where)
+        show(page.url)
         yield page
     finally:
         page.close()

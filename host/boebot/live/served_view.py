@@ -4,7 +4,7 @@ nobody interfere: the robot is driven by the other program."""
 
 from __future__ import annotations
 
-from typing import Any
+import re
 
 from boebot.arenas import load_arena
 from boebot.arenas.floor_plan import floor_plan
@@ -15,61 +15,14 @@ from boebot.link.messages import DEVICE_MESSAGES, Hello, Telemetry
 from boebot.live import messages
 from boebot.live.audience import Audience
 from boebot.live.chunks import Chunks
-from boebot.record.blocks import Group
 from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.running.driver import TICK_S
 
 _SILENT_S = 0.2  # after so long a time without telemetry nobody listens to the board
 _NOTHING = bytes(Telemetry.LENGTH)  # telemetry of a board that says nothing
-
-
-class ReadAlong:
-    """The rows of a served robot: what its board sends, and the truth."""
-
-    def __init__(self, session: BoardSession) -> None:
-        self.session = session
-        self._decoder = Decoder(NO_SESSION)
-        self._data = b""
-        self._heard_s = -_SILENT_S
-        self._last_s = -1.0  # of the newest row
-
-    def hear(self, data: bytes) -> None:
-        """What the board has sent."""
-        self._data += data
-
-    def news(self) -> Group:
-        """The rows that came since this was last asked; nothing but the truth, while no program has the port."""
-        record, now_s = Record(), self.session.counters()["time_s"]
-        telemetry = [payload for number, payload in self._messages(record, now_s) if number == Telemetry.ID]
-        if telemetry:
-            self._heard_s = now_s
-        elif now_s - self._heard_s > _SILENT_S:
-            telemetry = [_NOTHING]
-        for index, payload in enumerate(telemetry, 1 - len(telemetry)):
-            time_s = now_s + index * TICK_S
-            if time_s > self._last_s:
-                record.append_telemetry(time_s, payload, time_s, 0.0)
-                record.append_command(time_s, "stop", 0.0, 0.0)
-                self._last_s = time_s
-        record.put(self.session.drain())
-        return record.news()
-
-    def _messages(self, record: Record, now_s: float) -> list[tuple[int, bytes]]:
-        """Number and payload of each that has come whole. The handshake tells the session, by which the others are
-        known."""
-        data, self._data = self._data, b""
-        found = []
-        kinds = {kind.ID: kind for kind in DEVICE_MESSAGES}
-        while data:
-            piece, delimiter, data = data.partition(b"\0")
-            for number, _, payload in self._decoder.feed(piece + delimiter):
-                if number == Hello.ID:
-                    self._decoder.seed = Hello.unpack(payload).session or NO_SESSION
-                elif number in kinds:
-                    record.append(kinds[number].NAME, now_s, payload)
-                found.append((number, payload))
-        return found
+_SLOW = {kind.ID: kind.NAME for kind in DEVICE_MESSAGES}
+_PIECE = re.compile(rb"[^\0]*\0|[^\0]+")  # of a stream, up to the end of a frame
 
 
 class ServedView:
@@ -87,8 +40,10 @@ class ServedView:
         """
         self._request, self._kind = request, kind
         self._plan = floor_plan(load_arena(request.arena), 0.0, 0.0)
-        self._source: ReadAlong | None = None
         self._chunks: Chunks | None = None
+        self._decoder = Decoder(NO_SESSION)
+        self._record = Record()  # of what came since the last look
+        self._heard_s, self._last_s = -_SILENT_S, -1.0  # telemetry was heard; of the newest row
         self._printed = ""
         self._audience = Audience(self._asked, port=port)
         self._audience.forget(1)
@@ -104,27 +59,49 @@ class ServedView:
 
     def look(self, session: BoardSession, data: bytes) -> None:
         """See `boebot.boards.Server`."""
-        if self._source is None or self._chunks is None:
-            self._source = ReadAlong(session)
-            self._chunks = Chunks(session, self._source.news, self._result(session), 1)
-        self._source.hear(data)
+        if self._chunks is None:
+            self._chunks = Chunks(session, lambda: self._record.news(), self._run(session), 1)
+        time_s = session.counters()["time_s"]
+        self._read_along(data, time_s)
+        self._record.put(session.drain())
         if not self._chunks.gather():
             return
         rows = self._chunks.make()
         if not self._audience.knows_run:
-            assert self._chunks.content is not None
             now = session.truth_now()
-            live = {"can": [], "seed": self._request.seed, "imperfections": [], "robots": [{"parameters": []}]}
-            self._audience.begin(self._plan, [] if now is None else [now.pose], [self._chunks.content], live)
+            live = {"can": [], "seed": self._request.seed, "robots": []}
+            self._audience.begin(self._plan, [] if now is None else [now.pose], [self._chunks.content or {}], live)
         printed, self._printed = self._printed, ""
-        moving, state = self._chunks.moving(self._plan), _state(session.counters()["time_s"])
-        self._audience.add([rows], moving, state, printed)
+        self._audience.add([rows], self._chunks.moving(self._plan), {"time": time_s, "robots": []}, printed)
 
     def close(self) -> None:
         """No pages any more."""
         self._audience.close()
 
-    def _result(self, session: BoardSession) -> Run:
+    def _read_along(self, data: bytes, now_s: float) -> None:
+        """Takes what the board has sent up to now; while no program has the port, rows without telemetry."""
+        record, telemetry = Record(), []
+        for piece in _PIECE.findall(data):
+            for number, _, payload in self._decoder.feed(piece):
+                if number == Hello.ID:  # it says of which session all that follows is
+                    self._decoder.seed = Hello.unpack(payload).session or NO_SESSION
+                elif number == Telemetry.ID:
+                    telemetry.append(payload)
+                elif number in _SLOW:
+                    record.append(_SLOW[number], now_s, payload)
+        if telemetry:
+            self._heard_s = now_s
+        elif now_s - self._heard_s > _SILENT_S:
+            telemetry = [_NOTHING]
+        for index, payload in enumerate(telemetry, 1 - len(telemetry)):
+            time_s = now_s + index * TICK_S
+            if time_s > self._last_s:
+                record.append_telemetry(time_s, payload, time_s, 0.0)
+                record.append_command(time_s, "stop", 0.0, 0.0)
+                self._last_s = time_s
+        self._record = record
+
+    def _run(self, session: BoardSession) -> Run:
         """What is known of it as of a run."""
         request = self._request
         return Run(
@@ -141,9 +118,3 @@ class ServedView:
             without=request.without,
             imperfections=request.imperfections,
         )
-
-
-def _state(time_s: float) -> dict[str, Any]:
-    robot = {"parameters": {}, "latched": False, "driver": None, "pose": None, "link": None}
-    run = {"paused": False, "speed": 1.0, "time": time_s, "touched": 0}
-    return run | {"robots": [robot]}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import html
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -20,26 +21,25 @@ from boebot.view.display import browse, published
 
 
 @contextlib.contextmanager
-def opened(say: Callable[[str], None], *, port: int = 0, speed: float | None = 1.0) -> Iterator[LiveView]:
-    """A live view. As the first run begins it is opened in the browser, where there is a display, and `say` is told its
-    address; a notebook shows a link instead, for its kernel may run elsewhere.
+def opened(*, port: int = 0, speed: float | None = 1.0) -> Iterator[LiveView]:
+    """A live view, which is shown as the first run begins.
 
     Raises:
         BoebotError: the port is taken.
     """
-    view = LiveView(lambda url: show(url, say), port=port, speed=speed)
+    view = LiveView(show, port=port, speed=speed)
     try:
         yield view
     finally:
         view.close()
 
 
-def show(url: str, say: Callable[[str], None]) -> None:
-    """Tells the address, and opens the page where there is a display. A notebook shows a link, for its kernel may run
-    elsewhere."""
+def show(url: str) -> None:
+    """Says the address on standard error, and opens the page where there is a display. A notebook shows a link, for its
+    kernel may run elsewhere."""
     link = f'<a href="{html.escape(url)}" target="_blank" rel="noopener">watch it drive</a>'
     if not published(link, f"watch it: {url}"):
-        say(url)
+        print(f"watch it: {url}", file=sys.stderr, flush=True)
         browse(url)
 
 

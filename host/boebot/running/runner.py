@@ -3,7 +3,6 @@ command `boebot run` does. The loop of a run is in boebot.running.loop."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -153,5 +152,5 @@ def _kept(
 def _viewed(request: Request, progress: Progress | None, folder: RunFolder | None) -> Any:
     from boebot.live.session import opened, run_viewed
 
-    with opened(lambda url: print(f"watch it: {url}", file=sys.stderr, flush=True)) as page:
+    with opened() as page:
         return run_viewed(page, request, progress, folder, waits=False)
