@@ -5,7 +5,7 @@
 //   curves   {times, value(i), colour, width, holds: the value stands until the next one}, between the ends of `range`
 //   blocks   {times, colour(i): null: none; at, tall: shares of the lane's height}
 //   scale    [value, text, colour] beside the lane; rules: with a line at each value
-//   draw     anything else
+//   draw     anything else; legend: of its marks, in place of the name where the pointer is on that
 
 const [GUTTER, AXIS, RIGHT] = [112, 20, 10]; // pixels: of names at the left, of the time above, free at the right
 const SHORTEST = 1e-3; // s, of the time that is shown
@@ -229,7 +229,8 @@ const CURVES = 4; // of the numbers that the brain shows have a lane; the others
 const tickAt = t => indexIn(run.time.values, t);
 const ticks = () => run.time.values;
 function makeLanes() {
-  lanes = [{ name: "events", height: 20, draw: drawEvents, at: eventAt }];
+  const legend = Object.values(EVENTS).map(([mark, , words]) => mark + " " + words);
+  lanes = [{ name: "events", legend: legend.join("\n"), height: 20, draw: drawEvents, at: eventAt }];
   if (run.mind) lanes.push(mindLane());
   lanes.push({
     name: "motors",
@@ -350,7 +351,7 @@ function pinText(pin, t) {
   return word + " for " + (us < 1e4 ? us.toFixed(us < 100 ? 2 : 0) + " µs" : (us / 1e3).toFixed(1) + " ms");
 }
 
-// ---- events: a mark each, another form for each kind; its colour in the palette, and its words in the legend ----
+// ---- events: a mark each, another form for each kind; its colour in the palette, and its words ----
 const EVENTS = {
   switch: ["│", "faint", "switch"],
   contact: ["✕", "contact", "true contact"],

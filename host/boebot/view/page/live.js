@@ -179,7 +179,6 @@ function makeControls() {
   hide("newest", false);
   hide("play", true);
   hide("speedLabel", !can.has("speed"));
-  if (can.has("speed")) makeSpeeds();
 }
 function listenToControls() {
   $("stop").onclick = $("halt").onclick = stopRobot;
@@ -193,22 +192,16 @@ function listenToControls() {
   $("cancel").onclick = () => $("restartDialog").close();
   $("restartDialog").querySelector("form").onsubmit = restart;
   $("newest").onclick = () => setNewest(true);
+  $("speed").append(element("option", { value: "", textContent: "fastest" }));
+  $("speed").onchange = () => send({ type: "speed", speed: $("speed").value === "" ? null : Number($("speed").value) });
   $("move").onclick = pickUp;
   document.addEventListener("visibilitychange", letGo);
-}
-const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
-function makeSpeeds() {
-  $("speed").replaceChildren(
-    ...SPEEDS.map(v => element("option", { value: v, textContent: v + " ×" })),
-    element("option", { value: "", textContent: "fastest" }),
-  );
-  $("speed").onchange = () => send({ type: "speed", speed: $("speed").value === "" ? null : Number($("speed").value) });
 }
 function tellSpeed() {
   if (!can.has("speed") || document.activeElement === $("speed")) return;
   const value = state.speed === null ? "" : String(state.speed);
   if (![...$("speed").options].some(option => option.value === value))
-    $("speed").append(element("option", { value, textContent: value + " ×" }));
+    $("speed").append(element("option", { value, textContent: value }));
   $("speed").value = value;
 }
 // Off: nothing can be asked for, except another run where there may be one.

@@ -101,8 +101,7 @@ class Run {
     this.events = [];
     this.pins = [];
     this.placed = null; // where it has been put while time stands still
-    this.kinds = 0; // of events
-    this.names = 0; // how many numbers, texts, layers, pins and kinds of events have come: a new one asks for new panels
+    this.names = 0; // how many numbers, texts, layers and pins have come: a new one asks for new panels
     if (rows) this.append(rows);
   }
   get last() {
@@ -173,9 +172,6 @@ class Run {
   }
   appendEvents(events) {
     for (const [time, kind, text] of events) this.events.push({ time, kind, text });
-    const kinds = new Set(this.events.map(event => event.kind)).size;
-    if (kinds !== this.kinds) this.names++; // the legend has them
-    this.kinds = kinds;
     this.events.sort((a, b) => a.time - b.time);
   }
   appendPin(pin) {

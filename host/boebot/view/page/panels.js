@@ -1,4 +1,4 @@
-// The panels beside the arena: signals of the chosen robot at the moment that is shown, its figures, the legend.
+// The panels beside the arena: signals of the chosen robot at the moment that is shown, its figures.
 
 let cells = { lamps: [], readings: [], shown: [], utilities: [] }; // what is written anew for each moment
 let namesShown = -1; // for how many names the panels were made: a live run may show new ones
@@ -40,7 +40,6 @@ function makeShown() {
   $("shownRows").replaceChildren(...rows.map(([it]) => it), ...layers);
   hide("shown", !rows.length && !layers.length);
   makeLanes();
-  makeLegend();
 }
 function makeReadings() {
   hide("readings", !run.readings.length);
@@ -100,30 +99,6 @@ function makeRobots() {
     ),
   );
   $("robot").style.borderColor = $("robot").style.color = inText(run.colour);
-}
-
-// ---- the legend: only what there is ----
-function makeLegend() {
-  const entries = runs.map((one, i) => [
-    "━",
-    one.colour,
-    runs.length > 1 ? "robot " + (i + 1) : run.known ? "true path (the simulator's truth)" : "path by odometry",
-  ]);
-  if (run.estimate) entries.push(["╍", colours.estimate, "odometry"]);
-  const kinds = new Set(run.events.map(event => event.kind));
-  if (run.known) kinds.add("contact");
-  if (run.signs.some(sign => groupOf(sign) === "whisker")) kinds.add("touch");
-  for (const one of run.mind?.behaviors ?? []) entries.push(["■", one.colour, one.name]);
-  if (run.mind?.cognitive.length) entries.push(["━", colours.faint, "cognitive process"]);
-  for (const [kind, [mark, colour, words]] of Object.entries(EVENTS))
-    if (kinds.has(kind)) entries.push([mark, colours[colour], words]);
-  $("legend").replaceChildren(
-    ...entries.map(([mark, colour, words]) => {
-      const sign = element("span", { className: "mark", textContent: mark, ariaHidden: "true" });
-      sign.style.color = inText(colour);
-      return element("div", { className: "entry" }, sign, element("span", { textContent: words }));
-    }),
-  );
 }
 
 // ---- one moment ----
@@ -226,7 +201,7 @@ function hoverTracks(event) {
           " s" +
           (box ? "\n" + box.lane.name + ": " + box.lane.at(t) : "")
       : box
-        ? box.lane.name
+        ? (box.lane.legend ?? box.lane.name)
         : "",
   );
   requestDraw();
