@@ -83,11 +83,8 @@ def described(name: str, value: float) -> dict[str, Any]:
     }
 
 
-def _show(name: str, value: float, as_json: bool) -> None:
-    if as_json:
-        output.print_json(described(name, value))
-    else:
-        output.line(f"{name} = {value:.9g} {parameter_spec(name).unit}")
+def _show(name: str, value: float) -> None:
+    output.line(f"{name} = {value:.9g} {parameter_spec(name).unit}")
 
 
 @app.command("list")
@@ -106,14 +103,12 @@ def list_all(on: options.On = "native", robot: options.RobotName = "shieldbot", 
 
 
 @app.command()
-def get(
-    name: Name, on: options.On = "native", robot: options.RobotName = "shieldbot", json: options.Json = False
-) -> None:
+def get(name: Name, on: options.On = "native", robot: options.RobotName = "shieldbot") -> None:
     """One parameter's value."""
     parameter_spec(name)
     with _link(on, robot) as link:
         value = link.parameters.get(name)
-    _show(name, value, json)
+    _show(name, value)
 
 
 @app.command("set", context_settings={"ignore_unknown_options": True})  # a value may begin with a minus sign
@@ -123,7 +118,6 @@ def set_one(
     on: options.On = "native",
     robot: options.RobotName = "shieldbot",
     save: Save = False,
-    json: options.Json = False,
 ) -> None:
     """Set a parameter until the board's next reset; --save keeps it. Opening a port resets most boards."""
     number = quantity.parse(value, parameter_spec(name).unit)
@@ -132,35 +126,24 @@ def set_one(
         now = link.parameters.set(name, number)
         if save:
             _save(link, on)
-    if json:
-        output.print_json(described(name, now) | {"saved": save})
-    else:
-        _show(name, now, False)
+    _show(name, now)
     _say_how_long(f"{name} lasts", on, save)
 
 
 @app.command("save")
-def save_all(on: options.On = "native", robot: options.RobotName = "shieldbot", json: options.Json = False) -> None:
+def save_all(on: options.On = "native", robot: options.RobotName = "shieldbot") -> None:
     """Write all parameters to the board's EEPROM: they outlast resets and power cuts."""
     with _link(on, robot, changes=True) as link:
         _save(link, on)
-    if json:
-        output.print_json({"saved": True})
-    else:
-        output.line("all parameters are saved")
+    output.line("all parameters are saved")
 
 
 @app.command("reset")
-def reset_all(
-    on: options.On = "native", robot: options.RobotName = "shieldbot", save: Save = False, json: options.Json = False
-) -> None:
+def reset_all(on: options.On = "native", robot: options.RobotName = "shieldbot", save: Save = False) -> None:
     """All parameters to the image's defaults, until the board's next reset; --save keeps that."""
     with _link(on, robot, changes=True) as link:
         link.parameters.reset()
         if save:
             _save(link, on)
-    if json:
-        output.print_json({"reset": True, "saved": save})
-    else:
-        output.line(f"all parameters are reset{' and saved' if save else ''}")
+    output.line(f"all parameters are reset{' and saved' if save else ''}")
     _say_how_long("the reset of the parameters lasts", on, save)

@@ -65,13 +65,12 @@ def replay(
     trust: Annotated[
         bool, typer.Option("--trust", help="With --again: run a brain that came with the record.")
     ] = False,
-    json: Annotated[bool, typer.Option("--json", help="With --again: print JSON in place of a sentence.")] = False,
 ) -> None:
     """Run a brain on what was sensed in a run, and name the first command that differs; or repeat the run."""
     _check(context, run, repeats, brain)
     try:
         if repeats:
-            _repeat(run, json, trust)
+            _repeat(run, trust)
         else:
             _replay(run, brain or "", robot, kind, node, seed)
     except BoebotError as error:
@@ -88,7 +87,7 @@ def _check(context: typer.Context, run: Path, repeats: bool, brain: str | None) 
     """Raises a usage error where options of one way stand beside those of the other."""
     if not repeats and brain is None:
         raise typer.BadParameter(f"expected --brain BRAIN{', or --again' if _foreign(run) is None else ''}", context)
-    others = ("brain", "robot", "kind", "node", "seed") if repeats else ("trust", "json")
+    others = ("brain", "robot", "kind", "node", "seed") if repeats else ("trust",)
     for name in others:
         if context.params[name] not in (None, False):
             way = "--again repeats a run as it was; expected no" if repeats else "expected --again with"
@@ -155,7 +154,7 @@ def _place(result: Run, step: int) -> str:
 # ---- the run once more -----------------------------------------------------------------------------------------------
 
 
-def _repeat(folder: Path, as_json: bool, trust: bool) -> None:
+def _repeat(folder: Path, trust: bool) -> None:
     """`trust`: a brain that came with the record is run without asking."""
     run = recorded(folder)
     if run.foreign and not trust and sys.stdin is not None and sys.stdin.isatty():
@@ -168,10 +167,7 @@ def _repeat(folder: Path, as_json: bool, trust: bool) -> None:
         repetition = again(run, progress, trust=trust)
     if repetition.part is not None:
         output.say(repetition.part)
-    if as_json:
-        output.print_json(_values(repetition))
-    else:
-        output.line(_sentence(folder, repetition))
+    output.line(_sentence(folder, repetition))
     if not repetition.is_equal:
         raise typer.Exit(EXIT_DIFFERS)
 
@@ -183,18 +179,3 @@ def _sentence(folder: Path, repetition: Repetition) -> str:
         return f"differs from {folder}: robot {repetition.robot} ended by {' and by '.join(map(repr, repetition.ends))}"
     part = "" if repetition.part is None else ", as far as it goes"
     return f"bit-equal to {folder}{part}: {repetition.steps} steps"
-
-
-def _values(repetition: Repetition) -> dict[str, object]:
-    first = repetition.difference
-    return {
-        "equal": repetition.is_equal,
-        "whole": repetition.part is None,
-        "steps": repetition.steps,
-        "robot": None if repetition.is_equal else repetition.robot,
-        "stream": None if first is None else first.stream,
-        "time_s": None if first is None else first.time,
-        "row": None if first is None else first.row,
-        "difference": None if first is None else first.what,
-        "ends": None if repetition.ends is None else list(repetition.ends),
-    }

@@ -210,10 +210,8 @@ def test_repetition_says_where_it_differs(
     Path("moody.py").write_text(source)
     assert boebot(capsys, "run", "moody.py", "--seconds", "1", "--out", "run")[0] == 0
     Path("speed").write_text("0.1")
-    code, out, _ = boebot(capsys, "replay", "run", "--again", "--json")
-    said = json.loads(out)
-    assert code == 1 and not said["equal"]
-    assert (said["stream"], said["row"]) == ("command", 11) and said["time_s"] == pytest.approx(0.55)
+    code, out, _ = boebot(capsys, "replay", "run", "--again")
+    assert code == 1 and "differs from run first at robot 1, stream command, 0.5500 s, row 11" in out
 
 
 def test_record_that_is_cut_is_repeated_as_far_as_it_goes(
