@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import html
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from boebot.boards import WatchdogReset
 
-HANGS_AT_MOST = 4  # that get a sentence each
 _UNIT = re.compile(r"_(m_s|ms|m|s|kg|us|hz|bytes|v|ppm|cycles|percent)$")
 _UNITS = {"m_s": "m/s", "hz": "Hz", "v": "V", "us": "µs", "percent": "%"}
 
@@ -50,13 +48,7 @@ def html_table(values: Mapping[str, Any]) -> str:
 
 def hang_sentences(resets: Sequence[WatchdogReset]) -> list[str]:
     """For people: one for each place, by its first reset."""
-    found = []
-    for first, count in _by_place(resets):
-        times = "" if count == 1 else f"; {count} times in all"
-        found.append(f"{first}{times}")
-    if others := _others(resets):
-        found.append(f"the watchdog reset the program {others} times more, at other places")
-    return found
+    return [str(first) + ("" if count == 1 else f"; {count} times in all") for first, count in _by_place(resets)]
 
 
 def hang_places(resets: Sequence[WatchdogReset]) -> str | None:
@@ -65,22 +57,12 @@ def hang_places(resets: Sequence[WatchdogReset]) -> str | None:
     for first, count in _by_place(resets):
         times = "" if count == 1 else f", {count} times"
         parts.append(f"0x{first.address:04X} {first.place}".rstrip() + times)
-    if others := _others(resets):
-        parts.append(f"elsewhere {others} times")
     return "; ".join(parts) or None
 
 
-def _place(reset: WatchdogReset) -> str:
-    return reset.place or f"0x{reset.address:04X}"
-
-
 def _by_place(resets: Sequence[WatchdogReset]) -> list[tuple[WatchdogReset, int]]:
-    """The first reset at each place and how many there were, for the places that get a sentence each."""
-    counts = Counter(map(_place, resets))
-    first = {_place(reset): reset for reset in reversed(resets)}
-    return [(first[name], count) for name, count in list(counts.items())[:HANGS_AT_MOST]]
-
-
-def _others(resets: Sequence[WatchdogReset]) -> int:
-    """Resets at all further places."""
-    return len(resets) - sum(count for _, count in _by_place(resets))
+    """The first reset at each place and how many there were."""
+    found: dict[str, list[WatchdogReset]] = {}
+    for reset in resets:
+        found.setdefault(reset.place or f"0x{reset.address:04X}", []).append(reset)
+    return [(there[0], len(there)) for there in found.values()]

@@ -62,8 +62,8 @@ class RecordWriter:
         from mcap.writer import Writer
 
         self._file, self._name, self._waits = file, name, waits
-        self._tail = _Tail()
-        self._writer: Any = Writer(cast(IO[bytes], self._tail), chunk_size=sys.maxsize, enable_data_crcs=True)
+        self._end = _File(file.fileno())
+        self._writer: Any = Writer(cast(IO[bytes], self._end), chunk_size=sys.maxsize, enable_data_crcs=True)
         self._channels: dict[str, int] = {}
         self._schema = self._groups = 0
         self._until_s = 0.0
@@ -118,13 +118,10 @@ class RecordWriter:
         """What cannot be written whole is not written at all, and nothing after it."""
         if self._failure is not None:
             return
-        whole = self._tail.taken
+        whole = self._end.size
         try:
             work()
             self._writer.flush()
-            data = self._tail.take()
-            while data:
-                data = data[os.write(self._file.fileno(), data) :]
             os.fsync(self._file.fileno())
         except Exception as error:  # of any kind: the run is to end by it, not this thread alone
             self._failure = error
@@ -146,35 +143,30 @@ class RecordWriter:
         self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
 
 
-class _Tail:
-    """The end of the file, before it is written.
+class _File:
+    """What MCAP's writer writes to: all that it is given, or an OSError.
 
     Attributes:
-        taken: how much was taken so far (B).
+        size: so far (B).
     """
 
-    def __init__(self) -> None:
-        self._parts: list[bytes] = []
-        self._size = self.taken = 0
+    def __init__(self, number: int) -> None:
+        """`number`: the file's descriptor."""
+        self._number, self.size = number, 0
 
     def write(self, data: bytes) -> None:
         """At the end."""
-        self._parts.append(bytes(data))
-        self._size += len(data)
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(self._number, rest) :]
+        self.size += len(data)
 
     def tell(self) -> int:
         """Where the file ends."""
-        return self._size
+        return self.size
 
     def flush(self) -> None:
-        """It is written by whoever takes it."""
-
-    def take(self) -> memoryview:
-        """What is new."""
-        self.taken = self._size
-        data = memoryview(b"".join(self._parts))
-        self._parts.clear()
-        return data
+        """It is written already."""
 
 
 class Damage(NamedTuple):

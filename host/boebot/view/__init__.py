@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from boebot.record.run import Run
 
     Write = Callable[[Path], object]
-    Draw = Callable[[Sequence[Run], Path], object]
 
 
 class IncompleteError(BoebotError):
@@ -72,10 +71,9 @@ def save(robots: Sequence[Run], error: BaseException | None, folder: Path, *, cs
     if not any(robot.ticks for robot in robots):
         return paths
     failed = []
-    drawn: dict[str, Draw] = {"run.png": partial(_write_picture, error=error), "replay.html": _write_page}
-    for name, draw in drawn.items():
+    for name in ("run.png", "replay.html"):
         try:
-            paths.append(write_whole(folder / name, partial(draw, robots)))
+            paths.append(write_whole(folder / name, partial(_draw, robots, error)))
         except BoebotError:
             raise
         except Exception as why:  # whatever drawing meets: the run is worth more than its picture
@@ -103,13 +101,13 @@ def save_for_foxglove(results: Sequence[Run], folder: Path) -> Path:
     return write_whole(folder / "foxglove.mcap", partial(foxglove.write, results))
 
 
-def _write_picture(robots: Sequence[Run], path: Path, error: BaseException | None) -> None:
-    from boebot.view import picture
+def _draw(robots: Sequence[Run], error: BaseException | None, path: Path) -> None:
+    """The picture or the page, by the path's ending."""
+    if path.suffix == ".png":
+        from boebot.view import picture
 
-    picture.draw(robots, error).save(path)
+        picture.draw(robots, error).save(path)
+    else:
+        from boebot.view import replay
 
-
-def _write_page(robots: Sequence[Run], path: Path) -> None:
-    from boebot.view import replay
-
-    replay.write([robot for robot in robots if robot.ticks], path)
+        replay.write([robot for robot in robots if robot.ticks], path)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from boebot.errors import BoebotError, brief, did_you_mean, printable
 from boebot.view import figure_file, style, tables
+from boebot.view.painter import quiet
 
 if TYPE_CHECKING:
     from boebot.record.run import Run
@@ -43,11 +44,8 @@ def write(robots: Mapping[int, Run], names: Sequence[str], path: Path) -> Path:
             axes.plot(time, series, color=colour, lw=1.2, label=f"robot {number}")
         if not is_alone:
             axes.legend(fontsize=8, frameon=False, loc="best")
-        axes.set_ylabel(name, color=style.INK, fontsize=9)
-        axes.tick_params(labelsize=8.5, colors=style.FAINT, labelcolor=style.INK, length=3)
-        axes.grid(color=style.GRID, lw=0.7)
+        quiet(axes, "time (s)" if index == len(names) else "", name)
         axes.set_facecolor(style.FLOOR)
-    panels[-1].set_xlabel("time (s)", color=style.INK, fontsize=9)
     titles = (f"{one.brain} on {one.robot.name}" + ", ".join(["", *brief(one.error)]) for one in robots.values())
     title = printable("; ".join(dict.fromkeys(titles)))
     panels[0].set_title(title, fontsize=12, color=style.INK, parse_math=False)

@@ -24,23 +24,18 @@ def check(path: Path) -> None:
     """Refuses a file that cannot become a picture, before anything is drawn.
 
     Raises:
-        BoebotError: its ending is neither .png nor .svg, or its folder does not exist.
+        BoebotError: its ending is neither .png nor .svg.
     """
     if path.suffix.lower() not in FORMATS:
         raise BoebotError(f"{path} is no name of a picture; expected one that ends in {' or '.join(FORMATS)}")
-    if path.is_dir():
-        raise BoebotError(f"{path} is a folder; expected the name of a picture")
-    if not path.parent.is_dir():
-        raise BoebotError(f"there is no folder {path.parent}; expected one that the picture can be written to")
 
 
 def save(figure: Figure, path: Path, title: str) -> Path:
-    """Writes the figure with its title; in an SVG, texts stay texts.
+    """Writes the figure with its title to a path that was checked; in an SVG, texts stay texts.
 
     Raises:
-        BoebotError: see `check`; or the file cannot be written.
+        BoebotError: the file cannot be written.
     """
-    check(path)
     FigureCanvasAgg(figure)
     kind = path.suffix.lower().removeprefix(".")
     metadata = {"Title": title, "Date": None} if kind == "svg" else {"Title": title}  # no date: the same bytes

@@ -62,9 +62,12 @@ def test_arena_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path, monke
             ("show", "arena", "room", "--out", "it.jpg"),
             "it.jpg is no name of a picture; expected one that ends in .png",
         ),
-        (("show", "arena", "room", "--out", "no/it.png"), "there is no folder no; expected one that the picture"),
+        (("show", "arena", "room", "--out", "no/it.png"), "the picture cannot be written to no: No such file"),
         (("show", "robot", "shieldbott"), "did you mean 'shieldbot'?"),
-        (("show", "arena", "room", "--out", "/dev/full/it.png"), "there is no folder /dev/full"),
+        (
+            ("show", "arena", "room", "--out", "/dev/full/it.png"),
+            "cannot be written to /dev/full: Not a directory",
+        ),
     ],
 )
 def test_wrong_request_is_one_sentence(
