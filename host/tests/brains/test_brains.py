@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
+import boebot
 from boebot.brains import bundled, load_brain
 from boebot.errors import BrainError
 from boebot.robot import Robot
@@ -21,6 +23,14 @@ def test_bundled_brain() -> None:
     assert "wander" in bundled()
     brain = load_brain("wander")
     assert brain.name == "wander" and set(brain.needs) == {"infrared"}
+
+
+def test_wander_backs_off_from_a_touch_and_turns_away() -> None:
+    run = boebot.run("wander", arena="room", pose=(1.4, 0.0, 0.0), seconds=2.0)  # its whiskers touch the eastern wall
+    after = run.to_pandas()[["true_x_m", "true_heading_rad", "command_left", "command_right"]].loc[1.2]
+    assert after.true_x_m < 1.35
+    assert math.radians(80) < abs(after.true_heading_rad) < math.radians(140)
+    assert after.command_left == after.command_right > 0  # straight on
 
 
 def test_function_in_a_file(tmp_path: Path) -> None:
