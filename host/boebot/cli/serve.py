@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -39,8 +37,8 @@ def serve(
     """Offer the emulated robot to other programs, until Ctrl-C."""
     if pty == (tcp is not None):
         raise typer.BadParameter("give one of --pty and --tcp PORT")
-    if pty and os.name != "posix":
-        raise BoardError("there are no pseudo-terminals on this system; use --tcp PORT")
+    if view_port is not None and not view:
+        raise BoebotError("--view-port is of a live view; expected --view with it")
     if on not in board_kinds():
         raise BoardError(
             f"there is no emulated board {on!r} to serve; expected {' or '.join(board_kinds()) or 'an installed one'}"
@@ -56,6 +54,8 @@ def serve(
         without=options.names(without),
         imperfections=options.magnitudes(imperfection),
     )
+
+    page: ServedView | None = None
 
     def announce(url: str) -> None:
         if json:
@@ -75,29 +75,12 @@ def serve(
         except OSError:  # what started this has read where the robot is, and listens no more
             streams.discard()
 
-    with contextlib.suppress(KeyboardInterrupt), _view(request, on, view=view, port=view_port) as page:
+    with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
+        if view:
+            from boebot.live.served_view import ServedView
+            from boebot.live.session import show
+
+            page = stack.enter_context(contextlib.closing(ServedView(request, on, port=view_port or 0)))
+            show(page.url)
         look = None if page is None else page.look
         find_server()(on, request, tcp=tcp, announce=announce, visit=visit, running=lambda: True, look=look)
-
-
-@contextlib.contextmanager
-def _view(request: BoardRequest, kind: str, *, view: bool, port: int | None) -> Iterator[ServedView | None]:
-    """The live view of the robot on that kind of board, if one is wanted.
-
-    Raises:
-        BoebotError: the port is taken, or is given without --view.
-    """
-    if not view:
-        if port is not None:
-            raise BoebotError("--view-port is of a live view; expected --view with it")
-        yield None
-        return
-    from boebot.live.served_view import ServedView
-    from boebot.live.session import show
-
-    page = ServedView(request, kind, port=port or 0)
-    try:
-        show(page.url)
-        yield page
-    finally:
-        page.close()

@@ -7,8 +7,11 @@ import contextlib
 import dataclasses
 import functools
 import os
+import select
 import sys
+import termios
 import time
+import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, TextIO
@@ -151,24 +154,6 @@ def _show(screen: TextIO, line: str) -> None:
 @contextlib.contextmanager
 def raw_keyboard() -> Iterator[Callable[[], str]]:
     """Keys as they are typed, without waiting and without echo; gives a function that returns what was typed."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        def read_console() -> str:
-            typed = ""
-            while msvcrt.kbhit():
-                letter = msvcrt.getwch()
-                if letter in "\x00\xe0":  # an arrow key comes as two
-                    letter = {"H": "w", "P": "s", "K": "a", "M": "d"}.get(msvcrt.getwch(), "")
-                typed += letter
-            return typed
-
-        yield read_console
-        return
-    import select
-    import termios
-    import tty
-
     file = sys.stdin.fileno()
     before = termios.tcgetattr(file)
 

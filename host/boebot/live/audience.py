@@ -144,16 +144,10 @@ class Audience:
                     self._send(page, chunk)
 
     def tell(self, message: Message) -> None:
-        """A message for all pages; of those a page that comes later gets the newest state."""
+        """A message for all pages; of those a page that comes later gets the newest state, and the run's end."""
         with self._lock:
             self._state = message.get("state", self._state)
-            for page in self._pages.values():
-                self._send(page, message)
-
-    def end(self, message: Message) -> None:
-        """The run has ended; pages that come later are told, too."""
-        with self._lock:
-            self._end = message
+            self._end = message if message["type"] == "end" else self._end
             for page in self._pages.values():
                 self._send(page, message)
 

@@ -52,7 +52,6 @@ class Controls:
     Attributes:
         can: what people may do, as the page has it.
         pace: how fast the run goes.
-        restart: what the run is to begin afresh with; None: it goes on.
     """
 
     def __init__(
@@ -60,7 +59,6 @@ class Controls:
     ) -> None:
         """`shapes`: how many of them move in the arena. `pages`: those that are open now."""
         self.can, self.pace = can, pace
-        self.restart: messages.Restart | None = None
         self._robots, self._shapes, self._pages = robots, shapes, pages
         self._lock = threading.Lock()
         self._deeds: list[deque[Deed]] = [deque() for _ in range(robots)]
@@ -97,8 +95,6 @@ class Controls:
                 self.pace.step()
             case messages.Speed(speed):
                 self.pace.set_speed(speed)
-            case messages.Restart():
-                self.restart = asked
             case messages.Do(robot, deed):
                 self._do(page, robot, deed)
 

@@ -43,6 +43,7 @@ class LiveView:
 
     Attributes:
         url: the address of the page.
+        restart: what the run is to begin afresh with; None: it goes on.
     """
 
     def __init__(self, show: Callable[[str], None], *, port: int = 0, speed: float | None = 1.0) -> None:
@@ -58,6 +59,7 @@ class LiveView:
         self._speed = speed
         self._pace = Pace(speed)
         self._controls: Controls | None = None
+        self.restart: messages.Restart | None = None
         self._changing = threading.Lock()  # held while they become another run's, and while a page comes, goes or asks
         self._has_ended = False
         self._number = 0
@@ -83,6 +85,7 @@ class LiveView:
         with self._changing:
             if self._controls is not None and (not self._has_ended or isinstance(what, messages.Restart)):
                 self._controls.heard(page, what)
+                self.restart = what if isinstance(what, messages.Restart) else self.restart
 
     # ---- the run: in its thread ------------------------------------------------------------------------------------
 
@@ -100,8 +103,6 @@ class LiveView:
         self._audience.forget(len(robots))
         controls = Controls(len(robots), len(self._plan.moving), can, self._pace, self._audience.pages)
         with self._changing:
-            if self.restart is not None:  # asked for since the last run has ended
-                controls.restart = self.restart
             self._controls, self._has_ended = controls, False
         self._number += 1
         self._due_s = 0.0
@@ -113,7 +114,7 @@ class LiveView:
         controls = self._controls
         assert controls is not None
         while True:
-            if controls.restart is not None:
+            if self.restart is not None:
                 raise RestartedError("restarted by hand")
             deeds = controls.due(number, self._robots[number].held)
             yield from deeds
@@ -204,23 +205,16 @@ class LiveView:
 
     # ---- the end ---------------------------------------------------------------------------------------------------
 
-    @property
-    def restart(self) -> messages.Restart | None:
-        """What the run is to begin afresh with, if a page has asked for that."""
-        return None if self._controls is None else self._controls.restart
-
     def take_restart(self) -> messages.Restart | None:
-        """The same; what pages ask for from now on is another one."""
+        """`restart`; what pages ask for from now on is another one."""
         with self._changing:
-            taken = self.restart
-            if self._controls is not None:
-                self._controls.restart = None
+            taken, self.restart = self.restart, None
         return taken
 
     def announce_end(self, tables: list[Message], ended: str, *, again: bool) -> None:
         """Tells all pages. `again`: another run can be asked for."""
         self._has_ended = True
-        self._audience.end({"type": "end", "ended": ended, "tables": tables, "again": again})
+        self._audience.tell({"type": "end", "ended": ended, "tables": tables, "again": again})
 
     def wait_for_restart(self) -> None:
         """Waits while a page is open, until one asks for another run."""

@@ -96,7 +96,7 @@ def _draw_one(result: Run) -> Sheet:
     for index, colour in ((0, style.START), (-1, style.END)):
         turret = float(view.turret[index])
         draw_swept(axes, view.swept, index, colour)
-        draw_robot(axes, result.robot, view.pose(index), colour, plan=view.plan, turret=turret)
+        draw_robot(axes, result.robot, view.path.at(index), colour, plan=view.plan, turret=turret)
     return sheet
 
 
@@ -247,9 +247,9 @@ def _draw_together(robots: Sequence[Run], error: BaseException | None) -> Sheet:
         draw_layers(axes, view, colour)
         _draw_marks(axes, robot.overview)
         draw_swept(axes, view.swept, -1, colour)
-        draw_robot(axes, robot.robot, view.pose(-1), colour, plan=plan, turret=float(view.turret[-1]))
+        draw_robot(axes, robot.robot, view.path.at(-1), colour, plan=plan, turret=float(view.turret[-1]))
         axes.annotate(
-            str(number), view.pose(-1)[:2], color=style.INK, fontsize=8, weight="bold", ha="center", va="center",
+            str(number), view.path.at(-1)[:2], color=style.INK, fontsize=8, weight="bold", ha="center", va="center",
             zorder=13,
         )  # fmt: skip
     return sheet

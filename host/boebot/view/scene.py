@@ -110,12 +110,8 @@ class View:
     def origin(self, sketch: Sketch) -> tuple[float, float, float]:
         """Of the frame of a sketch, as it lies in the picture at the run's end: m, m, rad."""
         if sketch.frame == "robot":
-            return self.pose(-1)
+            return self.path.at(-1)
         return self.start if sketch.frame == "start" else (0.0, 0.0, 0.0)
-
-    def pose(self, index: int) -> tuple[float, float, float]:
-        """Of the path at a tick."""
-        return float(self.path.x[index]), float(self.path.y[index]), float(self.path.heading[index])
 
 
 def view(result: Run) -> View:
