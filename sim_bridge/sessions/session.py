@@ -8,16 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from boebot.arenas.floor_plan import floor_plan
-from boebot.boards import Truth, TruthNow, WatchdogReset
+from boebot.boards import TruthNow, WatchdogReset
 from boebot.description import robots
 from boebot.devices.uart import Uart
-from boebot.errors import BoardError
 from boebot.record.blocks import Group
-from boebot.record.truth import as_truth
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.pins import BoardPins, PinRecorder
-from sim_bridge.sim import Floats, SimRobot
+from sim_bridge.sim import SimRobot
 from sim_bridge.vehicles import STEP_S
 
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
@@ -48,15 +45,6 @@ class InWorld:
     def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
         """Puts a moving shape there; it goes on along its way shifted by as much."""
         self.sim.place_shape(index, (x, y, heading))
-
-    def truth(self) -> Truth | None:
-        """What happened so far; None without recording."""
-        robot, sim = self.robot, self.sim
-        columns = robot.truth() if robot.description.has_board else robot.truth_to_now()
-        if not len(columns["time"]):
-            return None
-        begin, end = float(columns["time"][0]), float(columns["time"][-1])
-        return as_truth(columns["time"], columns, floor_plan(sim.arena, begin, end, sim.lateness(), sim.shifts()))
 
     def drain(self, *, ended: bool = False) -> Group:
         """See `boebot.boards.Session`. What belongs to the world goes with its first robot."""
@@ -92,7 +80,6 @@ class SimTransport:
         self._sim = robot.sim
         self._wait = wait
         self._pins = pins
-        self._closed = False
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
@@ -100,8 +87,6 @@ class SimTransport:
 
     def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
         """As `read`, with the instant at which the last byte had come (s)."""
-        if self._closed:
-            raise BoardError("the emulated board is closed")
         # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
         cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
         quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
@@ -113,27 +98,20 @@ class SimTransport:
 
     def set_baud(self, rate: int) -> None:
         """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
-        if self._closed:
-            raise BoardError("the emulated board is closed")
         self._robot.line_rate(rate)
         self.baud = rate
         self._robot.receive()
 
     def write(self, data: bytes) -> None:
         """Sends bytes, back to back from now on."""
-        if self._closed:
-            raise BoardError("the emulated board is closed")
         self._robot.send(data)
 
     def now(self) -> float:
         """Simulated time since power-on (s)."""
-        if self._closed:
-            raise BoardError("the emulated board is closed")
         return self._sim.cycle / CLOCK_HZ
 
     def close(self) -> None:
-        """Nothing is sent or received any more."""
-        self._closed = True
+        """It ends with its world."""
 
 
 class SimSession(InWorld):
@@ -153,10 +131,6 @@ class SimSession(InWorld):
         """See `boebot.boards.BoardSession`."""
         edges = {} if self._pins is None else self._pins.drain()
         return {**super().drain(ended=ended), **edges}
-
-    def looks(self) -> dict[str, Floats]:
-        """Where the range sensors looked from and what they saw: columns `LOOK`."""
-        return self.robot.looks()
 
     def counters(self) -> Mapping[str, float]:
         """Counters of the board, those of every simulated robot, `load` (share of cycles executed), `true_supply_v`."""
@@ -178,11 +152,6 @@ class SimSession(InWorld):
     def watchdog_resets(self) -> list[WatchdogReset]:
         """Where the watchdog of an emulated ATmega328P found the program; none of a board without one."""
         return watchdog_resets(self.board.watchdog_log(), self.robot.board.elf)
-
-    def close(self) -> None:
-        """Frees board and world. May be called twice."""
-        self.transport.close()
-        super().close()
 
 
 class DirectSession(InWorld):

@@ -15,7 +15,10 @@ import numpy as np
 from cffi import FFI
 
 from boebot.arenas import Arena, ArenaDescription, Polygon, Start
+from boebot.arenas.floor_plan import floor_plan
+from boebot.boards import Truth
 from boebot.description.robots import RobotDescription, Supply, load_robot
+from boebot.record.truth import as_truth
 from sim_bridge import _core
 from sim_bridge._core import ffi
 from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
@@ -146,6 +149,16 @@ def add_scripted(
     description = load_robot("shieldbot") if robot is None else robot
     added = sim.add(board, description, pose=pose, number=number, without=without, imperfections=imperfections)
     return Scripted(added, script)
+
+
+def happened(robot: SimRobot) -> Truth | None:
+    """What happened so far; None without recording."""
+    sim = robot.sim
+    columns = robot.truth() if robot.description.has_board else robot.truth_to_now()
+    if not len(columns["time"]):
+        return None
+    begin, end = float(columns["time"][0]), float(columns["time"][-1])
+    return as_truth(columns["time"], columns, floor_plan(sim.arena, begin, end, sim.lateness(), sim.shifts()))
 
 
 def distance_to_segments(arena: Arena, x: float, y: float) -> float:

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
 RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
 WHOLE = 65535  # such a number for the whole reach
+COGNITIVE_AT_MOST = 4  # more cognitive processes are not shown
 EVENTS_AT_MOST = 2_000  # of a stretch
 EDGES_AT_MOST = 50_000  # of a pin in a stretch: its first ones
 
@@ -100,7 +101,7 @@ def robot_data(
     series, names = view.columns, result.brain_names
     mind = names and {
         "behaviors": [{"name": name, "colour": style.behavior(index)} for index, name in enumerate(names.behaviors)],
-        "cognitive": [{"name": name} for name in names.cognitive[: scene.COGNITIVE_AT_MOST]],
+        "cognitive": [{"name": name} for name in names.cognitive[:COGNITIVE_AT_MOST]],
     }
     return {
         "title": result.title,
@@ -293,7 +294,7 @@ def _mind(record: BrainRecord) -> dict[str, Any]:
         "time": _array(record.time),
         "motor": _small(record.motor),
         "behaviors": [_array(record.utility_of(name)) for name in names.behaviors],
-        "cognitive": [_array(record.utility_of(name)) for name in names.cognitive[: scene.COGNITIVE_AT_MOST]],
+        "cognitive": [_array(record.utility_of(name)) for name in names.cognitive[:COGNITIVE_AT_MOST]],
         "switches": [
             [round(switch.time, 3), switch.on, switch.reason]
             for switch in record.switches

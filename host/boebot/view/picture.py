@@ -1,7 +1,7 @@
 """run.png: the run seen from above. Arena, true path, path by odometry, true contacts, the robot at start and end with
 what its sensors look at. What the robot does not have is neither drawn nor named. Of a brain of processes, the path has
 the colour of the active motor behavior, and its utilities stand below (as in Fig. 8.3 of the notes): a line for each
-process, and a band that says which motor behavior was active. Of several robots each path has the robot's colour."""
+motor behavior, and a band that says which was active. Of several robots each path has the robot's colour."""
 
 from __future__ import annotations
 
@@ -193,8 +193,6 @@ def _draw_utilities(axes: Axes, record: BrainRecord, end: float) -> None:
         colour = style.behavior(behavior)
         axes.fill_between((begun, until), low, high, facecolor=colour, edgecolor="none", zorder=3)
         axes.axvspan(begun, until, ymin=(-1.05 - LOW) / (HIGH - LOW), color=colour, alpha=0.07, lw=0, zorder=0)
-    for name in scene.shown_cognitive(record):
-        axes.plot(record.time, record.utility_of(name), color=style.FAINT, lw=0.8, ls=_dashes(record, name), zorder=4)
     for index, name in enumerate(record.names.behaviors):
         axes.plot(record.time, record.utility_of(name), color=style.behavior(index), lw=1.7, zorder=5)
     axes.set_xlim(0.0, max(end, 1e-3))
@@ -210,24 +208,15 @@ def _draw_utilities(axes: Axes, record: BrainRecord, end: float) -> None:
 
 def _legend_rows(record: BrainRecord) -> int:
     """Of the legend above the panel."""
-    return -(-(len(record.names.behaviors) + len(scene.shown_cognitive(record))) // LEGEND_COLUMNS)
-
-
-def _dashes(record: BrainRecord, name: str) -> tuple[int, tuple[float, ...]]:
-    return style.DASHES[record.names.cognitive.index(name) % len(style.DASHES)]
+    return -(-len(record.names.behaviors) // LEGEND_COLUMNS)
 
 
 def _utility_entries(record: BrainRecord, end: float) -> list[Artist]:
     shares = record.shares(end)
-    entries: list[Artist] = [
+    return [
         Line2D([], [], color=style.behavior(index), lw=2.4, label=f"{name} {100 * shares[name]:.0f} %")
         for index, name in enumerate(record.names.behaviors)
     ]
-    entries += [
-        Line2D([], [], color=style.FAINT, lw=0.8, ls=_dashes(record, name), label=name)
-        for name in scene.shown_cognitive(record)
-    ]
-    return entries
 
 
 # ---- several robots --------------------------------------------------------------------------------------------------

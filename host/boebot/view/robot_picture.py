@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 LEFT_IN, BELOW_IN, ABOVE_IN = 0.72, 0.55, 0.6  # around the field
 FIELD_IN, TALLEST_IN = 5.2, 4.2  # of the field: across, and at most upwards
 NAME_IN, NAME_ROW_IN = 0.35, 0.22  # from the field to the names beside it; from name to name
-WHEEL_M = 0.012  # beyond the middle of a wheel
 TITLE_COLUMNS = 62
 MARGIN = 0.04  # of the greater side
 
@@ -69,12 +68,7 @@ def write(robot: RobotDescription, path: Path) -> Path:
 
 def _bounds(robot: RobotDescription) -> tuple[Floats, Floats]:
     """Lower left and upper right corner of the robot and of what its sensors look at, as it is drawn (m)."""
-    body = robot.body
-    wheel = (body.wheel_radius_m, body.track_width_m / 2 + WHEEL_M)
-    points = [*(body.outline_m or [(body.radius_m, body.radius_m)]), wheel]
-    points += [(-x, -y) for x, y in points] if not body.outline_m else [(-wheel[0], -wheel[1])]
-    points += [point for items in scene.device_items(robot).values() for item in _shown(items) for point in item.points]
-    corners = np.array(points, dtype=np.float64)
+    corners = np.array([point for item in _shown(scene.robot_items(robot)) for point in item.points])
     low, high = corners.min(axis=0), corners.max(axis=0)
     edge = MARGIN * float((high - low).max())
     return low - edge, high + edge

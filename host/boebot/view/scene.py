@@ -31,7 +31,6 @@ OPEN_M = 0.3  # to see around a path in an open field, at least
 OPEN_ARENA_M = 1.0  # around the robots in an open field
 OPEN_SHARE = 0.15  # of the path's extent, to see around it
 SAME_S = 1e-6  # sweeps nearer in time than this are one
-COGNITIVE_AT_MOST = 4  # more cognitive processes are not drawn
 SLIMMEST = 0.4  # shorter side by longer side of what is shown of an open field
 
 
@@ -140,12 +139,6 @@ def swept(series: Columns, path: Pose) -> list[Swept]:
         pose = Pose(x + cosine * forward - sine * left, y + sine * forward + cosine * left, heading + sweeps.heading)
         found.append(Swept(time, pose, sweeps, ticks))
     return found
-
-
-def shown_cognitive(record: BrainRecord) -> Sequence[str]:
-    """The cognitive processes that are drawn: those whose utility changes, where they are few."""
-    changing = [name for name in record.names.cognitive if len(record) and np.ptp(record.utility_of(name)) > 0]
-    return changing if len(changing) <= COGNITIVE_AT_MOST else []
 
 
 def bounds(*views: View) -> tuple[Floats, Floats]:

@@ -132,8 +132,7 @@ def test_identity_goes_by_iso_tp_with_its_flow_control(run: RunResult, logs: dic
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs and reports leave no pictures and pages: those take their time, and other tests look at them."""
-    monkeypatch.setattr("boebot.view._write_picture", lambda robots, path, error: path.touch())
-    monkeypatch.setattr("boebot.view._write_page", lambda robots, path: path.touch())
+    monkeypatch.setattr("boebot.view._draw", lambda robots, error, path: path.touch())
 
 
 def together(folder: Path, *robots: str) -> str:

@@ -14,7 +14,7 @@ from boebot.description.robots import load_robot
 from boebot_course.vehicle_view import View
 from sim_bridge.sessions.session import DirectSession
 from sim_bridge.sessions.world import NATIVE, direct_world, open_on
-from sim_bridge.tests.simulated import arena_of, square
+from sim_bridge.tests.simulated import arena_of, happened, square
 from sim_bridge.vehicle import Vehicle, arsim
 
 
@@ -72,7 +72,7 @@ def test_a_run_tells_of_its_own_time() -> None:
     session = open_on(NATIVE, BoardRequest(robot=load_robot("shieldbot"), arena="showcase"))
     try:
         session.transport.read(2.0, 2.0)
-        truth = session.truth()
+        truth = happened(session.robot)
     finally:
         session.close()
     assert truth is not None and truth.plan.described.name == "showcase"
@@ -82,7 +82,7 @@ def test_a_run_tells_of_its_own_time() -> None:
     assert isinstance(vehicle, DirectSession)
     for _ in range(100):
         vehicle.step(0.1, 0.1)
-    truth = vehicle.truth()
+    truth = happened(vehicle.robot)
     assert truth is not None and truth.plan.moving[0].time[-1] == pytest.approx(1.0)
     assert truth.plan.moving[0].pose(1.0)[0] == pytest.approx(1.0 + 0.6 / 4)
 

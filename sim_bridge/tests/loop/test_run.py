@@ -85,9 +85,10 @@ def test_long_silence_of_the_reader_loses_nothing() -> None:
     assert robot.robot.receive() == bytes(i & 0xFF for i in range(200_000))
 
 
-def test_closed_transport_says_so() -> None:
-    transport = SimTransport(scripted().robot, "script")
-    transport.close()
+def test_transport_of_a_closed_world_says_so() -> None:
+    robot = scripted().robot
+    transport = SimTransport(robot, "script")
+    robot.sim.close()
     for call in (lambda: transport.read(0.1), lambda: transport.write(b"x"), transport.now):
         with pytest.raises(BoardError, match="closed"):
             call()

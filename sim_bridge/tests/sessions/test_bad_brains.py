@@ -30,6 +30,7 @@ from boebot.running import loop
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from sim_bridge.sessions.session import DirectSession, SimSession
+from sim_bridge.tests.simulated import happened
 
 pytestmark = pytest.mark.unsanitized
 
@@ -63,7 +64,7 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 
     def look(session: SimSession) -> None:
         session.transport.read(1.0, 1.0)  # wheels that nothing drives have stopped by then
-        truth = session.truth()
+        truth = happened(session.robot)
         assert truth is not None and truth.left_speed is not None
         stopped.append(bool(abs(truth.left_speed[-1]) < 1e-3 < abs(truth.left_speed).max()))
 
@@ -87,8 +88,8 @@ def stood_still(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         session.close = look_and_close  # type: ignore[method-assign]
         return world
 
-    for name in ("_write_picture", "_write_page"):  # tested elsewhere, and they take long
-        monkeypatch.setattr(f"boebot.view.{name}", lambda robots, path, error=None: path.touch())
+    # tested elsewhere, and they take long
+    monkeypatch.setattr("boebot.view._draw", lambda robots, error, path: path.touch())
     monkeypatch.setattr(loop, "open_world", opened)
     return stopped
 

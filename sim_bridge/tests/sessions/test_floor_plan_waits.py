@@ -21,9 +21,9 @@ from boebot.record.truth import lateness
 from boebot_course.recorder import Recorder
 from boebot_course.vehicle_view import View
 from sim_bridge.boards.board import CLOCK_HZ
-from sim_bridge.sessions.session import DirectSession, InWorld
+from sim_bridge.sessions.session import DirectSession
 from sim_bridge.sim import Sim, SimRobot
-from sim_bridge.tests.simulated import MS, add_scripted, arena_of, square
+from sim_bridge.tests.simulated import MS, add_scripted, arena_of, happened, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel
 
 pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests of world, parts and loop
@@ -105,7 +105,7 @@ def test_a_robot_without_a_board_is_pinched_and_leaves() -> None:
     assert 0.5 < late.waited[-1] < PINCHED_S
     pinched.signals(1.0, 1.0)
     seen += run(sim, FREE_S)
-    shape = check(InWorld(pinched, shared=True).truth(), arena, seen)
+    shape = check(happened(pinched), arena, seen)
     assert abs(deepest(shape, pinched.truth(), robot.body.radius_m)) < 2e-6, "it was touched, never entered"
     (late,) = sim.lateness()
     assert len(late.time) < 100, "rows only where something changes"
@@ -121,14 +121,14 @@ def test_a_robot_with_a_board_is_pinched_and_taken_away(disc: bool) -> None:
     seen = list(run(sim, PINCHED_S))
     robot.pins.place(0.0, 1.0, 0.0)
     seen += run(sim, FREE_S)
-    check(InWorld(robot.robot, shared=True).truth(), arena, seen)
+    check(happened(robot.robot), arena, seen)
 
 
 def test_without_a_record_it_is_told_by_the_path() -> None:
     sim = Sim(press(), record=False)
     sim.add(None, load_robot("arsim"))
     sim.run(1000 * MS)
-    assert sim.lateness() == [] and InWorld(sim.robot(0), shared=True).truth() is None
+    assert sim.lateness() == [] and happened(sim.robot(0)) is None
 
 
 def test_a_session_tells_it() -> None:
@@ -138,7 +138,7 @@ def test_a_session_tells_it() -> None:
     for step in range(700):
         session.step(*((1.0, 1.0) if step > 300 else (0.0, 0.0)))
         seen.append(poses_in(sim))
-    check(session.truth(), sim.arena, seen)
+    check(happened(session.robot), sim.arena, seen)
 
 
 def test_record_does_not_depend_on_how_often_it_is_brought_up_to_date() -> None:

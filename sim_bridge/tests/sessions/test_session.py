@@ -19,6 +19,7 @@ from boebot.record.record import Record
 from sim_bridge.boards.board import CLOCK_HZ, Damage
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sessions.world import NATIVE, open_on
+from sim_bridge.tests.simulated import happened
 
 
 def open_with(**wishes: Any) -> SimSession:
@@ -77,7 +78,7 @@ def test_each_read_brings_one_whole_message(session: SimSession) -> None:
 
 def test_it_drives_straight_and_records_it(session: SimSession) -> None:
     drive(session, 0.5, 0.5, 3.0)
-    truth = session.truth()
+    truth = happened(session.robot)
     assert truth is not None
     assert truth.x[-1] == pytest.approx(3.0 * 0.15, abs=0.05)
     assert abs(truth.y[-1]) < 0.01
