@@ -120,10 +120,10 @@ def _speed(given: str | float) -> float:
     """Of "0.5", "10" or "max"."""
     if given == "max":
         return math.inf
-    try:
-        return float(given)
-    except ValueError:
-        raise typer.BadParameter(f"{given!r} is no speed; expected a number, 1 for real time, or max") from None
+    with contextlib.suppress(ValueError):
+        if 0.01 <= float(given) <= 10_000:
+            return float(given)
+    raise typer.BadParameter(f"{given!r} is no speed; expected 0.01 to 10000, 1 for real time, or max")
 
 
 View = Annotated[
@@ -193,8 +193,7 @@ def runner(*, view: bool, speed: float | None, port: int | None, waits: bool) ->
 
         yield execute
         return
-    from boebot.live.controls import usual_speed
     from boebot.live.session import opened, run_viewed
 
-    with opened(port=port or 0, speed=1.0 if speed is None else usual_speed(speed)) as page:
+    with opened(port=port or 0, speed=None if speed == math.inf else speed or 1.0) as page:
         yield functools.partial(run_viewed, page, waits=waits)

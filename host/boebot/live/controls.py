@@ -6,7 +6,6 @@ of the wall clock (a hidden page lets go); its brain drives again only once some
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections import deque
@@ -151,16 +150,3 @@ def _why_not(need: str) -> str:
     if need in PACED or need == "drag":
         return "only a simulated run that is not in real time stands still, and only a simulated robot is put elsewhere"
     return "this run has nothing of the kind"
-
-
-def usual_speed(speed: float | None) -> float | None:
-    """A speed as people give it, checked: None or infinite: as fast as possible.
-
-    Raises:
-        BoebotError: it is none.
-    """
-    if speed is None or speed == math.inf:
-        return None
-    if not 0.01 <= speed <= 10_000:
-        raise BoebotError(f"a run cannot go {speed:g} times as fast as real time; expected 0.01 to 10000, or max")
-    return float(speed)

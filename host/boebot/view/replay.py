@@ -7,7 +7,6 @@ page of the live view asks for its data, and may reach the server that it came f
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -80,18 +79,19 @@ def live_page(server: str) -> str:
 
 def joined(content: dict[str, Any] | None, policy: str = POLICY) -> str:
     """All of it; the data may hold any text."""
-    data = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    page = _read("page.html")
     parts = {
-        "POLICY": policy,
-        "COLOURS": colours(),
-        "STYLE": _read("style.css"),
-        "SCRIPT": "\n".join(map(_read, SCRIPTS)),
-        "DATA": data,
-        "LAYERS": json.dumps(style.LAYERS),
+        "/*POLICY*/": policy,
+        "/*COLOURS*/": colours(),
+        "/*STYLE*/": _read("style.css"),
+        "/*SCRIPT*/": "\n".join(map(_read, SCRIPTS)),
+        "/*LAYERS*/[]": json.dumps(style.LAYERS),
+        # at last, as nothing is looked for in the data
+        "/*DATA*/null": json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
     }
-    # DATA and LAYERS stand in SCRIPT, so that is filled in before; nothing is looked for in the data
-    page = _filled(_read("page.html"), {name: parts[name] for name in ("POLICY", "COLOURS", "STYLE", "SCRIPT")})
-    return _filled(page, {name: parts[name] for name in ("DATA", "LAYERS")})
+    for place, part in parts.items():
+        page = page.replace(place, part)
+    return page
 
 
 def colours() -> str:
@@ -103,11 +103,6 @@ def colours() -> str:
 
 def _variables(values: dict[str, str]) -> str:
     return " ".join(f"--{name}: {value};" for name, value in values.items())
-
-
-def _filled(text: str, parts: dict[str, str]) -> str:
-    """With each part where its name stands, as in /*STYLE*/."""
-    return re.sub(r"/\*([A-Z]+)\*/(null|\[\])?", lambda found: parts.get(found[1], found[0]), text)
 
 
 def _read(name: str) -> str:

@@ -314,7 +314,7 @@ def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> Non
     ("arguments", "sentence"),
     [
         (["--speed", "2"], "expected --view with them"),
-        (["--view", "--speed", "0"], "expected 0.01 to 10000, or max"),
+        (["--view", "--speed", "0"], "expected 0.01 to 10000, 1 for real time, or max"),
         (["--view", "--speed", "quick"], "'quick' is no speed"),
     ],
 )

@@ -324,24 +324,14 @@ function drawTrails(c) {
   c.globalAlpha = 1;
 }
 function drawMarks(c) {
-  const places = kind =>
-    run.events.filter(event => event.kind === kind).map(event => poseAt(run.time.values, run.path, event.time));
-  c.strokeStyle = colours.touch;
-  c.lineWidth = 1.4 * ratio;
-  for (const [x, y] of places("touch")) {
-    c.beginPath();
-    c.arc(X(x), Y(y), 3.5 * ratio, 0, 7);
-    c.stroke();
-  }
-  c.strokeStyle = colours.contact;
-  c.lineWidth = 2 * ratio;
-  for (const [x, y] of places("contact")) {
-    const r = 4 * ratio;
-    c.beginPath();
-    for (const side of [-1, 1]) {
-      c.moveTo(X(x) - r, Y(y) - side * r);
-      c.lineTo(X(x) + r, Y(y) + side * r);
-    }
-    c.stroke();
+  font(c, 14);
+  c.textAlign = "center";
+  c.textBaseline = "middle";
+  for (const { kind, time } of run.events) {
+    if (kind !== "touch" && kind !== "contact") continue;
+    const [mark, colour] = EVENTS[kind],
+      [x, y] = poseAt(run.time.values, run.path, time);
+    c.fillStyle = colours[colour];
+    c.fillText(mark, X(x), Y(y));
   }
 }
