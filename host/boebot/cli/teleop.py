@@ -86,19 +86,15 @@ def sensors(robot: Robot) -> str:
     drive = "stopped, latched  " if robot.latched else f"drive {robot.command.left:+.2f} {robot.command.right:+.2f}"
     parts = [f"{robot.time:7.1f} s", drive]
     equipment = robot.observation.equipment
-    if equipment.has("whisker_left") and equipment.has("whisker_right"):
-        parts.append(
-            f"whiskers {'L' if robot.whisker_left.pressed else '·'}{'R' if robot.whisker_right.pressed else '·'}"
-        )
-    if equipment.has("infrared_left") and equipment.has("infrared_right"):
-        parts.append(
-            f"IR {'L' if robot.infrared_left.detected else '·'}{'R' if robot.infrared_right.detected else '·'}"
-        )
+    for group, device, sign in (("whiskers", "whisker", "pressed"), ("infrared", "infrared", "detected")):
+        if equipment.has(group):
+            is_on = {side: getattr(getattr(robot, f"{device}_{side}"), sign) for side in ("left", "right")}
+            parts.append(f"{group} {'L' if is_on['left'] else '·'}{'R' if is_on['right'] else '·'}")
     if equipment.has("ping"):
         distance = robot.ping.distance
         unknown = robot.ping.status.name.lower().replace("_", " ")
         parts.append(f"ping {unknown}" if distance is None else f"ping {distance:4.2f} m")
-    if equipment.has("encoder_left") and equipment.has("encoder_right"):
+    if equipment.has("encoders"):
         parts.append(f"encoders {robot.encoder_left.count} {robot.encoder_right.count}")
     return "   ".join(parts)
 

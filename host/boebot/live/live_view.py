@@ -146,7 +146,8 @@ class LiveView:
 
     def _make_chunk(self, time_s: float, *, is_over: bool = False) -> None:
         for robot in self._robots if not is_over else ():
-            _gather(robot)
+            with interrupts.uncut():
+                gather_rows(robot.driver, robot.task)
         # the first chunk has all robots from their beginning
         if not (any if self._audience.knows_run else all)([chunks.gather() for chunks in self._chunks]):
             return
@@ -240,18 +241,6 @@ class Heard:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._own, name)
-
-
-def _gather(robot: Hands) -> None:
-    """Brings what has happened into its record; no row is lost by Ctrl-C.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C.
-    """
-    with interrupts.held():
-        gather_rows(robot.driver, robot.task)
-    if interrupts.first is not None:
-        raise KeyboardInterrupt
 
 
 def _possible(robots: Sequence[Hands]) -> frozenset[str]:

@@ -42,6 +42,8 @@ TICKS = 20_000  # of a piece
 TRUTH_BEFORE_S = 0.5  # of the truth, before a piece's first tick
 LATE_TICKS = 100  # after a piece's last one: a message of a slow device may come so much later than its reading
 MESSAGES = {kind.NAME: kind for kind in DEVICE_MESSAGES}
+Directions = tuple[WheelDirection, WheelDirection]
+"""In which direction each wheel is thought to turn, where its encoder does not say it."""
 _APART = 1 << 40  # ticks between two starts of the board, as positions have them
 _NUMPY_CODES = {"b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 _TELEMETRY = np.dtype(
@@ -150,8 +152,8 @@ class Columns(ABC):
 
     @abstractmethod
     def locate(self, directions: Directions, place: tuple[float, float, float] | None) -> None:
-        """Computes `odometry`. `directions`: of the wheels so far; they go on with it. `place`: that of the first tick;
-        None: it is the run's first."""
+        """Computes `odometry`. `directions`: of the left and the right wheel so far; they go on with it. `place`: that
+        of the first tick; None: it is the run's first."""
 
     @cached_property
     def _places(self) -> dict[str, Place]:
@@ -262,14 +264,6 @@ def _held_all(every: Sequence[Held]) -> Held:
 # ---- a robot with a board, and one without ---------------------------------------------------------------------------
 
 
-class Directions:
-    """In which direction each wheel is thought to turn, where its encoder does not say it."""
-
-    def __init__(self) -> None:
-        self.encoder_left = WheelDirection()
-        self.encoder_right = WheelDirection()
-
-
 class BoardColumns(Columns):
     """Of a robot with a board: its telemetry."""
 
@@ -302,8 +296,8 @@ class BoardColumns(Columns):
         """See `Columns`: by the encoders."""
         left, right = self.signals
         self.travel = (
-            self._travel("encoder_left", left, directions.encoder_left),
-            self._travel("encoder_right", right, directions.encoder_right),
+            self._travel("encoder_left", left, directions[0]),
+            self._travel("encoder_right", right, directions[1]),
         )
         if self.robot.has("encoder_left") and self.robot.has("encoder_right"):
             pose = Pose(*dead_reckoning(*self.travel, self.robot.body.track_width_m))
@@ -413,7 +407,7 @@ class Reader:
         self._ticks = "telemetry" if result.layout is None else "readings"
         self._rows: dict[str, Block] = {}  # from the last tick that was read on
         self._first = 0
-        self._directions = Directions()
+        self._directions = WheelDirection(), WheelDirection()
         self._place: tuple[float, float, float] | None = None  # by odometry, at that tick
 
     def feed(self, group: Group) -> None:

@@ -38,7 +38,6 @@ PAUSE_S = 0.005  # between two looks whether it is done
 LARGEST_CHUNK = 1 << 28  # B, that is read; a second of a run has a hundredth of it
 PIECE = 1 << 16  # B, that are read at a time
 TRIES, SPARE = 8, 1 << 26  # times its size, and B more, that a file is looked at for what is sound
-TEXT = "text/plain"
 LONGEST_NAME = 200  # B, of an attachment that is named
 NAMED = 3  # damages, one by one; of more it is said how many
 
@@ -90,9 +89,9 @@ class RecordWriter:
         self._groups, self._until_s = number + 1, time_s
         self._put(partial(self._write, rows, number, *(max(0, round(each * 1e9)) for each in times)))
 
-    def attach(self, name: str, data: bytes, media_type: str = TEXT) -> None:
+    def attach(self, name: str, data: bytes) -> None:
         """A file within the file. Raises as `check`."""
-        self._put(partial(self._attach, name, data, media_type))
+        self._put(partial(self._attach, name, data))
 
     def finish(self) -> None:
         """Ends the record; nothing is written any more. Raises as `check`, and where the file has no name any more."""
@@ -139,7 +138,8 @@ class RecordWriter:
             data = packed(block, stream)
             self._writer.add_message(self._channels[stream], time_ns, data, begin_ns, sequence=number)
 
-    def _attach(self, name: str, data: bytes, media_type: str) -> None:
+    def _attach(self, name: str, data: bytes) -> None:
+        media_type = "application/json" if name.endswith(".json") else "text/plain"
         self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
 
 

@@ -26,7 +26,6 @@ from boebot.record.run_folder import FORMAT, RECORD, RunFolder
 
 R = TypeVar("R", bound=Run)
 BEGIN, END = "begin.json", "end.json"
-JSON = "application/json"
 
 
 class Recording:
@@ -66,7 +65,7 @@ class Recording:
             writer = RecordWriter(folder.new_record(), str(folder.path / RECORD), waits=waits)
             for name, data in sources.items():
                 writer.attach(as_utf8(name), data)
-            writer.attach(BEGIN, say(results, request=requested), JSON)
+            writer.attach(BEGIN, say(results, request=requested))
             for group in self._kept.groups():
                 writer.write(group, 0.0)
             self._kept.written = writer
@@ -75,7 +74,7 @@ class Recording:
         """Nothing comes any more. Returns why the file is not whole. `results`: what is known at the run's end."""
         if self._kept.written is not None:
             try:
-                self._kept.written.attach(END, say(results), JSON)
+                self._kept.written.attach(END, say(results))
                 self._kept.written.finish()
             except BoebotError as error:
                 return error

@@ -71,6 +71,15 @@ def held() -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def uncut() -> Iterator[None]:
+    """The same, and once the block is over it raises KeyboardInterrupt for it: what is on its way is not lost."""
+    with held():
+        yield
+    if first is not None:
+        raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
 def heard() -> Iterator[None]:
     """While a run goes on, signals that would raise KeyboardInterrupt are handled as above; others are the program's
     own affair. Outside the main thread, which alone hears of them, they stay as they are."""

@@ -96,25 +96,6 @@ def _check_own_brains(tasks: Sequence[Task]) -> None:
                 )
 
 
-def driver_of(session: BoardSession | VehicleSession, task: Task) -> Driver:
-    """Who drives that robot: over the link to its board, or direct.
-
-    Raises:
-        BoebotError: it cannot be driven so.
-    """
-    driver: Driver
-    if task.board.robot.has_board:
-        from boebot.running.board_driver import BoardDriver
-
-        driver = BoardDriver(cast(BoardSession, session), task)
-    else:
-        from boebot.running.direct_driver import DirectDriver
-
-        driver = DirectDriver(cast(VehicleSession, session), task)
-    driver.robot.showing.is_kept = True
-    return driver
-
-
 def gather_rows(driver: Driver, task: Task, *, ended: bool = False) -> None:
     """Brings what has happened into the record, where it waits to be kept."""
     append_brain(task.record, task.brain.brain, driver.robot)
@@ -205,16 +186,25 @@ class _Robot:
                 self.result = self._result(driver)  # now: later is the others' time
 
     def _driver(self) -> Driver:
-        try:
-            return driver_of(self.session, self.task)
-        except BoebotError as error:
-            if self.task.board.robot.has_board:
-                from boebot.record import figures
+        """Who drives it: over the link to its board, or direct."""
+        driver: Driver
+        if self.task.board.robot.has_board:
+            from boebot.record import figures
+            from boebot.running.board_driver import BoardDriver
 
-                board = cast(BoardSession, self.session)
+            board = cast(BoardSession, self.session)
+            try:
+                driver = BoardDriver(board, self.task)
+            except BoebotError as error:
                 for sentence in (*board.notes(), *figures.hang_sentences(board.watchdog_resets())):
                     error.add_note(sentence)
-            raise
+                raise
+        else:
+            from boebot.running.direct_driver import DirectDriver
+
+            driver = DirectDriver(cast(VehicleSession, self.session), self.task)
+        driver.robot.showing.is_kept = True
+        return driver
 
     def _result(self, driver: Driver) -> RunResult:
         task, brain, status = self.task, self.task.brain, driver.status()
@@ -249,11 +239,8 @@ class _Robot:
             return self.thread.resume()
         if is_live(self.task.on) or self.task.board.realtime:
             return next(self._stretches, DONE) or _STEP
-        with interrupts.held():
-            found = next(self._stretches, DONE) or _STEP
-        if interrupts.first is not None:
-            raise KeyboardInterrupt
-        return found
+        with interrupts.uncut():
+            return next(self._stretches, DONE) or _STEP
 
     def step(self, watch: StepWatch) -> None:
         """A step of its brain.
@@ -280,11 +267,9 @@ class _Robot:
             KeyboardInterrupt: Ctrl-C.
         """
         if self.task.record.is_due() and self.driver is not None and not self._is_ending:
-            with interrupts.held():
+            with interrupts.uncut():
                 gather_rows(self.driver, self.task)
                 self.task.record.keep(self.time_s)
-            if interrupts.first is not None:
-                raise KeyboardInterrupt
 
     def stop(self, error: BoebotError) -> None:
         """Begins to end it, if it has not ended."""

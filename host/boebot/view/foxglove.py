@@ -54,7 +54,6 @@ if TYPE_CHECKING:
 
 WORLD = "world"
 FIELD = re.compile(r"\W|^(?=\d)", re.ASCII)  # what no name of a Protobuf field has
-SAME_S = 1e-6  # sweeps nearer in time than this are one
 
 
 Entry = tuple[float, str, Any]
@@ -223,7 +222,7 @@ def _sweeps(result: Run, part: Columns, prefix: str) -> Iterator[Entry]:
             continue
         distances = part.values(name)
         sampled = part.time - part.ages(name)
-        is_new = np.diff(sampled, prepend=-np.inf) > SAME_S
+        is_new = np.diff(sampled, prepend=-np.inf) > scene.SAME_S
         half = laser.step_rad * (laser.rays - 1) / 2
         place = foxglove_scene.pose(*laser.position_m, laser.heading_rad, height=laser.height_m)
         for index in np.flatnonzero(is_new[part.first :]) + part.first:

@@ -9,15 +9,15 @@ runs     one per robot: `robot_data`, with its `rows`
 moving   poses of the moving shapes, on the clock of the truth, which begins `begin` before a run's own
 live     null; or what can be done while the run goes on (boebot.live)
 
-Of rows: `flags` are the bits below, `signs` which devices are on; `shown` and `layers`: what the brain showed and
-sketched; `mind`: what a brain of processes did, or null; `events`: time, kind ("contact", "touch", "fault", "lost",
-"reset" or "intervention") and a text, to which the page adds the switches of `mind`; `pins`: output edges of a board's
-pins, where they were recorded (`time`: float64); `swept`: of each sensor with a fan of rays, of each sweep its time,
-the sensor's pose and the rays' distances, sweep after sweep (uint16: 65535 is `reach`, in m), of at most
-`RAYS_AT_MOST` rays.
+Of rows: `state` as of `states`; `contact`: 1 where the body has touched something; `signs`: which devices are on;
+`shown` and `layers`: what the brain showed and sketched; `mind`: what a brain of processes did, or null; `events`:
+time, kind ("contact", "touch", "fault", "lost", "reset" or "intervention") and a text, to which the page adds the switches of
+`mind`; `pins`: output edges of a board's pins, where they were recorded (`time`: float64); `swept`: of each sensor with
+a fan of rays, of each sweep its time, the sensor's pose and the rays' distances, sweep after sweep (uint16: 65535 is
+`reach`, in m), of at most `RAYS_AT_MOST` rays.
 
-Arrays are little-endian float32 in base64 (`flags`, `signs`, `motor` and `level`: uint8), one entry per tick; those of
-`mind` one per step of the brain.
+Arrays are little-endian float32 in base64 (`state`, `contact`, `signs`, `motor` and `level`: uint8), one entry per
+tick; those of `mind` one per step of the brain.
 """
 
 from __future__ import annotations
@@ -56,9 +56,6 @@ WHOLE = 65535  # such a number for the whole reach
 COGNITIVE_AT_MOST = 4  # more cognitive processes are not shown
 EVENTS_AT_MOST = 2_000  # of a stretch
 EDGES_AT_MOST = 50_000  # of a pin in a stretch: its first ones
-
-# bits of the page's `flags` array
-CONTACT, DEAD_MAN, MOTORS_OFF, FALLBACK = (1 << bit for bit in range(4))
 
 FAULTS = {
     Status.DEAD_MAN: "motors stopped by the dead-man",
@@ -175,7 +172,8 @@ def rows_data(
         "turret": _array(view.turret),
         "left": _array(series.signals[0]),
         "right": _array(series.signals[1]),
-        "flags": _small(flags(series)),
+        "state": _small(states(series)),
+        "contact": _small(np.zeros(len(series)) if series.contact is None else series.contact),
         "signs": [_small(values) for _, _, values in series.signs()],
         "readings": [{"values": _array(one.values), "ages": _array(one.ages)} for one in series.readouts()],
         "shown": _shown(view.shown),
@@ -187,16 +185,11 @@ def rows_data(
     }
 
 
-def flags(series: Columns) -> NDArray[np.intp]:
-    """The bits of each tick."""
-    status, contact = series.status, np.False_ if series.contact is None else series.contact
-    found: NDArray[np.intp] = (
-        contact * CONTACT
-        | ((status & int(Status.DEAD_MAN)) != 0) * DEAD_MAN
-        | ((status & int(Status.MOTORS_ENABLED)) == 0) * MOTORS_OFF
-        | ((status & int(Status.FALLBACK)) != 0) * FALLBACK
-    )
-    return found
+def states(series: Columns) -> NDArray[np.intp]:
+    """What drives the motors at each tick: 0 the brain, 1 nothing, 2 nothing (dead-man), 3 the board's own brain."""
+    flags = series.status
+    is_on, dead_man, fallback = Status.MOTORS_ENABLED, Status.DEAD_MAN, Status.FALLBACK
+    return np.select([(flags & fallback) > 0, (flags & dead_man) > 0, (flags & is_on) == 0], [3, 2, 1], 0)
 
 
 def events(series: Columns, whiskers: Sequence[str]) -> list[Event]:

@@ -103,8 +103,20 @@ class View:
 
     @cached_property
     def swept(self) -> list[Swept]:
-        """What sensors with fans of rays measured."""
-        return swept(self.columns, self.path)
+        """The sweeps of each sensor with a fan of rays."""
+        path, found = self.path, []
+        for sweeps in self.columns.sweeps():
+            sampled = self.columns.time - sweeps.ages
+            ticks = np.flatnonzero(np.diff(sampled, prepend=-np.inf) > SAME_S)
+            time = sampled[ticks]
+            track = (path.x, path.y, np.unwrap(path.heading))
+            x, y, heading = (np.interp(time, self.columns.time, row) for row in track)
+            (forward, left), (cosine, sine) = sweeps.position, (np.cos(heading), np.sin(heading))
+            pose = Pose(
+                x + cosine * forward - sine * left, y + sine * forward + cosine * left, heading + sweeps.heading
+            )
+            found.append(Swept(time, pose, sweeps, ticks))
+        return found
 
     def origin(self, sketch: Sketch) -> tuple[float, float, float]:
         """Of the frame of a sketch, as it lies in the picture at the run's end: m, m, rad."""
@@ -125,20 +137,6 @@ def view(result: Run) -> View:
         brain=brain if brain is not None and len(brain) else None,
         plan=result.plan if result.has_truth else FloorPlan(),
     )
-
-
-def swept(series: Columns, path: Pose) -> list[Swept]:
-    """The sweeps of each such sensor of a robot on that path, which has a pose for each tick."""
-    found = []
-    for sweeps in series.sweeps():
-        sampled = series.time - sweeps.ages
-        ticks = np.flatnonzero(np.diff(sampled, prepend=-np.inf) > SAME_S)
-        time = sampled[ticks]
-        x, y, heading = (np.interp(time, series.time, row) for row in (path.x, path.y, np.unwrap(path.heading)))
-        (forward, left), (cosine, sine) = sweeps.position, (np.cos(heading), np.sin(heading))
-        pose = Pose(x + cosine * forward - sine * left, y + sine * forward + cosine * left, heading + sweeps.heading)
-        found.append(Swept(time, pose, sweeps, ticks))
-    return found
 
 
 def bounds(*views: View) -> tuple[Floats, Floats]:

@@ -173,7 +173,7 @@ def test_replay_page_needs_nothing_from_outside(folder: Path) -> None:
 def test_replay_page_holds_the_run(result: RunResult, folder: Path) -> None:
     data = data_of((folder / "replay.html").read_text())
     time, x = (np.frombuffer(base64.b64decode(text), "<f4") for text in (data["rows"]["time"], data["rows"]["path"][0]))
-    flags = np.frombuffer(base64.b64decode(data["rows"]["flags"]), np.uint8)
+    flags = np.frombuffer(base64.b64decode(data["rows"]["state"]), np.uint8)
     assert len(time) == len(x) == len(flags) == result.record.ticks
     assert time[-1] == 30.0
     assert np.allclose(x, result.true_pose.x, atol=1e-6)  # type: ignore[union-attr]
@@ -189,7 +189,7 @@ def test_long_run_is_thinned_for_the_page(result: RunResult, monkeypatch: pytest
     data = replay.run_data(long, scene.view(long))
     count = len(base64.b64decode(data["rows"]["time"])) // 4
     assert 700 < count <= 1001
-    assert len(base64.b64decode(data["rows"]["flags"])) == count
+    assert len(base64.b64decode(data["rows"]["state"])) == count
 
 
 def test_text_cannot_break_out_of_the_page(result: RunResult, tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def rows(time: list[float], x: list[float] | None = None, **more: Any) -> dict[s
         **dict.fromkeys(("turret", "left", "right"), none),
         "time": packed(time),
         "path": [packed(time if x is None else x), none, none],
-        "flags": packed([0] * len(time), "u1"),
+        **dict.fromkeys(("state", "contact"), packed([0] * len(time), "u1")),
         "shown": {"time": packed([]), "numbers": [], "texts": []},
         **{name: [] for name in ("readings", "signs", "layers", "swept", "events", "pins")},
         **dict.fromkeys(("estimate", "mind")),

@@ -13,8 +13,6 @@ function into(c, [x, y, heading]) {
   c.scale(scale, -scale);
   c.rotate(heading);
 }
-const CONTACT_BIT = 1; // of the flags, see page_data.py
-const [DEAD_MAN, MOTORS_OFF, FALLBACK] = [2, 4, 8];
 const ofPoints = width => ((width * 4) / 3) * (ratio / scale); // a width in points, where c draws metres
 const colourOf = (name, own) => (name === "robot" ? own : (colours[name] ?? readable(name)));
 // One item, in the frame that c draws in. `own`: the colour of its robot; `one`, `i`: the robot and the tick whose signs

@@ -77,7 +77,8 @@ class Run {
     this.turret = new Column();
     this.left = new Column();
     this.right = new Column();
-    this.flags = new Column(Uint8Array);
+    this.state = new Column(Uint8Array);
+    this.contact = new Column(Uint8Array);
     this.signs = about.signs.map(sign => ({ ...sign, values: new Column(Uint8Array) })); // of devices that are on or off
     this.readings = about.readings.map(one => ({ ...one, values: new Column(), ages: new Column() }));
     this.shownTime = new Column();
@@ -115,13 +116,13 @@ class Run {
   }
   // Whether a sign, or "contact", is on at a tick.
   isOn(name, i) {
-    if (name === "contact") return (this.flags.values[i] & CONTACT_BIT) > 0;
+    if (name === "contact") return this.contact.values[i] > 0;
     return this.signs.some(sign => sign.device === name && sign.values.values[i] > 0);
   }
 
   append(rows) {
     for (const name of ["time", "turret", "left", "right"]) this[name].append(floats(rows[name]));
-    this.flags.append(bytes(rows.flags));
+    for (const name of ["state", "contact"]) this[name].append(bytes(rows[name]));
     rows.signs.forEach((values, k) => this.signs[k].values.append(bytes(values)));
     appendEach(this.path, rows.path);
     if (this.estimate && rows.estimate) appendEach(this.estimate, rows.estimate);

@@ -106,17 +106,9 @@ function bar({ style }, value) {
   style.left = (value < 0 ? 50 + 50 * Math.max(-1, value) : 50) + "%";
   style.width = Math.min(50, Math.abs(50 * value)) + "%";
 }
-const stateText = bits =>
-  bits & FALLBACK
-    ? "driven by the board's own brain"
-    : bits & DEAD_MAN
-      ? "stopped by dead-man"
-      : bits & MOTORS_OFF
-        ? "off"
-        : "driven";
+const STATES = ["driven", "off", "stopped by dead-man", "driven by the board's own brain"]; // as of page_data.py
 function tellMoment() {
   const i = tickOf(run),
-    bits = run.flags.values[i],
     place = placeOf(run);
   say("clock", now.toFixed(2) + " / " + run.duration.toFixed(2) + " s");
   if (run.mind) tellMind();
@@ -124,7 +116,7 @@ function tellMoment() {
     bar($(name + "Bar"), run[name].values[i]);
     say(name + "Text", signed(run[name].values[i]));
   }
-  say("state", stateText(bits));
+  say("state", STATES[run.state.values[i]]);
   run.signs.forEach(({ values, colour }, k) => {
     const lamp = cells.lamps[k],
       on = values.values[i] > 0;
