@@ -11,10 +11,10 @@ live     null; or what can be done while the run goes on (boebot.live)
 
 Of rows: `state` as of `states`; `contact`: 1 where the body has touched something; `signs`: which devices are on;
 `shown` and `layers`: what the brain showed and sketched; `mind`: what a brain of processes did, or null; `events`:
-time, kind ("contact", "touch", "fault", "lost", "reset" or "intervention") and a text, to which the page adds the switches of
-`mind`; `pins`: output edges of a board's pins, where they were recorded (`time`: float64); `swept`: of each sensor with
-a fan of rays, of each sweep its time, the sensor's pose and the rays' distances, sweep after sweep (uint16: 65535 is
-`reach`, in m), of at most `RAYS_AT_MOST` rays.
+time, kind ("contact", "touch", "fault", "lost", "reset" or "intervention") and a text, to which the page adds the
+switches of `mind`; `pins`: output edges of a board's pins, where they were recorded (`time`: float64); `swept`: of each
+sensor with a fan of rays, of each sweep its time, the sensor's pose and the rays' distances, sweep after sweep (uint16:
+65535 is `reach`, in m), of at most `RAYS_AT_MOST` rays.
 
 Arrays are little-endian float32 in base64 (`state`, `contact`, `signs`, `motor` and `level`: uint8), one entry per
 tick; those of `mind` one per step of the brain.
