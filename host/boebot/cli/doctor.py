@@ -114,7 +114,8 @@ def _checks(url: str | None, robot: RobotDescription) -> Iterator[Check]:
     Raises:
         BoebotError: there is no such board.
     """
-    yield Check("kit", f"boebot {boebot.__version__}, protocol {finding.version_name()}, Python {_python()}")
+    python = sys.version.split()[0]
+    yield Check("kit", f"boebot {boebot.__version__}, protocol {finding.version_name()}, Python {python}")
     if url is None:
         ports = _ports()
         if len(ports) != 1:
@@ -138,10 +139,6 @@ def _checks(url: str | None, robot: RobotDescription) -> Iterator[Check]:
         if not is_live(url):
             raise
         yield Check("link", str(error), "an answer", "is the robot on, its cable sound, its firmware flashed?")
-
-
-def _python() -> str:
-    return sys.version.split()[0]
 
 
 def _ports() -> list[str]:

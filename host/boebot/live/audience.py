@@ -8,13 +8,12 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from boebot.arenas.floor_plan import FloorPlan, Moving
+from boebot.boards import Pose
 from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.outbox import Message, Outbox, merged
 from boebot.live.page_server import PageServer
 from boebot.view import page_data, replay, scene
-
-Placed = tuple[float, float, float]
 
 PAST = 1_200  # chunks that are kept for pages that come later
 BYE_S = 0.5  # for the last messages
@@ -108,7 +107,7 @@ class Audience:
         """What `begin` tells is told."""
         return self._run is not None
 
-    def begin(self, plan: FloorPlan, poses: Iterable[Placed], runs: list[Message], live: Message) -> None:
+    def begin(self, plan: FloorPlan, poses: Iterable[Pose], runs: list[Message], live: Message) -> None:
         """What pages know of a run from its start; they get it with the first chunk.
 
         Args:

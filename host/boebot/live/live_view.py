@@ -26,7 +26,7 @@ from boebot.record.interventions import Deed
 from boebot.record.run import Run
 from boebot.running import interrupts
 from boebot.running.brain_parameters import bounds, sliders
-from boebot.running.hands import Hands
+from boebot.running.hands import Hands, Onlooker
 from boebot.running.loop import gather_rows
 
 EACH_UNSEEN_S = 0.5  # where no page is open
@@ -38,8 +38,8 @@ class RestartedError(BoebotError):
     """A page has asked for another run."""
 
 
-class LiveView:
-    """Shows runs to pages (an `Onlooker` of boebot.running.hands).
+class LiveView(Onlooker):
+    """Shows runs to pages.
 
     Attributes:
         url: the address of the page.

@@ -8,7 +8,6 @@ bit for bit: `boebot replay --again` takes them from the record.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Protocol
 
 import msgspec
 
@@ -35,8 +34,8 @@ from boebot.running.driver import Driver
 from boebot.running.tasks import Task
 
 
-class Onlooker(Protocol):
-    """Who watches a run, and may interfere with it."""
+class Onlooker:
+    """Who watches a run, and may interfere with it; this one does neither."""
 
     def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
         """The run begins. `results`: what is known of each robot."""
@@ -47,6 +46,7 @@ class Onlooker(Protocol):
         Raises:
             BoebotError: the run is to end.
         """
+        return ()
 
     def refuse(self, number: int, error: BoebotError) -> None:
         """What was to be done cannot be done.
@@ -128,24 +128,16 @@ def carry_out(one: Deed, robot: Robot, brain: LoadedBrain, held: Hand | None) ->
     return held
 
 
-class Repeated:
-    """Does again what a record says that was done (an `Onlooker`)."""
+class Repeated(Onlooker):
+    """Does again what a record says that was done. What could be done once can be done again, or the runs differ: they
+    are compared."""
 
     def __init__(self, records: Sequence[Record]) -> None:
         """`records`: one for each robot."""
         self._due = [interventions(record) for record in records]
-
-    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
-        """See `Onlooker`."""
 
     def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
         """See `Onlooker`."""
         due = self._due[number]
         while due and due[0][0] <= time_s:
             yield due.pop(0)[1]
-
-    def refuse(self, number: int, error: BoebotError) -> None:
-        """What could be done once can be done again, or the runs differ: they are compared."""
-
-    def look(self, time_s: float, *, is_over: bool = False) -> None:
-        """Nobody looks."""

@@ -133,8 +133,8 @@ def draw_arena(axes: Axes, plan: FloorPlan) -> None:
     paint(axes, scene.arena_items(plan))
     for moving in plan.moving:
         axes.plot(moving.x, moving.y, color=style.MOVING, lw=1.0, ls=(0, (4, 2)), zorder=2.5)
-        paint(axes, [scene.moving_item(moving.at(float(moving.time[0])))])
-    paint(axes, scene.moving_remarks(plan))
+        begun = moving.at(float(moving.time[0]))
+        paint(axes, [scene.moving_item(begun), *scene.remarks(begun, plan)])
 
 
 def legend_entries(plan: FloorPlan) -> list[Artist]:

@@ -255,7 +255,7 @@ def arena_items(plan: FloorPlan) -> list[Item]:
         items.append(Item([(there[0], there[1] - charger.radius_m)], text="charger", side=-1, layer=WORDS))
     for solid in plan.obstacles:
         items.append(solid_item(solid))
-        items += _remarks(solid, plan)
+        items += remarks(solid, plan)
     for lamp in plan.described.light:
         star = _star((lamp.x_m, lamp.y_m))
         items.append(
@@ -282,11 +282,6 @@ def moving_item(solid: Solid) -> Item:
     return solid_item(solid)._replace(fill="moving", layer=MOVES, says="moves, shown at the start")
 
 
-def moving_remarks(plan: FloorPlan) -> list[Item]:
-    """Labels of the moving shapes, where they begin."""
-    return [item for moving in plan.moving for item in _remarks(moving.at(float(moving.time[0])), plan)]
-
-
 def _layer(item: Item) -> float:
     return item.layer
 
@@ -303,7 +298,7 @@ def _star(centre: tuple[float, float]) -> list[tuple[float, float]]:
     return points
 
 
-def _remarks(solid: Solid, plan: FloorPlan) -> list[Item]:
+def remarks(solid: Solid, plan: FloorPlan) -> list[Item]:
     """Its label: inside it where there is room, else above it, and near the arena's upper edge below it."""
     if not (said := solid.remarks):
         return []
