@@ -26,7 +26,7 @@ HAL_INLINE uint8_t clock_waiting(void) { return (uint8_t)(clock_slot + 1u - cloc
 HAL_INLINE uint8_t clock_frame_slot(void) { return clock_next_slot % CLOCK_SLOTS_PER_FRAME; }
 HAL_INLINE bool clock_tick_begins(void) { return clock_next_slot % CLOCK_SLOTS_PER_TICK == 0; }
 
-/* Ages of readings, in ticks: AGE_NEVER: none yet, or older. */
+/* Ages of readings, in ticks; AGE_NEVER: there was none yet, or it is at least as old. */
 #define AGE_NEVER 255u
 HAL_INLINE void clock_grow_older(uint8_t *age) {
   if (*age < AGE_NEVER) {

@@ -37,8 +37,7 @@ class Drift(CognitiveProcess):
         self.value = 0.0
 
     def enter(self, robot: Robot) -> None:
-        self.forget()
-        self._from = self.other(Odometry).travelled
+        self.set_right()
 
     def step(self, robot: Robot) -> None:
         self.value = 1 - math.exp(-(self.other(Odometry).travelled - self._from) / self.distance)

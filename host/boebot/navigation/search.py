@@ -27,7 +27,7 @@ METHODS: tuple[Method, ...] = ("walk", "greedy", "dijkstra", "astar")
 
 
 class Graph(Protocol[N]):
-    """What can be searched: `Lattice`, or anything else of nodes."""
+    """What can be searched: a `Lattice`, or anything else whose nodes have neighbours."""
 
     def neighbours(self, node: N) -> Iterable[tuple[N, float]]:
         """The nodes next to one, each with the way there (m)."""
