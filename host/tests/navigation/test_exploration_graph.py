@@ -37,6 +37,17 @@ def test_nodes_are_apart_and_the_nearest_is_next() -> None:
     assert graph.target() is None
 
 
+def test_setting_out_says_whether_a_way_leads_there() -> None:
+    graph = ExplorationGraph((0.0, 0.0), 0.75)
+    for number, place in enumerate([(1.0, 0.0), (2.0, 0.0)], 1):
+        graph.place(place)
+        graph.reached(number)
+    start = graph.nodes[0]
+    assert graph.set_out(start) and start.path == [2, 1, 0]
+    graph.bad_leg(0, 1)
+    assert not graph.set_out(start)
+
+
 @given(st.lists(st.tuples(st.integers(0, 3), st.floats(-3, 3), st.floats(-3, 3)), max_size=40))
 def test_paths_lead_from_the_active_node_along_neighbours(deeds: list[tuple[int, float, float]]) -> None:
     """However nodes are placed, reached and blocked: no leg but those along which nodes were placed."""
