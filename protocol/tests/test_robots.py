@@ -101,9 +101,12 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("[supply]\nfull_v = 4.0", "supply.full_v is 4; expected more than empty_v, 5 V"),
+        ("[supply]\nfull_v = 4.0", r"variant\.toml:3: supply\.full_v is 4; expected more than empty_v, 5 V"),
         ("[supply]\nservos = 'mains'", "servos"),
-        ("[device.buzzer]\ntype = 'buzzer'\npin = 5", "whisker_left and buzzer cannot share pin 5"),
+        (
+            "[device.buzzer]\ntype = 'buzzer'\npin = 5",
+            r"variant\.toml:4: device\.buzzer\.pin: whisker_left and buzzer cannot share pin 5",
+        ),
         (
             "[device.ping_rear]\ntype = 'ping'\npin = 8\nposition_m = [0, 0]\nheading_rad = 0.0\nbeam_rad = 0.7\n"
             "range_min_m = 0.02\nrange_max_m = 3.0\nperiod_ticks = 5",
@@ -113,8 +116,11 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
             "remove = ['light_right']\n[device.horn]\ntype = 'buzzer'\npin = 6",
             "device.horn is buzzer; expected the name buzzer",
         ),
-        ("[device.ping]\npin = 7", "ping.pin is pin 7, which cannot do that; expected 8"),
-        ("[device.servo_left]\npin = 20", "there is no pin 20; expected 0..13 or 'A0'..'A5'"),
+        ("[device.ping]\npin = 7", r"variant\.toml:3: device\.ping\.pin is pin 7, which cannot do that; expected 8"),
+        (
+            "[device.servo_left]\npin = 20",
+            r"variant\.toml:3: device\.servo_left\.pin: there is no pin 20; expected 0..13 or 'A0'..'A5'",
+        ),
         (
             "[device.servo_left]\npin = 13\nwidth_us = 3",
             "servo_left: there is no key 'width_us' here; expected on, plugged, pin",
@@ -127,7 +133,7 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
         ("[device.infrared_left]\nheading_rad = nan", "device.infrared_left.heading_rad: expected a finite number"),
         ("remove = 'ping'", "remove: expected a list of devices, got 'ping'"),
         ("remove = ['uart']", "device.uart is missing or off; every robot needs it"),
-        ("[device.servo_left]\non = false", "device.servo_left is missing or off"),
+        ("[device.servo_left]\non = false", r"variant\.toml:2: device\.servo_left is missing or off"),
         ("[device.light_right]\npin = 10", "light_right.pin is pin 10, which cannot do that; expected 0, 1, 2"),
         (
             "remove = ['light_right']\n[device.whisker_left]\npin = 6",

@@ -225,7 +225,7 @@ def _faults(robot: RobotDescription, path: Path) -> Faults:
     if supply is None:
         yield "", "supply is missing; expected the table of the pack that the board runs on"
     elif not supply.full_v > supply.empty_v:
-        yield "", f"supply.full_v is {supply.full_v:g}; expected more than empty_v, {supply.empty_v:g} V"
+        yield "supply.full_v", f" is {supply.full_v:g}; expected more than empty_v, {supply.empty_v:g} V"
     yield from _pin_faults(robot)
     yield from _image_faults(robot, path)
 
@@ -259,49 +259,50 @@ def _pin_faults(robot: RobotDescription) -> Faults:
     for name, device in robot.device.items():
         kind = device.__struct_config__.tag
         if isinstance(device, VehicleDevice):
-            yield "", f"device.{name} is {kind}, which only a robot without a board can have"
+            yield f"device.{name}", f" is {kind}, which only a robot without a board can have"
         if name not in device.NAMES:
             known = " or ".join(device.NAMES)
-            yield "", f"device.{name} is {kind}; expected the name {known}, which the firmware knows"
-        try:
-            pins = {field: pin_number(getattr(device, field)) for field in device.PINS}
-        except ValueError as error:
-            yield "", f"device.{name}: {error}"
-        for field, pin in pins.items():
+            yield f"device.{name}", f" is {kind}; expected the name {known}, which the firmware knows"
+        for field in device.PINS:
+            try:
+                pin = pin_number(getattr(device, field))
+            except ValueError as error:
+                yield f"device.{name}.{field}", f": {error}"
+                continue
             allowed = device.ONLY_PINS.get(field)
             if allowed is not None and pin not in allowed:
                 expected = ", ".join(pin_name(number) for number in allowed)
-                yield "", f"device.{name}.{field} is pin {pin_name(pin)}, which cannot do that; expected {expected}"
+                yield f"device.{name}.{field}", f" is pin {pin_name(pin)}, which cannot do that; expected {expected}"
             if pin in pin_owner:
-                yield "", f"{pin_owner[pin]} and {name} cannot share pin {pin_name(pin)}"
+                yield f"device.{name}.{field}", f": {pin_owner[pin]} and {name} cannot share pin {pin_name(pin)}"
             pin_owner[pin] = name
         for unit, group in device.NEEDS.items():
             owner, owner_group = unit_owner.setdefault(unit, (name, group))
             if owner != name and (group == "" or group != owner_group):
-                yield "", f"{owner} and {name} cannot share {unit}"
+                yield f"device.{name}", f": {owner} and {name} cannot share {unit}"
 
 
 def _vehicle_faults(robot: RobotDescription) -> Faults:
     """Without a board: pins, a supply, a drive that is none, a second battery (its devices empty one energy)."""
     if robot.supply is not None:
-        yield "", "supply is given, but a robot without a board has none; its devices say their voltages"
+        yield "supply", " is given, but a robot without a board has none; its devices say their voltages"
     if robot.pin_map:
-        yield "", f"pin_map is {robot.pin_map!r}, but a robot without a board has no pins"
+        yield "pin_map", f" is {robot.pin_map!r}, but a robot without a board has no pins"
     if robot.unit is not None:
-        yield "", f"unit is {robot.unit}, but nothing of a robot without a board is drawn by it"
+        yield "unit", f" is {robot.unit}, but nothing of a robot without a board is drawn by it"
     for name, device in robot.device.items():
         if not isinstance(device, VehicleDevice):
             kind = device.__struct_config__.tag
-            yield "", f"device.{name} is {kind}, which needs a board's pins, but board is {NO_BOARD!r}"
+            yield f"device.{name}", f" is {kind}, which needs a board's pins, but board is {NO_BOARD!r}"
         elif not device.plugged:
-            yield "", f"device.{name}.plugged is false, but a robot without a board has no plugs"
+            yield f"device.{name}.plugged", " is false, but a robot without a board has no plugs"
     for name in ("motor_left", "motor_right"):
         if not (robot.has(name) and isinstance(robot.device[name], Motor)):
             needs = "a robot without a board needs a dc_motor or regulated_motor"
-            yield "", f"device.{name} is missing or off; {needs}"
+            yield f"device.{name}", f" is missing or off; {needs}"
     left, right = (robot.device[name].__struct_config__.tag for name in ("motor_left", "motor_right"))
     if left != right:
-        yield "", f"device.motor_right is {right}, device.motor_left {left}; expected the same type"
+        yield "device.motor_right", f" is {right}, device.motor_left {left}; expected the same type"
     batteries = [name for name, device in robot.device.items() if isinstance(device, Energy) and device.on]
     if len(batteries) > 1:
         yield f"device.{batteries[1]}", " is a second energy; expected one"
@@ -314,7 +315,7 @@ def _image_faults(robot: RobotDescription, path: Path) -> Faults:
     """What the firmware of the robot's pin map cannot do: other pins or devices than it was built with."""
     for name in _ALWAYS:
         if not robot.has(name):
-            yield "", f"device.{name} is missing or off; every robot needs it"
+            yield f"device.{name}", " is missing or off; every robot needs it"
     owner = resources.folder("robots") / f"{robot.pin_map}.toml"
     if not owner.is_file() or owner.samefile(path):
         return  # the robot has its own pin map, and so its own image
@@ -324,8 +325,8 @@ def _image_faults(robot: RobotDescription, path: Path) -> Faults:
         if type(built) is not type(device) or (built is not None and built.pins() != device.pins()):
             there = "not there" if built is None else f"{built.__struct_config__.tag} on {_pins_text(built)}"
             yield (
-                "",
-                f"device.{name} is {device.__struct_config__.tag} on {_pins_text(device)}, but in the firmware "
+                f"device.{name}",
+                f" is {device.__struct_config__.tag} on {_pins_text(device)}, but in the firmware "
                 f"for pin map {robot.pin_map!r} it is {there}; expected the same, or a pin_map of the robot's own",
             )
 

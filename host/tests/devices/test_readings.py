@@ -92,10 +92,10 @@ def variant(folder: Path, text: str) -> Path:
     ("text", "sentence"),
     [
         ("remove = ['motor_left']", "device.motor_left is missing or off; a robot without a board needs a dc_motor"),
-        ("pin_map = 'shieldbot'", "pin_map is 'shieldbot', but a robot without a board has no pins"),
+        ("pin_map = 'shieldbot'", r"variant\.toml:2: pin_map is 'shieldbot', but a robot without a board has no pins"),
         (
             "[device.compass]\nplugged = false",
-            "device.compass.plugged is false, but a robot without a board has no plugs",
+            r"variant\.toml:3: device\.compass\.plugged is false, but a robot without a board has no plugs",
         ),
         ("[device.buzzer]\ntype = 'buzzer'\npin = 4", "device.buzzer is buzzer, which needs a board's pins"),
         ("[device.compass]\nsigma_rad = -1.0", "device.compass.sigma_rad: expected float >= 0.0"),
