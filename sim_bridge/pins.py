@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.arguments import number, shown
+from boebot.arguments import number, shown, whole
 from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, BoardMemory, EmulatedBoard, ResetCause
-from sim_bridge.sim import SimRobot
+from sim_bridge.boards.board import CLOCK_HZ, EDGE, BoardMemory, EmulatedBoard, Level, ResetCause, checked_pin
+from sim_bridge.sim import CYCLES_MAXIMUM, SimRobot
 
 ECHO_MAXIMUM_US = 1e6
 SUPPLY_MAXIMUM_V = 30.0
@@ -57,6 +57,7 @@ class BoardPins(BoardMemory):
 
     def pin_log(self, newest: int = EDGES_KEPT) -> NDArray[Any]:
         """The board's `newest` output edges (dtype EDGE), a million at most, oldest first."""
+        newest = whole("pin_log: newest", newest, BoardError, least=0, most=CYCLES_MAXIMUM)
         count = min(self.edge_count, EDGES_KEPT, newest)
         log = np.empty(count, dtype=EDGE)
         edges = ffi.addressof(self._robot.handle, "edges")
@@ -66,12 +67,17 @@ class BoardPins(BoardMemory):
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:
         """Takes a pin from its part and drives it from `at_cycle` on (now)."""
         at = self._sim.cycle + 64 if at_cycle is None else at_cycle
-        self._check(lib.robot_drive(self._with_board, max(0, at), pin, level), f"pin {pin}, level {level}")
+        at = max(0, whole("drive: at_cycle", at, BoardError, least=-CYCLES_MAXIMUM, most=CYCLES_MAXIMUM))
+        level = whole("drive: the level", level, BoardError, least=0, most=Level.RELEASED)
+        lib.robot_drive(self._with_board, at, checked_pin("drive", pin), level)
 
     def square_wave(self, pin: int, period: int, seconds: float) -> None:
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
-        status = lib.robot_wave(self._with_board, pin, period // 2, round(seconds * CLOCK_HZ))
-        self._check(status, f"square wave of {period} cycles on pin {pin}")
+        half = whole("square_wave: the period", period, BoardError, least=2, most=2**32 - 1) // 2
+        seconds = number("square_wave: seconds", seconds, BoardError, least=0, most=CYCLES_MAXIMUM / CLOCK_HZ)
+        status = lib.robot_wave(self._with_board, checked_pin("square_wave", pin), half, round(seconds * CLOCK_HZ))
+        if status != lib.SIM_OK:
+            raise BoardError(f"square_wave: {seconds:g} s of {period} cycles have too many edges; expected fewer")
 
     def answer_ping(self, echo_us: float | None) -> None:
         """Every trigger is answered by a pulse of that length (us), or by none at all."""

@@ -21,7 +21,7 @@ from boebot.description import robots
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.record.blocks import Block, Group, group_of
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
+from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard, checked_pin
 from sim_bridge.robots.imperfections import Draw, applied, body_parameters, collision_outline
 from sim_bridge.robots.wiring import done, join
 from sim_bridge.vehicles import ENDS
@@ -276,6 +276,7 @@ class Sim:
         Raises:
             BoardError: a board's program crashed.
         """
+        cycle = whole("run_until: the cycle", cycle, BoardError, least=0, most=NEVER)
         while True:  # in portions, or Ctrl-C would not be heard
             until = min(cycle, self.cycle + PORTION_CYCLES)
             self.check(lib.sim_run_until(self.handle, until))
@@ -464,7 +465,7 @@ class SimRobot:
 
     def listen(self, cycle: int) -> None:
         """From that cycle on its bytes end a run of `Sim.run_until`."""
-        cycle = whole("listen: the cycle", cycle, BoardError, least=0, most=2**64 - 1)
+        cycle = whole("listen: the cycle", cycle, BoardError, least=0, most=NEVER)
         self.handle.listen_from = cycle
 
     def wait(self, cycles: int, quiet: int) -> None:
@@ -474,7 +475,9 @@ class SimRobot:
         Raises:
             BoardError: a board's program crashed.
         """
-        sim, quiet = self.sim, quiet or 1
+        sim = self.sim
+        cycles = whole("wait: cycles", cycles, BoardError, least=0, most=CYCLES_MAXIMUM)
+        quiet = whole("wait: quiet", quiet, BoardError, least=0, most=CYCLES_MAXIMUM) or 1
         if cycles <= PORTION_CYCLES:
             if crashed := lib.robot_wait(self.handle, cycles, quiet):
                 sim.check(crashed)
@@ -579,7 +582,7 @@ class SimRobot:
 
     def turret_angle(self, pin: int) -> float:
         """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
-        turret = lib.robot_turret(self.handle, pin)
+        turret = lib.robot_turret(self.handle, checked_pin("turret_angle", pin))
         return float(turret.motor.angle) if turret else 0.0
 
     def looks(self) -> dict[str, Floats]:

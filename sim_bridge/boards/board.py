@@ -13,10 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from boebot.arguments import whole
 from boebot.boards import WatchdogReset
 from boebot.errors import BoardError
 
 CLOCK_HZ = 16_000_000
+PINS = 20  # Arduino numbers 0..19, BOARD_PIN_COUNT of board.h
 DATA_SIZE = 0x900
 EEPROM_SIZE = 1024
 ROOM = 4096  # bytes that are read from the line at once
@@ -160,7 +162,7 @@ class BoardMemory(ABC):
     def output(self, pin: int) -> Level:
         """What the firmware does to a pin now."""
         board = self.board.handle
-        return Level(board.op.output(board, pin))
+        return Level(board.op.output(board, checked_pin("output", pin)))
 
     def counters(self) -> dict[str, int]:
         """What the board counted since power-on."""
@@ -212,6 +214,7 @@ class BoardMemory(ABC):
     def eeprom_damage(self, damage: Damage, garbage: int = 0x5A) -> None:
         """What becomes of a cell whose write is cut short by a power-on or brown-out reset; `garbage`: for GARBAGE."""
         eeprom = self._eeprom()
+        garbage = whole("eeprom_damage: garbage", garbage, BoardError, least=0, most=255)
         eeprom.damage, eeprom.garbage = int(damage), garbage
 
     def watchdog_log(self) -> list[tuple[int, int]]:
@@ -231,6 +234,11 @@ class BoardMemory(ABC):
         found = (log.notes[i] for i in range(since, log.count))
         words = ((note, *(text(part).decode() for part in (note.does, note.what, note.why))) for note in found)
         return [(note.cycle, note.address, f"{does} {what}", why) for note, does, what, why in words]
+
+
+def checked_pin(what: str, pin: object) -> int:
+    """An Arduino number, else raises BoardError; `what` names who asks."""
+    return whole(f"{what}: the pin", pin, BoardError, least=0, most=PINS - 1)
 
 
 def check_range(what: str, address: int, count: int, size: int) -> None:

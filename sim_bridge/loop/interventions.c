@@ -4,8 +4,6 @@
 
 #define WAVE_EDGES_MAXIMUM 10000000u
 
-static int bad_pin(uint8_t pin) { return pin >= BOARD_PIN_COUNT; }
-
 /* The truth has where it was, and a cycle later where it is. */
 static void lift(robot *r, double x, double y, double heading) {
   const uint64_t at = r->sim->world_at;
@@ -49,17 +47,15 @@ static int take_pin(robot *r, uint8_t pin) {
   return pulled_up;
 }
 
-int robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level) {
-  if (bad_pin(pin) || level > BOARD_RELEASED) return SIM_BAD_ARGUMENT;
+void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level) {
   const int pulled_up = take_pin(self, pin);
   if (level == BOARD_RELEASED && pulled_up) level = BOARD_HIGH;
   self->chassis.driven[pin] = level;
   self->board->op->drive(self->board, at, pin, level);
-  return SIM_OK;
 }
 
 int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
-  if (bad_pin(pin) || half_cycles == 0 || duration / half_cycles > WAVE_EDGES_MAXIMUM) return SIM_BAD_ARGUMENT;
+  if (duration / half_cycles > WAVE_EDGES_MAXIMUM) return SIM_BAD_ARGUMENT;
   take_pin(self, pin);
   const uint64_t start = self->sim->world_at + PART_GUARD; /* edges up to there are queued already */
   uint8_t level = self->chassis.driven[pin];

@@ -106,8 +106,8 @@ int sim_place_shape(sim *self, int shape, double x, double y, double heading);
 
 /* For tests: a pin taken from its part and driven at a cycle, or by a square wave of that half period for that long;
  * length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part at a pin pulled
- * out (1) or put in again (0). Return SIM_OK or an error. */
-int robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level);
+ * out (1) or put in again (0). Pins, levels and periods have been checked (pins.py). Return SIM_OK or an error. */
+void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level);
 int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int robot_answer_ping(robot *self, int64_t echo_cycles);
 int robot_unplug(robot *self, uint8_t pin, int unplugged);

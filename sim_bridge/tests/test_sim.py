@@ -16,7 +16,7 @@ import pytest
 from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoebotError
-from sim_bridge.boards.board import EmulatedBoard
+from sim_bridge.boards.board import Damage, EmulatedBoard
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim
@@ -146,6 +146,22 @@ def test_what_is_no_number_name_or_byte() -> None:
         (lambda: pins.supply(1e300), r"the voltage is 1e\+300; expected a finite number from 0 to 30"),
         (lambda: pins.brown_out(foo=1), "there is no 'foo'; expected one of reset_v"),
         (lambda: pins.reset("nope"), "there is no cause 'nope'; expected one of power"),
+        (lambda: pins.drive(300, 1), "drive: the pin is 300; expected a whole number from 0 to 19"),
+        (lambda: pins.drive(3, 3), "drive: the level is 3; expected a whole number from 0 to 2"),
+        (lambda: pins.drive(3, 1, anything), "drive: at_cycle is 'x'; expected a whole number"),
+        (lambda: pins.square_wave(20, 100, 1.0), "square_wave: the pin is 20; expected a whole number from 0 to 19"),
+        (lambda: pins.square_wave(3, 1, 1.0), "square_wave: the period is 1; expected a whole number from 2"),
+        (lambda: pins.square_wave(3, 100, math.nan), "square_wave: seconds is nan; expected a finite number from 0"),
+        (lambda: pins.square_wave(3, 100, math.inf), "square_wave: seconds is inf; expected a finite number from 0"),
+        (lambda: pins.square_wave(3, 2, 1e6), "have too many edges; expected fewer"),
+        (lambda: pins.pin_log(-1), "pin_log: newest is -1; expected a whole number from 0"),
+        (lambda: pins.output(300), "output: the pin is 300; expected a whole number from 0 to 19"),
+        (lambda: pins.eeprom_damage(Damage.GARBAGE, 256), "garbage is 256; expected a whole number from 0 to 255"),
+        (lambda: robot.turret_angle(999), "turret_angle: the pin is 999; expected a whole number from 0 to 19"),
+        (lambda: robot.wait(-1, 0), "wait: cycles is -1; expected a whole number from 0"),
+        (lambda: robot.wait(anything, 0), "wait: cycles is 'x'"),
+        (lambda: robot.wait(10, -1), "wait: quiet is -1; expected a whole number from 0"),
+        (lambda: sim.run_until(-1), "run_until: the cycle is -1; expected a whole number from 0"),
     ]
     for act, words in acts:
         refused(act, words)
