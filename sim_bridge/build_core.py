@@ -25,8 +25,7 @@ typedef struct { body_state state; uint32_t id; ...; } body;
 void body_init(body *self, const body_parameters *parameters, double reach);
 void body_place(body *self, double x, double y, double heading);
 void body_as_mover(const body *self, mover *out);
-int body_step(body *bodies[], size_t count, const scene *around, double torques[][2], double dt);
-int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
+void body_step(body *bodies[], size_t count, const scene *around, double torques[][2], double dt);
 double body_wheel_hold(const body *self, double dt);
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1,
                          double height);

@@ -18,10 +18,11 @@ from sim_bridge._core import ffi, lib
 from sim_bridge.devices.catalogue import SensorKind, sensor_kinds
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.robots.imperfections import collision_outline
-from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, known, number, struct, values_of
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, Range, known, number, struct, values_of
 from sim_bridge.vehicles.drives import ENERGY, dc_parameters, regulated_parameters, servo_parameters
 
 SIDES: Final = ("left", "right")
+STEP: Final = Range(0.0, 1e6, above=True)  # s
 MOUNTS: Final = {"left": 1, "right": -1}  # of servos: which way drives forward
 
 
@@ -70,7 +71,7 @@ class VehicleModel:
         """
         given, outline = _body_and_outline(body)
         parameters = struct("body_parameters", "vehicle: body", given)
-        self.dt = number("vehicle", "dt", dt, POSITIVE)
+        self.dt = number("vehicle", "dt", dt, STEP)
         switches = (
             switch("vehicle: noise", noise, RobotError),
             switch("vehicle: ends_at_collision", ends_at_collision, RobotError),

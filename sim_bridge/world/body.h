@@ -53,7 +53,6 @@ typedef struct {
 } body_state;
 
 enum { BODY_MAXIMUM = 64 }; /* robots in one world */
-enum { BODY_OK = 0, BODY_BAD_STEP = -1, BODY_TOO_MANY = -2, BODY_SAME_ID = -3, BODY_BAD_TORQUE = -4 };
 
 /* A of (2.26) and B of (2.30). */
 double body_a(const body_parameters *p);

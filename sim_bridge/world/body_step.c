@@ -149,15 +149,6 @@ static void move_freely(body *self, double way, double dt) {
   s->touching = 0;
 }
 
-/* Moves by `way`; `clear`: what stays_clear says. */
-static void move_alone(body *self, const scene *around, int clear, double way, double dt) {
-  if (clear) {
-    move_freely(self, way, dt);
-  } else {
-    contact_move(&self, 1, around, dt);
-  }
-}
-
 static int is_finite(double left, double right) { return fabs(left) + fabs(right) < 1e300; }
 
 static void turn_wheels(body *self, double dt) {
@@ -169,20 +160,6 @@ static void turn_wheels(body *self, double dt) {
   const double angle = self->per_radius * dt;
   s->wheel_left += s->rim_left * angle;
   s->wheel_right += s->rim_right * angle;
-}
-
-int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt) {
-  const double torque[2] = {torque_left, torque_right};
-  if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
-  if (!is_finite(torque_left, torque_right)) return BODY_BAD_TORQUE;
-  rest_movers(around, dt);
-  drive(self, around, torque, dt);
-  start_movers(around, dt);
-  const double way = body_way(self, dt);
-  move_alone(self, around, stays_clear(self, around, way, dt), way, dt);
-  count_waits(around, dt);
-  turn_wheels(self, dt);
-  return BODY_OK;
 }
 
 /* Makes the groups of places i and k one. */
@@ -208,7 +185,7 @@ static void find_groups(body *const bodies[], size_t count, const scene *around,
       if (dx * dx + dy * dy < reach * reach) join(group, count, i, k);
     }
   }
-  for (size_t m = 0; m < around->movers_count; m++) {
+  for (size_t m = 0; count > 1 && m < around->movers_count; m++) {
     size_t first = count;
     for (size_t i = 0; i < count; i++) {
       if (!mover_is_near(bodies[i], &around->movers[m], body_way(bodies[i], dt), dt)) continue;
@@ -219,32 +196,26 @@ static void find_groups(body *const bodies[], size_t count, const scene *around,
 }
 
 /* Places of the bodies in the order of their ids. */
-static int sort(body *const bodies[], size_t count, size_t order[]) {
+static void sort(body *const bodies[], size_t count, size_t order[]) {
   for (size_t i = 0; i < count; i++) {
     size_t at = i;
     while (at > 0 && bodies[order[at - 1]]->id > bodies[i]->id) {
       order[at] = order[at - 1];
       at--;
     }
-    if (at > 0 && bodies[order[at - 1]]->id == bodies[i]->id) return BODY_SAME_ID;
     order[at] = i;
   }
-  return BODY_OK;
 }
 
-int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt) {
-  if (count == 1) return body_advance(bodies[0], around, torques[0][0], torques[0][1], dt);
-  if (!(dt > 0.0 && dt < 1e6)) return BODY_BAD_STEP;
-  if (count > BODY_MAXIMUM) return BODY_TOO_MANY;
+void body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt) {
   for (size_t i = 0; i < count; i++) {
-    if (!is_finite(torques[i][0], torques[i][1])) return BODY_BAD_TORQUE;
+    if (!is_finite(torques[i][0], torques[i][1])) return;
   }
   size_t order[BODY_MAXIMUM];
-  const int status = sort(bodies, count, order);
-  if (status != BODY_OK) return status;
   body *sorted[BODY_MAXIMUM];
   body *together[BODY_MAXIMUM];
   size_t group[BODY_MAXIMUM];
+  sort(bodies, count, order);
   rest_movers(around, dt);
   for (size_t i = 0; i < count; i++) {
     sorted[i] = bodies[order[i]];
@@ -258,14 +229,13 @@ int body_step(body *const bodies[], size_t count, const scene *around, const dou
     for (size_t k = i; k < count; k++) {
       if (group[k] == i) together[members++] = sorted[k];
     }
-    if (members == 1) {
-      const double way = body_way(sorted[i], dt);
-      move_alone(sorted[i], around, stays_clear(sorted[i], around, way, dt), way, dt);
+    const double way = body_way(sorted[i], dt);
+    if (members == 1 && stays_clear(sorted[i], around, way, dt)) {
+      move_freely(sorted[i], way, dt);
     } else {
       contact_move(together, members, around, dt);
     }
   }
   count_waits(around, dt);
   for (size_t i = 0; i < count; i++) turn_wheels(sorted[i], dt);
-  return BODY_OK;
 }

@@ -8,11 +8,8 @@
  * bodies). `around`: the arena and its moving obstacles as they are at the step's beginning, without the robots. Moving
  * obstacles push and are not pushed; one that would push a robot into something waits, and `waited` of it grows. Robots
  * push each other. The result does not depend on the order of the bodies.
- * Returns BODY_OK; BODY_BAD_STEP for dt <= 0, BODY_TOO_MANY, BODY_SAME_ID, BODY_BAD_TORQUE for one that is no finite
- * number, and then nothing has moved. A body is copied as a whole: its lists of near things belong to it. */
-int body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt);
-
-/* The same for one robot. */
-int body_advance(body *self, const scene *around, double torque_left, double torque_right, double dt);
+ * Ids differ, and there are at most BODY_MAXIMUM. With a torque that is no finite number nothing moves. A body is copied as
+ * a whole: its lists of near things belong to it. */
+void body_step(body *const bodies[], size_t count, const scene *around, const double torques[][2], double dt);
 
 #endif

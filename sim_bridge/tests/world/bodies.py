@@ -103,7 +103,7 @@ class Body:
 
     def advance(self, left: float, right: float, dt: float = 0.001, steps: int = 1) -> None:
         for _ in range(steps):
-            assert lib.body_advance(self.body, self.scene, left, right, dt) == lib.BODY_OK
+            lib.body_step([self.body], 1, self.scene, [[left, right]], dt)
 
     def regulate(
         self, reference: Callable[[float], tuple[float, float]], gain: float, seconds: float, dt: float
@@ -183,11 +183,11 @@ class World:
             setattr(mover, name, value)
         return mover
 
-    def step(self, torques: Sequence[tuple[float, float]], dt: float, order: Sequence[int] | None = None) -> int:
+    def step(self, torques: Sequence[tuple[float, float]], dt: float, order: Sequence[int] | None = None) -> None:
         """One step; moving obstacles go on along their velocities unless they wait."""
         places = range(len(self.robots)) if order is None else order
         bodies = ffi.new("body *[]", [self.robots[i].body for i in places])
-        status = int(lib.body_step(bodies, len(bodies), self.scene, [list(torques[i]) for i in places], dt))
+        lib.body_step(bodies, len(bodies), self.scene, [list(torques[i]) for i in places], dt)
         for i in range(self.scene.movers_count):
             mover = self._movers[i]
             gone = mover.stops  # it may have waited for the rest of the step
@@ -195,7 +195,6 @@ class World:
             mover.y += mover.vy * gone
             c, s = math.cos(mover.turn_rate * gone), math.sin(mover.turn_rate * gone)
             mover.cosine, mover.sine = mover.cosine * c - mover.sine * s, mover.sine * c + mover.cosine * s
-        return status
 
     @property
     def energy(self) -> float:
