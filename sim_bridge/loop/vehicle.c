@@ -14,8 +14,7 @@ int sim_add_vehicle(sim *self, int number, const vehicle_model *model, double x,
   robot *r = status == VEHICLE_OK ? sim_new_robot(self, number, NULL) : NULL;
   if (r == NULL) {
     vehicles_destroy(v);
-    if (status == VEHICLE_NOT_FREE) return SIM_NOT_FREE;
-    return status == VEHICLE_OK || status == VEHICLE_NO_MEMORY ? SIM_NO_MEMORY : SIM_BAD_ARGUMENT;
+    return status == VEHICLE_NOT_FREE ? SIM_NOT_FREE : SIM_NO_MEMORY;
   }
   v->worlds[0].in = &self->world;
   r->vehicle = v;

@@ -126,12 +126,16 @@ static vehicle_model *model(int servos, const double notes[BODY]) {
   right.mount = -1.0;
   vehicle_model *m = vehicle_model_new(servos ? &small : &large, servos ? 0.001 : 0.01);
   const motor_dc_parameters dc = {0.0333, 0.0333, 0.62, 0.2e-3, 0.008, 0.02, 2.0, 1.0, 1.0, 12.0};
-  const int driven = servos ? vehicle_model_drive_servo(m, &left, &right) : vehicle_model_drive_dc(m, &dc, &dc, 1);
+  if (servos) {
+    vehicle_model_drive_servo(m, &left, &right);
+  } else {
+    vehicle_model_drive_dc(m, &dc, &dc, 1);
+  }
   const charge_parameters gauge = {.empty = 5.0, .full = 7.75, .sigma = 0.005};
   const energy_parameters energy = {0.002, 0.004, 0.1};
-  const int bad = add_sensors(m) || vehicle_model_battery(m, &energy) != VEHICLE_OK ||
-                  vehicle_model_add(m, &charge_sensor, &gauge, 0.0) < 0 || driven != VEHICLE_OK;
-  vehicle_model_switch(m, 1, 0);
+  vehicle_model_battery(m, &energy);
+  const int bad = add_sensors(m) || vehicle_model_add(m, &charge_sensor, &gauge, 0.0) < 0;
+  m->ends_at_collision = 0;
   if (bad) printf("bad model\n");
   return m;
 }

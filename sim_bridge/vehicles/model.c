@@ -20,11 +20,6 @@ void vehicle_model_destroy(vehicle_model *self) {
   free(self);
 }
 
-void vehicle_model_switch(vehicle_model *self, int noise, int ends_at_collision) {
-  self->noise = noise;
-  self->ends_at_collision = ends_at_collision;
-}
-
 /* ---- drive -------------------------------------------------------------------------------------------------------- */
 
 /* Torque that one wheel loses per rad/s of its speed, N m s. */
@@ -48,49 +43,34 @@ double vehicle_model_euler_limit(const vehicle_model *self) {
   return rate > 0.0 ? 2.0 / rate : INFINITY;
 }
 
-/* A model that steps too far keeps its drive, so that its limit can be asked; vehicles_place refuses it. */
-static int check_step(const vehicle_model *self) {
-  return self->dt < vehicle_model_euler_limit(self) ? VEHICLE_OK : VEHICLE_BAD_STEP;
-}
-
-int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,
-                           int full) {
-  if (self->drive != DRIVE_NONE) return VEHICLE_TOO_MANY;
+void vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,
+                            int full) {
   self->drive = DRIVE_DC;
   self->dc[0] = *left;
   self->dc[1] = *right;
   self->full = full;
-  return check_step(self);
 }
 
-int vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters *left,
-                              const servo_motor_parameters *right) {
-  if (self->drive != DRIVE_NONE) return VEHICLE_TOO_MANY;
+void vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters *left,
+                               const servo_motor_parameters *right) {
   self->drive = DRIVE_SERVO;
   self->servo[0] = *left;
   self->servo[1] = *right;
-  return check_step(self);
 }
 
-int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
-                                  const motor_regulated_parameters *right) {
-  if (self->drive != DRIVE_NONE) return VEHICLE_TOO_MANY;
+void vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
+                                   const motor_regulated_parameters *right) {
   self->drive = DRIVE_REGULATED;
   self->regulated[0] = *left;
   self->regulated[1] = *right;
-  return check_step(self);
 }
 
 /* ---- battery and sensors ------------------------------------------------------------------------------------------ */
 
-int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy) {
-  if (self->has_battery) return VEHICLE_TOO_MANY;
+void vehicle_model_battery(vehicle_model *self, const energy_parameters *energy) {
   self->energy = *energy;
   self->has_battery = 1;
-  return VEHICLE_OK;
 }
-
-size_t vehicle_model_readings(const vehicle_model *self) { return self->readings; }
 
 /* Key of the noise of a kind's `number`-th sensor: a block of 64 for each kind, and the next 64 of all kinds above them. */
 static uint32_t device_of(const sensor_kind *kind, uint32_t number) {

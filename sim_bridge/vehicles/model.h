@@ -21,11 +21,8 @@
 enum {
   VEHICLE_OK = 0,
   VEHICLE_BAD_NUMBER = -1, /* not finite, or outside its range */
-  VEHICLE_BAD_STEP = -2,   /* dt <= 0 or not finite, or at or beyond the motors' Euler limit */
   VEHICLE_NOT_FREE = -3,   /* the start is not free space */
-  VEHICLE_TOO_MANY = -4,   /* a second drive or battery */
   VEHICLE_NO_MEMORY = -5,
-  VEHICLE_NOT_PLACED = -6, /* a world that is not there or without an arena, or a model without a drive */
 };
 
 typedef struct vehicle_model vehicle_model;
@@ -37,26 +34,20 @@ void vehicle_model_destroy(vehicle_model *self);
 
 /* Drives: motor signal s in [-1, 1]. DC: s V_max volts, quasi-static, or with the current as a state if `full` (a motor
  * with inductance 0 is quasi-static nevertheless). Servo: 1500 us +- 200 us s, one pulse every 20 ms. Regulated: (3.15)
- * with the reference s v_max. */
-int vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,
-                           int full);
-int vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters *left,
-                              const servo_motor_parameters *right);
-int vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
-                                  const motor_regulated_parameters *right);
+ * with the reference s v_max. A model has one, and steps by less than its Euler limit, before worlds are made of it. */
+void vehicle_model_drive_dc(vehicle_model *self, const motor_dc_parameters *left, const motor_dc_parameters *right,
+                            int full);
+void vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters *left,
+                               const servo_motor_parameters *right);
+void vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
+                                   const motor_regulated_parameters *right);
 
 /* The notes' battery, which empties by these rates; sensors/charge.h reads it. */
-int vehicle_model_battery(vehicle_model *self, const energy_parameters *energy);
-
-/* Switches: all noise (1), and the end of a run at a collision (1). */
-void vehicle_model_switch(vehicle_model *self, int noise, int ends_at_collision);
+void vehicle_model_battery(vehicle_model *self, const energy_parameters *energy);
 
 /* Adds a sensor of a kind (world/sensors/sensor.h), with the parameters that its header says. `period`: s between samples;
  * 0: every step. Returns the number of its first reading, or an error. */
 int vehicle_model_add(vehicle_model *self, const sensor_kind *kind, const void *parameters, double period);
-
-/* How many readings there are by now. */
-size_t vehicle_model_readings(const vehicle_model *self);
 
 /* Above this step, s, Euler's method diverges for the drive and body: 2 / (the faster of their two linearised rates). */
 double vehicle_model_euler_limit(const vehicle_model *self);
@@ -83,7 +74,7 @@ struct vehicle_model {
   motor_regulated_parameters regulated[2];
   int has_battery;
   energy_parameters energy;
-  int noise, ends_at_collision;
+  int noise, ends_at_collision; /* switches, both on at first: all noise, and the end of a run at a collision */
   size_t sensors_count, readings;
   size_t numbers; /* that all sensors keep */
   vehicle_sensor *sensors;

@@ -72,10 +72,8 @@ class VehicleModel:
         given, outline = _body_and_outline(body)
         parameters = struct("body_parameters", "vehicle: body", given)
         self.dt = number("vehicle", "dt", dt, STEP)
-        switches = (
-            switch("vehicle: noise", noise, RobotError),
-            switch("vehicle: ends_at_collision", ends_at_collision, RobotError),
-        )
+        noise = switch("vehicle: noise", noise, RobotError)
+        ends_at_collision = switch("vehicle: ends_at_collision", ends_at_collision, RobotError)
         self.names: dict[str, slice] = {}
         self.looks: dict[str, tuple[Mapping[str, float], float]] = {}
         self.body = dict(body)
@@ -88,7 +86,7 @@ class VehicleModel:
         self.a: float = lib.body_a(parameters)
         self.b: float = lib.body_b(parameters)
         self.handle = ffi.gc(handle, lib.vehicle_model_destroy)
-        lib.vehicle_model_switch(self.handle, *switches)
+        self.handle.noise, self.handle.ends_at_collision = noise, ends_at_collision
 
     @property
     def euler_limit(self) -> float:
@@ -98,7 +96,7 @@ class VehicleModel:
     @property
     def readings(self) -> int:
         """How many readings it gives."""
-        return int(lib.vehicle_model_readings(self.handle))
+        return int(self.handle.readings)
 
     @property
     def radius(self) -> float:
@@ -115,12 +113,13 @@ class VehicleModel:
             )
         return self.handle
 
-    def bad_step(self) -> RobotError:
-        """Of a model that steps at its drive's Euler limit or beyond."""
-        limit = lib.vehicle_model_euler_limit(self.handle)
-        return RobotError(
-            f"vehicle: dt = {self.dt:g} s; expected less than {limit:.4g} s, the Euler limit of its drive and body"
-        )
+    def check_drive(self, who: str = "vehicle") -> None:
+        """Raises RobotError where it has no drive, or steps at the Euler limit of it or beyond."""
+        if not self.handle.drive:
+            raise RobotError(f"{who}: the model has no drive; expected dc_motors, regulated_motors or servos")
+        if not self.dt < self.euler_limit:
+            expected = f"expected less than {self.euler_limit:.4g} s, the Euler limit of its drive and body"
+            raise RobotError(f"{who}: dt = {self.dt:g} s; {expected}")
 
     # ---- drives ------------------------------------------------------------------------------------------------------
 
@@ -134,7 +133,8 @@ class VehicleModel:
         """
         motors = [dc_parameters(f"vehicle: {side} motor", changes) for side, changes in _sides(left, right)]
         is_full = switch("vehicle: full", full, RobotError)
-        self._driven(lib.vehicle_model_drive_dc(self._open, *motors, is_full))
+        lib.vehicle_model_drive_dc(self._undriven, *motors, is_full)
+        self.check_drive()
 
     def regulated_motors(self, left: Mapping[str, Any] | None = None, right: Mapping[str, Any] | None = None) -> None:
         """Two velocity-regulated motors (3.15): torque K (v_ref - v), limited, with v_ref = s speed_maximum_m_s.
@@ -142,7 +142,8 @@ class VehicleModel:
         What is not said is as in `RegulatedMotor`, which has the keys.
         """
         motors = [regulated_parameters(f"vehicle: {side} motor", changes) for side, changes in _sides(left, right)]
-        self._driven(lib.vehicle_model_drive_regulated(self._open, *motors))
+        lib.vehicle_model_drive_regulated(self._undriven, *motors)
+        self.check_drive()
 
     def servos(self, left: Mapping[str, Any] | None = None, right: Mapping[str, Any] | None = None) -> None:
         """Two continuous-rotation servos driven by signal: 1500 us +- 200 us s, mirrored on the right.
@@ -154,15 +155,17 @@ class VehicleModel:
             servo_parameters(f"vehicle: {side} servo", changes, MOUNTS[side], radius)
             for side, changes in _sides(left, right)
         ]
-        self._driven(lib.vehicle_model_drive_servo(self._open, *servos))
+        lib.vehicle_model_drive_servo(self._undriven, *servos)
+        self.check_drive()
 
-    def _driven(self, status: int) -> None:
-        if status == lib.VEHICLE_TOO_MANY:
+    @property
+    def _undriven(self) -> Any:
+        """The C model, while it has no drive."""
+        if self._open.drive:
             raise RobotError(
                 "vehicle: it has a drive already; expected one of dc_motors, regulated_motors or servos, once"
             )
-        if status == lib.VEHICLE_BAD_STEP:
-            raise self.bad_step()
+        return self.handle
 
     # ---- battery and sensors -----------------------------------------------------------------------------------------
 
@@ -172,8 +175,9 @@ class VehicleModel:
         """The notes' battery, read as a voltage; `energy`: idle_per_s, signal_per_s, charger_per_s."""
         where = self._named(name)
         rates = struct("energy_parameters", where, energy, ENERGY)
-        if lib.vehicle_model_battery(self._open, rates) == lib.VEHICLE_TOO_MANY:
+        if self._open.has_battery:
             raise RobotError(f"{where}: it has a battery already; expected one")
+        lib.vehicle_model_battery(self.handle, rates)
         self.sensor("charge", name, empty=empty, full=full, sigma=sigma)
 
     def sensor(
@@ -211,7 +215,7 @@ class VehicleModel:
             raise RobotError(f"{where}: there is no memory for it")
         if first < 0:
             raise RobotError(f"{where} has numbers that do not fit together; expected such as its header says")
-        self.names[name] = slice(first, lib.vehicle_model_readings(self.handle))
+        self.names[name] = slice(first, self.readings)
         if what.reach:
             self.looks[name] = (values_of(given.beam), float(getattr(given, what.reach)))
 

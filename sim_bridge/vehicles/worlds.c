@@ -48,8 +48,6 @@ void vehicles_destroy(vehicles *self) {
 int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, uint32_t id, double x, double y,
                    double heading) {
   const vehicle_model *m = self->model;
-  if (m->drive == DRIVE_NONE) return VEHICLE_NOT_PLACED;
-  if (!(m->dt < vehicle_model_euler_limit(m))) return VEHICLE_BAD_STEP;
   vehicle *w = &self->worlds[i];
   const size_t moving = arena_moving_count(where);
   mover *movers = moving > 0 ? calloc(moving, sizeof *movers) : NULL;

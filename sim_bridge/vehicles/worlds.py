@@ -60,16 +60,11 @@ def place(
     )
     number = arguments.whole(f"{who}: robot", robot, RobotError, least=1, most=2**31 - 1)
     key = arguments.whole(f"{who}: the seed", seed, RobotError, least=-(2**63), most=2**64 - 1) % 2**64
+    model.check_drive(who)
     status = lib.vehicles_place(handle, index, arena.handle, key, number, x, y, heading)
     if status == lib.VEHICLE_NOT_FREE:
         raise ArenaError(
             f"{who}: in arena {arena.name} the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
-        )
-    if status == lib.VEHICLE_NOT_PLACED:
-        raise RobotError(f"{who}: the model has no drive; expected dc_motors, regulated_motors or servos")
-    if status == lib.VEHICLE_BAD_STEP:
-        raise RobotError(
-            f"{who}: the model's dt = {model.dt:g} s; expected less than {model.euler_limit:.4g} s, the Euler limit"
         )
     if status == lib.VEHICLE_NO_MEMORY:
         raise MemoryError(f"{who}: no memory for the world's moving shapes or laser")

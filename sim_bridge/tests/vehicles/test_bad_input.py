@@ -328,7 +328,7 @@ START = "expected 3 finite numbers, x, y (m), heading (rad), within ±1,000,000,
         (lambda: any_vehicle(MODEL, None), RobotError, "vehicle: the arena is None; expected an Arena"),
         (lambda: any_vehicle("arsim", ROOM), RobotError, "vehicle: the model is 'arsim'; expected a VehicleModel"),
         (undriven, RobotError, "vehicle: the model has no drive; expected dc_motors, regulated_motors or servos"),
-        (too_slow, RobotError, "vehicle: the model's dt = 0.5 s; expected less than 0.3255 s, the Euler limit"),
+        (too_slow, RobotError, "vehicle: dt = 0.5 s; expected less than 0.3255 s, the Euler limit"),
         (
             lambda: any_vehicle(MODEL, ROOM).place((0, 0, 0), 200),
             RobotError,
