@@ -161,7 +161,7 @@ static const part_operations OPERATIONS = {.edge = two_wire_edge, .step = step};
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   compass *self = (compass *)base;
   const hmc5883l_parameters *p = parameters;
-  if (two_wire_init(&self->bus, &OPERATIONS, place, pins, &self->device) != 0) return -1;
+  two_wire_init(&self->bus, &OPERATIONS, place, pins, &self->device);
   self->device = (two_wire_device){.op = &CHIP, .address = COMPASS_ADDRESS};
   self->parameters = *p;
   self->registers[CONFIGURATION_A] = 0x10;

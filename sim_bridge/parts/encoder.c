@@ -68,7 +68,6 @@ static const part_operations OPERATIONS = {.step = step};
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   encoder *self = (encoder *)base;
   const encoder_parameters *p = parameters;
-  if (place->index > 1 || p->edges_per_turn == 0) return -1;
   part_join(base, &OPERATIONS, place, (part_pin[]){{pins[0], PART_DRIVES}, {pins[1], PART_DRIVES}}, 2);
   self->side = place->index;
   self->pin_a = pins[0];

@@ -20,7 +20,6 @@ static const part_operations OPERATIONS = {.edge = edge, .before_step = before_s
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   servo *self = (servo *)base;
-  if (place->index > 1) return -1;
   part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS}, 1);
   self->side = place->index;
   self->parameters = *(const servo_motor_parameters *)parameters;

@@ -1,8 +1,6 @@
 /* turret.c: see turret.h. */
 #include "turret.h"
 
-#include <math.h>
-
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   turret *self = (turret *)base;
   if (!part_pulse_ends(&self->pulse, cycle, level)) return;
@@ -25,7 +23,6 @@ turret *turret_of(part *base) { return base->op == &OPERATIONS ? (turret *)base 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   turret *self = (turret *)base;
   const turret_parameters *p = parameters;
-  if (!isfinite(p->x + p->y)) return -1;
   part_join(base, &OPERATIONS, place, &(part_pin){pins[0], PART_HEARS}, 1);
   self->parameters = p->motor;
   motor_position_init(&self->motor, 0.0);

@@ -73,10 +73,9 @@ void two_wire_edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
 }
 
-int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins,
-                  two_wire_device *device) {
+void two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins,
+                   two_wire_device *device) {
   const uint8_t role = PART_HEARS | PART_DRIVES | PART_PULLED_UP;
-  if (pins[0] == pins[1] || pins[1] == PART_NO_PIN) return -1;
   part_join(&self->part, op, place, (part_pin[]){{pins[0], role}, {pins[1], role}}, 2);
   self->device = device;
   self->sda_pin = pins[0];
@@ -84,5 +83,4 @@ int two_wire_init(two_wire *self, const part_operations *op, const part_place *p
   self->sda = self->scl = 1;
   part_drive(&self->part, 0, self->sda_pin, BOARD_HIGH);
   part_drive(&self->part, 0, self->scl_pin, BOARD_HIGH);
-  return 0;
 }

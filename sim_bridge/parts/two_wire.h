@@ -41,9 +41,9 @@ typedef struct {
   uint8_t shift;
 } two_wire;
 
-/* A part that begins with a bus, whose `edge` is two_wire_edge; pins: SDA, SCL. Returns 0, or -1: no such pins. */
-int two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins,
-                  two_wire_device *device);
+/* A part that begins with a bus, whose `edge` is two_wire_edge; pins: SDA, SCL. */
+void two_wire_init(two_wire *self, const part_operations *op, const part_place *place, const uint8_t *pins,
+                   two_wire_device *device);
 void two_wire_edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level);
 
 #endif

@@ -192,26 +192,6 @@ class Arena:
             "expected a smaller robot or more room"
         )
 
-    def grip(self, x: float, y: float, otherwise: float) -> float:
-        """Friction coefficient of the floor at (x, y); `otherwise` outside of all patches.
-
-        Raises:
-            ArenaError: a number is not finite, negative or too large.
-        """
-        x, y = _position(x, y)
-        otherwise = arguments.number("arena: otherwise", otherwise, ArenaError, least=0.0)
-        coefficient: float = lib.arena_grip(self.handle, x, y, otherwise)
-        return coefficient
-
-    def floor_reflectance(self, x: float, y: float) -> float:
-        """Share of infrared light that the floor at (x, y) throws back: of the last line painted there, or the floor's.
-
-        Raises:
-            ArenaError: a number is not finite, or too large.
-        """
-        share: float = lib.arena_floor_reflectance(self.handle, *_position(x, y))
-        return share
-
 
 def arena_names() -> list[str]:
     """The bundled arenas."""

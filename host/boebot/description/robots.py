@@ -323,17 +323,12 @@ def _image_faults(robot: RobotDescription, path: Path) -> Faults:
     for name, device in robot.device.items():
         built = image.device.get(name)
         if type(built) is not type(device) or (built is not None and built.pins() != device.pins()):
-            there = "not there" if built is None else f"{built.__struct_config__.tag} on {_pins_text(built)}"
+            there = "not there" if built is None else f"{built.__struct_config__.tag} on {built.wired_to}"
             yield (
                 f"device.{name}",
-                f" is {device.__struct_config__.tag} on {_pins_text(device)}, but in the firmware "
+                f" is {device.__struct_config__.tag} on {device.wired_to}, but in the firmware "
                 f"for pin map {robot.pin_map!r} it is {there}; expected the same, or a pin_map of the robot's own",
             )
-
-
-def _pins_text(device: Device) -> str:
-    pins = [pin_name(pin) for pin in device.pins().values()]
-    return f"pin {pins[0]}" if len(pins) == 1 else f"pins {', '.join(pins)}"
 
 
 def owners(row: Imperfection, robot: RobotDescription) -> list[Any]:

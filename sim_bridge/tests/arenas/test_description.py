@@ -145,9 +145,9 @@ def test_showcase_holds_what_its_file_says() -> None:
     arena = load_arena("showcase")
     handle = arena.handle
     assert lib.arena_disc_count(handle) == 1
-    assert arena.grip(0, 0, 0.6) == 0.9
-    assert arena.grip(1.2, -1.2, 0.6) == 0.15
-    assert arena.grip(-1.5, -1, 0.6) == 0.6
+    assert lib.arena_grip(handle, 0, 0, 0.6) == 0.9
+    assert lib.arena_grip(handle, 1.2, -1.2, 0.6) == 0.15
+    assert lib.arena_grip(handle, -1.5, -1, 0.6) == 0.6
     light = lib.arena_lights(handle)[0]
     assert [lib.arena_is_at_charger(handle, 1.6, 1.2 + away) for away in (-0.149, 0.149, 0.151)] == [1, 1, 0]
     assert (light.x, light.y, light.height, light.power) == (1.6, 1.2, 0.25, 5.0)

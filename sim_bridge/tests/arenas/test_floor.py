@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from shapely import LineString, Point
 
 from boebot.arenas import Arena, ArenaDescription
+from boebot.arenas._arena import lib
 from boebot.arenas.description import Line
 
 COORDINATE = st.floats(-2, 2, allow_nan=False).map(lambda value: round(value, 3))
@@ -35,4 +36,4 @@ def test_the_floor_is_that_of_the_last_line_there(
         assume(abs(distance - width / 2) > 1e-9)
         if distance < width / 2:
             expected = share
-    assert arena.floor_reflectance(x, y) == expected
+    assert lib.arena_floor_reflectance(arena.handle, x, y) == expected

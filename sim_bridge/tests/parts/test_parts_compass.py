@@ -281,7 +281,6 @@ def test_one_address_is_for_one_chip() -> None:
 
     assert add(SDA, SCL) == 0
     assert add(SDA, SCL) == lib.SIM_PIN_TAKEN
-    assert add(SDA, SDA) == lib.SIM_BAD_ARGUMENT
     assert (
         lib.robot_add_part(handle, ffi.addressof(lib.compass_kind), 0, [20, SCL], parameters()) == lib.SIM_BAD_ARGUMENT
     )

@@ -147,7 +147,6 @@ def test_any_question_to_an_arena_is_answered_in_numbers_or_refused(x: Any, y: A
     for question in (
         lambda: ROOM.ray(x, y, angle, reach),
         lambda: ROOM.is_free(x, y, reach),
-        lambda: ROOM.grip(x, y, reach),
         lambda: FIELD.ray(x, y, 0.0, reach),
     ):
         refused(lambda: answers.append(question()))  # noqa: B023
@@ -277,7 +276,6 @@ def test_one_description_cannot_be_changed_behind_an_arena() -> None:
         (lambda a: a.ray(0, 0, math.nan, 1), "arena: angle is nan; expected a finite number"),
         (lambda a: a.ray(0, 0, 0, -1), "arena: reach is -1; expected a finite number from 0 to 1e+07"),
         (lambda a: a.is_free(0, 0, "r"), "arena: radius is 'r'; expected a finite number from 0"),
-        (lambda a: a.grip(0, 0, math.inf), "arena: otherwise is inf; expected a finite number of at least 0"),
         (lambda a: type(a)(None), "arena: expected object, got null"),
         (lambda a: ray_segment(0, 0, 0, (1, 0), (1e7, 0)), "segment (1, 0) to (10000000.0, 0), ray from (0, 0) at 0"),
     ],
