@@ -141,12 +141,7 @@ class Vehicle:
         Raises:
             BrainError: a signal is not a finite number.
         """
-        try:
-            if lib.vehicles_step_one(self.handle, 0, left, right) >= 0:
-                return
-        except (TypeError, OverflowError):
-            pass
-        raise _bad_signals((left, right))
+        self.run(lambda _: (left, right), 1)
 
     def run(self, brain: Brain, steps: int, *, stage: Stage | None = None) -> int:
         """The loop of Fig. 3.1 until it ends or for `steps` steps; `brain` takes the vehicle and gives the signals.

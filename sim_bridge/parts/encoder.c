@@ -4,7 +4,8 @@
 #include "geometry/numbers.h"
 
 static uint8_t level_a(const encoder *self, long long index) {
-  if (self->pin_b == PART_NO_PIN) return (uint8_t)(index & 1);
+  if (self->part.pins[1].pin == PART_NO_PIN) /* one channel */
+    return (uint8_t)(index & 1);
   return (uint8_t)(((index & 3) == 1 || (index & 3) == 2) ? 1 : 0);
 }
 
@@ -70,15 +71,13 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   const encoder_parameters *p = parameters;
   part_join(base, &OPERATIONS, place, (part_pin[]){{pins[0], PART_DRIVES}, {pins[1], PART_DRIVES}}, 2);
   self->side = place->index;
-  self->pin_a = pins[0];
-  self->pin_b = pins[1];
   self->parameters = *p;
   self->edges_per_rad = (double)p->edges_per_turn / (2.0 * NUMBERS_PI);
   self->phase = noise_next_uniform(&base->noise); /* 0.5 without noise */
   self->position = wheel_angle(self) * self->edges_per_rad + self->phase;
   self->index = number_floor(self->position);
-  part_drive(base, 0, self->pin_a, level_a(self, self->index));
-  part_drive(base, 0, self->pin_b, level_b(self->index));
+  part_drive(base, 0, pins[0], level_a(self, self->index));
+  part_drive(base, 0, pins[1], level_b(self->index));
   return 0;
 }
 

@@ -25,8 +25,6 @@ typedef struct {
 typedef struct {
   part part;
   int side; /* 0 left, 1 right */
-  uint8_t pin_a;
-  uint8_t pin_b; /* PART_NO_PIN: one channel */
   encoder_parameters parameters;
   double edges_per_rad;
   double phase;    /* edges: where the disc stands at angle 0, in [0, 1) */

@@ -20,19 +20,19 @@ static void drive_output(infrared *self, uint64_t cycle) {
   forget_past_light(self, cycle);
   uint64_t low_until = self->lit_until;
   const int lit = low_until > cycle;
-  if (lit) part_drive(&self->part, cycle, self->receiver_pin, BOARD_LOW);
+  if (lit) part_drive(&self->part, cycle, self->part.pins[1].pin, BOARD_LOW);
   int low = lit;
   for (int i = 0; i < self->foreign_count; i++) {
     const infrared_light *light = &self->foreign[i];
     if (low && light->from > low_until) {
-      part_drive(&self->part, low_until, self->receiver_pin, BOARD_HIGH);
+      part_drive(&self->part, low_until, self->part.pins[1].pin, BOARD_HIGH);
       low = 0;
     }
-    if (!low) part_drive(&self->part, light->from > cycle ? light->from : cycle, self->receiver_pin, BOARD_LOW);
+    if (!low) part_drive(&self->part, light->from > cycle ? light->from : cycle, self->part.pins[1].pin, BOARD_LOW);
     if (!low || light->until > low_until) low_until = light->until;
     low = 1;
   }
-  if (low) part_drive(&self->part, low_until, self->receiver_pin, BOARD_HIGH);
+  if (low) part_drive(&self->part, low_until, self->part.pins[1].pin, BOARD_HIGH);
 }
 
 static double frequency_of(uint32_t period) { return (double)BOARD_CLOCK_HZ / (double)period; }
@@ -106,7 +106,6 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   const infrared_pair_parameters *p = parameters;
   if (pins[1] == PART_NO_PIN || infrared_pair_init(&self->pair, p) != 0) return -1;
   part_join(base, &OPERATIONS, place, (part_pin[]){{pins[0], PART_HEARS}, {pins[1], PART_DRIVES | PART_PULLED_UP}}, 2);
-  self->receiver_pin = pins[1];
   self->mount = p->beam;
   part_drive(base, 0, pins[1], BOARD_HIGH);
   return 0;

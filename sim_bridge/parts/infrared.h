@@ -22,7 +22,6 @@ typedef struct {
 
 typedef struct {
   part part;
-  uint8_t receiver_pin;
   beam_parameters mount;
   infrared_pair pair;
   uint64_t last_rise;

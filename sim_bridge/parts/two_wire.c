@@ -4,7 +4,7 @@
 static void pull(two_wire *self, int low, uint64_t cycle) {
   if (self->pulling == low) return;
   self->pulling = (uint8_t)low;
-  part_drive(&self->part, cycle + TWO_WIRE_DELAY_CYCLES, self->sda_pin, low ? BOARD_LOW : BOARD_HIGH);
+  part_drive(&self->part, cycle + TWO_WIRE_DELAY_CYCLES, self->part.pins[0].pin, low ? BOARD_LOW : BOARD_HIGH);
 }
 
 /* The eight bits of an address are in: 1 if somebody has it. */
@@ -61,10 +61,10 @@ static void begin_or_end(two_wire *self, uint64_t cycle) {
 void two_wire_edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   two_wire *self = (two_wire *)base;
   const uint8_t high = level != BOARD_LOW;
-  uint8_t *line = pin == self->sda_pin ? &self->sda : &self->scl;
+  uint8_t *line = pin == self->part.pins[0].pin ? &self->sda : &self->scl;
   if (*line == high) return;
   *line = high;
-  if (pin == self->sda_pin) {
+  if (pin == self->part.pins[0].pin) {
     if (self->scl && !self->pulling) begin_or_end(self, cycle); /* START or STOP */
   } else if (high) {
     on_rise(self);
@@ -78,9 +78,7 @@ void two_wire_init(two_wire *self, const part_operations *op, const part_place *
   const uint8_t role = PART_HEARS | PART_DRIVES | PART_PULLED_UP;
   part_join(&self->part, op, place, (part_pin[]){{pins[0], role}, {pins[1], role}}, 2);
   self->device = device;
-  self->sda_pin = pins[0];
-  self->scl_pin = pins[1];
   self->sda = self->scl = 1;
-  part_drive(&self->part, 0, self->sda_pin, BOARD_HIGH);
-  part_drive(&self->part, 0, self->scl_pin, BOARD_HIGH);
+  part_drive(&self->part, 0, pins[0], BOARD_HIGH);
+  part_drive(&self->part, 0, pins[1], BOARD_HIGH);
 }

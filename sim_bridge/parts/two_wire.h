@@ -33,7 +33,6 @@ typedef enum { TWO_WIRE_IDLE, TWO_WIRE_ADDRESS, TWO_WIRE_WRITE, TWO_WIRE_READ, T
 typedef struct {
   part part;
   two_wire_device *device;
-  uint8_t sda_pin, scl_pin;
   uint8_t sda, scl; /* what the board does: 0 low, 1 let go */
   uint8_t pulling;  /* 1: a device holds SDA low */
   two_wire_phase phase;
