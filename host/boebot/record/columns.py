@@ -107,7 +107,7 @@ class Columns(ABC):
         return len(self.time)
 
     def part(self, which: NDArray[np.intp]) -> Columns:
-        """The ticks of these indices."""
+        """The ticks of these indices, without what the brain showed and rows of the truth."""
         return replace(
             self,
             first=0,
@@ -120,6 +120,8 @@ class Columns(ABC):
             odometry=None if self.odometry is None else self.odometry.part(which),
             true_pose=None if self.true_pose is None else self.true_pose.part(which),
             contact=None if self.contact is None else self.contact[which],
+            showing=EMPTY,
+            track=None,
         )
 
     @property

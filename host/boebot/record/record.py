@@ -75,11 +75,12 @@ class Keeper(Protocol):
 
 
 class InMemory:
-    """In this process: the newest groups as they are, older ones packed. What is `written` goes to a file, too."""
+    """In this process: the newest groups as they are. What is `written` goes to a file, too: of that older groups are
+    read again; else they are packed."""
 
     def __init__(self) -> None:
         self.written: RecordWriter | None = None
-        self._groups: list[Group | bytes] = []
+        self._groups: list[Group | bytes | None] = []  # None: only written
 
     def write(self, rows: Rows, time_s: float) -> None:
         """Keeps rows that end at that time of the run (s), as a group.
@@ -89,15 +90,24 @@ class InMemory:
         """
         group = group_of(rows)
         self._groups.append(group)
-        if len(self._groups) > PLAIN:
-            self._groups[-PLAIN - 1] = zstandard.compress(pickle.dumps(self._groups[-PLAIN - 1]))
         if self.written is not None:
             self.written.write(group, time_s)
+        if len(self._groups) > PLAIN:
+            oldest = self._groups[-PLAIN - 1]
+            self._groups[-PLAIN - 1] = None if self.written else zstandard.compress(pickle.dumps(oldest))
 
     def groups(self) -> Iterator[Group]:
-        """See `Keeper`."""
-        for group in self._groups:
-            yield pickle.loads(zstandard.decompress(group)) if isinstance(group, bytes) else group
+        """See `Keeper`. What could not be written is missing; the run has ended by that.
+
+        Raises:
+            RecordError: what was written cannot be read.
+        """
+        on_disk = self.written.groups() if self.written and None in self._groups else iter(())
+        for group in self._groups.copy():
+            read = next(on_disk, None)
+            found = pickle.loads(zstandard.decompress(group)) if isinstance(group, bytes) else group or read
+            if found is not None:
+                yield found
 
 
 class Record:

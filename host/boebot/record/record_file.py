@@ -28,10 +28,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
+from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
 from boebot.errors import BoebotError
-from boebot.record.blocks import SCHEMA, Kept, Rows, group_of, packed, schema, unpacked
+from boebot.record.blocks import SCHEMA, Group, Kept, Rows, group_of, packed, schema, unpacked
 
 WAITING = 4  # groups at most that wait for a disk, where time can stand still
 PAUSE_S = 0.005  # between two looks whether it is done
@@ -93,6 +94,20 @@ class RecordWriter:
         """A file within the file. Raises as `check`."""
         self._put(partial(self._attach, name, data))
 
+    def groups(self) -> Iterator[Group]:
+        """What was written so far, oldest first, read from the file.
+
+        Raises:
+            RecordError: it cannot be read.
+        """
+        self._work.join()
+        try:
+            with Path(self._file.name).open("rb") as file:
+                for kept in RecordReader(file, self._name).groups():
+                    yield kept.group
+        except OSError as error:
+            raise RecordError(f"the record {self._name} cannot be read: {error.strerror}") from None
+
     def finish(self) -> None:
         """Ends the record; nothing is written any more. Raises as `check`, and where the file has no name any more."""
         if self._thread.is_alive():
@@ -111,7 +126,9 @@ class RecordWriter:
     def _run(self) -> None:
         while (work := self._work.get()) is not None:
             self._do(work)
+            self._work.task_done()
         self._do(self._writer.finish)
+        self._work.task_done()
 
     def _do(self, work: Callable[[], None]) -> None:
         """What cannot be written whole is not written at all, and nothing after it."""
