@@ -25,6 +25,17 @@ enum {
   READ_SIGNATURE = 0x75
 };
 
+/* Bytes between a command and its end, without a page; in flash, as nothing fills RAM here. */
+static const uint8_t ARGUMENTS[0x100] PROGMEM = {
+    [GET_PARAMETER] = 1,
+    [LOAD_ADDRESS] = 2,
+    [PROGRAM_PAGE] = 3, /* size, high byte first, and the kind of memory: flash */
+    [READ_PAGE] = 3,
+    [UNIVERSAL] = 4,
+    [SET_DEVICE_MORE] = 5,
+    [SET_DEVICE] = 20,
+};
+
 static uint8_t *const page = (uint8_t *)0x100;
 
 static void send(uint8_t byte) {
@@ -42,10 +53,6 @@ static uint8_t receive(void) {
   return UDR0;
 }
 
-static void skip(uint8_t count) {
-  while (count-- > 0) (void)receive();
-}
-
 /* The end of a command. */
 static void agree(void) {
   if (receive() != END_OF_PACKET) {
@@ -55,75 +62,39 @@ static void agree(void) {
   send(IN_SYNC);
 }
 
-static void write_page(uint16_t address) {
-  (void)receive();
-  const uint8_t size = receive();
-  (void)receive(); /* the kind of memory: flash */
-  for (uint8_t i = 0; i < size; i++) page[i] = receive();
+static void write_page(uint16_t address, uint8_t size) {
   boot_page_erase(address);
   boot_spm_busy_wait();
   for (uint8_t i = 0; i < size; i += 2) boot_page_fill(address + i, (uint16_t)(page[i] | page[i + 1] << 8));
   boot_page_write(address);
   boot_spm_busy_wait();
   boot_rww_enable();
-  agree();
 }
 
-static void read_page(uint16_t address) {
-  (void)receive();
-  uint8_t size = receive();
-  (void)receive();
-  agree();
-  while (size-- > 0) send(pgm_read_byte(address++));
-}
-
-static void serve(void) {
+/* By itself, as start() has no place on the stack for what it keeps. */
+static __attribute__((noinline)) void serve(void) {
   uint16_t address = 0;
+  uint8_t given[20]; /* with a command */
   for (;;) {
-    switch (receive()) {
-      case GET_PARAMETER:
-        skip(1);
-        agree();
-        send(3);
-        break;
-      case SET_DEVICE:
-        skip(20);
-        agree();
-        break;
-      case SET_DEVICE_MORE:
-        skip(5);
-        agree();
-        break;
-      case LOAD_ADDRESS: /* in words */
-        address = receive();
-        address = (uint16_t)((address | (uint16_t)receive() << 8) * 2u);
-        agree();
-        break;
-      case UNIVERSAL:
-        skip(4);
-        agree();
-        send(0);
-        break;
-      case PROGRAM_PAGE:
-        write_page(address);
-        break;
-      case READ_PAGE:
-        read_page(address);
-        break;
-      case READ_SIGNATURE:
-        agree();
-        send((uint8_t)(SIGNATURE >> 16));
-        send((uint8_t)(SIGNATURE >> 8));
-        send((uint8_t)SIGNATURE);
-        break;
-      case LEAVE:
-        wdt_enable(WDTO_15MS);
-        agree();
-        break;
-      default:
-        agree();
-        break;
+    const uint8_t command = receive();
+    for (uint8_t i = 0; i < pgm_read_byte(&ARGUMENTS[command]); i++) given[i] = receive();
+    if (command == PROGRAM_PAGE) {
+      for (uint8_t i = 0; i < given[1]; i++) page[i] = receive();
     }
+    agree();
+    if (command == GET_PARAMETER) send(3);
+    if (command == UNIVERSAL) send(0);
+    if (command == LOAD_ADDRESS) address = (uint16_t)((given[0] | (uint16_t)given[1] << 8) * 2u); /* in words */
+    if (command == PROGRAM_PAGE) write_page(address, given[1]);
+    if (command == READ_PAGE) {
+      while (given[1]-- > 0) send(pgm_read_byte(address++));
+    }
+    if (command == READ_SIGNATURE) {
+      send((uint8_t)(SIGNATURE >> 16));
+      send((uint8_t)(SIGNATURE >> 8));
+      send((uint8_t)SIGNATURE);
+    }
+    if (command == LEAVE) wdt_enable(WDTO_15MS);
     send(OK);
   }
 }
