@@ -121,7 +121,7 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
     files: list[Path] = []
     with (
         output.progress_bar("experiments", len(experiments), unit="") as watch,
-        closing(running.run(experiments, seed, jobs, watch, output_files.files)) as coming,
+        closing(running.run(experiments, seed, jobs, watch, "boebot_course.output_files:files")) as coming,
     ):
         for verdict in coming:
             by_name[verdict.name] = verdict

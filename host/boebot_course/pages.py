@@ -122,7 +122,7 @@ def main(chapters: list[str]) -> int:
     chosen = [one for one in known if not chapters or chapter_of(one) in chapters]
     with (
         progress_bar("experiments", len(chosen), unit="") as watch,
-        closing(running.run(chosen, SEED, os.cpu_count() or 1, watch, picture)) as coming,
+        closing(running.run(chosen, SEED, os.cpu_count() or 1, watch, "boebot_course.pages:picture")) as coming,
     ):
         verdicts = {verdict.name: verdict for verdict in coming}
     for verdict in verdicts.values():

@@ -1,30 +1,30 @@
-"""Runs experiments, in this process or in several, and says what came of each.
+"""Runs experiments, in this process or each in its own, and says what came of each.
 
-An experiment is a function of its seed, so what comes out does not depend on how many processes there are. What draws
+An experiment is a function of its seed, so what comes out does not depend on how many run at the same time. What draws
 its figure cannot leave its process: files are made where it runs, and handed over as bytes.
 """
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
 import os
-import signal
-import threading
+import pickle
+import subprocess
+import sys
+import tempfile
+import time
 import traceback
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import CancelledError, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from pkgutil import resolve_name
 
 from boebot.errors import BoebotError
-from boebot.running.interrupts import SIGNALS
-from boebot_course.experiment import Experiment, Measured, Outcome
+from boebot.running import interrupts
+from boebot_course.experiment import Experiment, Measured
 from boebot_course.experiments import all_experiments
 
-Files = Callable[[Experiment, Outcome, int], dict[str, bytes]]
-"""Makes files of what came of an experiment with that seed: name -> content. A function of a module, for processes."""
-BOARDS = ("avr", "native", "direct", "arsim")  # from slow to fast, as named in `Experiment.robot`
+LOOK_S = 0.02  # between two looks at whether a process has ended
+_ALONE = "import sys; from boebot_course import running; running.hand_over(*sys.argv[1:])"
 
 
 @dataclass(frozen=True)
@@ -49,42 +49,55 @@ class Verdict:
 
 
 def run(
-    experiments: Sequence[Experiment], seed: int, jobs: int, watch: Callable[[float], None], files: Files
+    experiments: Sequence[Experiment], seed: int, jobs: int, watch: Callable[[float], None], files: str
 ) -> Generator[Verdict, None, None]:
-    """Runs them, with up to that many processes beside each other; the verdicts, as they come. `watch` is told how many
-    are done.
+    """Runs them, up to that many processes beside each other; the verdicts, as they come. An experiment that raises, or
+    whose process dies, has failed; the others go on. Processes end when what is returned is closed.
 
-    An experiment that raises, or whose process dies, has failed; the others go on. Processes end when what is returned
-    is closed.
+    Args:
+        watch: is called with how many are done.
+        files: "module:function"; the function makes files (name -> content) of an experiment, its outcome and the seed.
     """
     if jobs == 1 or len(experiments) == 1:
         for number, one in enumerate(experiments, 1):
             yield _run(one, seed, files)
             watch(number)
         return
-    waiting = {one.name: one for one in sorted(experiments, key=_length)}
-    with contextlib.closing(_in_processes(list(waiting), seed, jobs, files)) as verdicts:
-        for number, verdict in enumerate(verdicts, 1):
-            del waiting[verdict.name]
-            watch(number)
-            yield verdict
-    for name in waiting:  # a process died, and with it the others: each now gets its own
-        alone = list(_in_processes([name], seed, 1, files))
-        yield alone[0] if alone else Verdict(name, error="its process has died")
+    waiting = [one.name for one in sorted(experiments, key=lambda one: not one.slow)]
+    going: dict[str, subprocess.Popen[bytes]] = {}
+    with tempfile.TemporaryDirectory(prefix="boebot-") as folder:
+        try:
+            while waiting or going:
+                while waiting and len(going) < jobs:
+                    name = waiting.pop(0)
+                    with interrupts.uncut():
+                        command = [sys.executable, "-c", _ALONE, name, str(seed), files, str(Path(folder, name))]
+                        going[name] = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                time.sleep(LOOK_S)
+                for name in [name for name, process in going.items() if process.poll() is not None]:
+                    code = going.pop(name).returncode
+                    watch(len(experiments) - len(waiting) - len(going))
+                    if code:
+                        yield Verdict(name, error="its process has died")
+                    else:
+                        yield pickle.loads(Path(folder, name).read_bytes())
+        finally:
+            for process in going.values():
+                process.kill()
+                process.wait()
 
 
-def _length(experiment: Experiment) -> tuple[bool, int]:
-    """Sorts those that are likely to take longest to the front."""
-    board = next((index for index, board in enumerate(BOARDS) if board in experiment.robot), len(BOARDS))
-    return not experiment.slow, board
+def hand_over(name: str, seed: str, files: str, path: str) -> None:
+    """In its own process: runs an experiment and writes its verdict to a file."""
+    Path(path).write_bytes(pickle.dumps(_run(all_experiments()[name], int(seed), files)))
 
 
-def _run(experiment: Experiment, seed: int, files: Files) -> Verdict:
+def _run(experiment: Experiment, seed: int, files: str) -> Verdict:
     try:
         outcome = experiment.run(seed)
         if not outcome.measured:
             raise ValueError("nothing was measured")
-        return Verdict(experiment.name, tuple(outcome.measured), "", files(experiment, outcome, seed))
+        return Verdict(experiment.name, tuple(outcome.measured), "", resolve_name(files)(experiment, outcome, seed))
     except BoebotError as error:
         return Verdict(experiment.name, error=str(error))
     except Exception as error:  # a mistake in an experiment is not the end of the others
@@ -96,54 +109,3 @@ def _place(error: Exception) -> str:
     last = traceback.extract_tb(error.__traceback__)[-1]
     what = str(error).strip().partition("\n")[0]
     return f"{type(error).__name__}{what and f': {what}'} ({os.path.basename(last.filename)}, line {last.lineno})"  # noqa: PTH119
-
-
-def _in_processes(names: Sequence[str], seed: int, jobs: int, files: Files) -> Generator[Verdict, None, None]:
-    """The verdicts of those whose process lived."""
-    before = set(multiprocessing.active_children())
-    spawned = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(jobs, len(names)), spawned, _end_with_parent)
-    try:
-        # Processes start with the signals ignored that ask to end, and keep to it: it is this one that ends them.
-        with _ignored():
-            futures = {pool.submit(_run_there, name, seed, files): name for name in names}
-        for future in as_completed(futures):
-            try:
-                yield future.result()
-            except (BrokenProcessPool, CancelledError):
-                continue  # the caller sees that it is missing
-            except Exception as error:  # what came of it could not be handed over
-                yield Verdict(futures[future], error=_place(error))
-    finally:
-        with _ignored():
-            for child in set(multiprocessing.active_children()) - before:
-                child.kill()
-            pool.shutdown(cancel_futures=True)
-
-
-@contextlib.contextmanager
-def _ignored() -> Iterator[None]:
-    """Signals that ask to end do nothing in the block."""
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-
-def _end_with_parent() -> None:
-    """Once in each process: it ends with the one that started it, however that ended."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def follow() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
-
-
-def _run_there(name: str, seed: int, files: Files) -> Verdict:
-    """One experiment, by name, in one of the processes."""
-    return _run(all_experiments()[name], seed, files)
