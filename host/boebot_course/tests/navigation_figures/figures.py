@@ -19,25 +19,17 @@ from boebot_course.tests.navigation_figures import kidnapping, paths, tasks
 WHERE: dict[kidnapping.Outcome, str] = {"right": "in the right room", "wrong": "in the wrong one", "lost": "lost"}
 Thing = TypeVar("Thing")
 Result = TypeVar("Result")
-Progress = Callable[[float], None]
-"""Called now and then with the share that is done, 0 to 1."""
 
 
-def side_by_side(work: Callable[[Thing], Result], things: Sequence[Thing], progress: Progress) -> list[Result]:
+def side_by_side(work: Callable[[Thing], Result], things: Sequence[Thing]) -> list[Result]:
     """What comes of each thing, in their order."""
-    results = []
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        for number, result in enumerate(pool.map(work, things), 1):
-            results.append(result)
-            progress(number / len(things))
-    return results
+        return list(pool.map(work, things))
 
 
-def office_tasks(
-    robot: str, on: str | None, count: int, progress: Progress, *, least: int, mistaken: int
-) -> list[Measured]:
+def office_tasks(robot: str, on: str | None, count: int, least: int, mistaken: int) -> list[Measured]:
     """Arrived, and mistaken about it."""
-    ended = side_by_side(tasks.tried, tasks.tasks(robot, count, on), progress)
+    ended = side_by_side(tasks.tried, tasks.tasks(robot, count, on))
     arrived = sum(one.has_arrived for one in ended)
     low, high = (100 * share for share in interval(arrived, count))
     name = robot if on is None else f"{robot} on {on}"
@@ -50,7 +42,7 @@ def office_tasks(
     ]
 
 
-def kidnappings(progress: Progress) -> list[Measured]:
+def kidnappings() -> list[Measured]:
     """To other places of the office."""
     plan = LineMap.of(tasks.ARENA)
     found = kidnapping.pairs(plan)
@@ -60,7 +52,7 @@ def kidnappings(progress: Progress) -> list[Measured]:
     measured = [Measured(f"places that look alike, {of}", alike)]
     kinds = list(kidnapping.ESTIMATORS)
     work = partial(kidnapping.kidnapped, found=found)
-    for kind, outcomes in zip(kinds, side_by_side(work, kinds, progress), strict=True):
+    for kind, outcomes in zip(kinds, side_by_side(work, kinds), strict=True):
         measured += [
             Measured(f"{kind}: of {kidnapping.KIDNAPPINGS}, lost after two scans", outcomes["lost"], least=95),
             Measured(f"{kind}: found itself where it is", outcomes["right"]),
@@ -69,10 +61,10 @@ def kidnappings(progress: Progress) -> list[Measured]:
     return measured
 
 
-def twins(progress: Progress) -> list[Measured]:
+def twins() -> list[Measured]:
     """Into one of two rooms that look alike."""
     cases = [(kind, start) for start in kidnapping.FROM for kind in kidnapping.ESTIMATORS]
-    results = side_by_side(kidnapping.carried, cases, progress)
+    results = side_by_side(kidnapping.carried, cases)
     return [
         Measured(f"{kind}, from the {start}: of {kidnapping.KIDNAPPINGS}, {words}", outcomes[outcome])
         for (kind, start), outcomes in zip(cases, results, strict=True)
@@ -80,10 +72,10 @@ def twins(progress: Progress) -> list[Measured]:
     ]
 
 
-def lengths(progress: Progress) -> list[Measured]:
+def lengths() -> list[Measured]:
     """Of planned paths, against the shortest ones."""
     parts = [*range(paths.ARENAS), None]
-    found = side_by_side(paths.of, parts, progress)
+    found = side_by_side(paths.of, parts)
     office, others = np.array(found[-1]), np.array(found[:-1]).reshape(-1, 2)
     measured = []
     for name, ways in ((f"{paths.WAYS} ways in the office", office), (f"{paths.ARENAS} random arenas", others)):
@@ -94,14 +86,10 @@ def lengths(progress: Progress) -> list[Measured]:
     return measured
 
 
-FIGURES: dict[str, Callable[[Progress], list[Measured]]] = {
-    "Office tasks on roller": lambda progress: office_tasks("roller", None, 100, progress, least=97, mistaken=0),
-    "Office tasks on shieldbot-turret": lambda progress: office_tasks(
-        "shieldbot-turret", "native", 100, progress, least=80, mistaken=2
-    ),
-    "Office tasks on the AVR image": lambda progress: office_tasks(
-        "shieldbot-turret", "avr", 5, progress, least=4, mistaken=0
-    ),
+FIGURES: dict[str, Callable[[], list[Measured]]] = {
+    "Office tasks on roller": partial(office_tasks, "roller", None, 100, 97, 0),
+    "Office tasks on shieldbot-turret": partial(office_tasks, "shieldbot-turret", "native", 100, 80, 2),
+    "Office tasks on the AVR image": partial(office_tasks, "shieldbot-turret", "avr", 5, 4, 0),
     "Kidnapped": kidnappings,
     "Rooms that look alike": twins,
     "Lengths of paths": lengths,

@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 from boebot.navigation import LineMap
 from boebot.view import figure_file, style
 from boebot_course.tests.navigation_figures import kidnapping
-from boebot_course.tests.navigation_figures.figures import Progress, side_by_side
+from boebot_course.tests.navigation_figures.figures import side_by_side
 from boebot_timing.plots import PLOTS
 
 COURSES = {
@@ -35,15 +35,11 @@ def run(number: int, arena: str, is_carried: bool) -> dict[str, list[float]]:
     return kidnapping.errors(plan, number, is_carried=is_carried)
 
 
-def medians(progress: Progress) -> Curves:
+def medians() -> Curves:
     """Of each kind of course and each estimator, the error after each step (m)."""
     curves: Curves = {}
-    for number, (name, (arena, is_carried)) in enumerate(COURSES.items()):
-        runs = side_by_side(
-            partial(run, arena=arena, is_carried=is_carried),
-            range(kidnapping.RUNS),
-            lambda share, number=number: progress((number + share) / len(COURSES)),  # type: ignore[misc]
-        )
+    for name, (arena, is_carried) in COURSES.items():
+        runs = side_by_side(partial(run, arena=arena, is_carried=is_carried), range(kidnapping.RUNS))
         curves[name] = {kind: np.median([one[kind] for one in runs], axis=0).tolist() for kind in LOOKS}
     return curves
 
