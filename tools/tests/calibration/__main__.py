@@ -10,8 +10,6 @@ import argparse
 import sys
 from pathlib import Path
 
-from rich.console import Console
-
 from boebot.errors import BoebotError
 from tools.tests.calibration import board, emulator, table
 from tools.tests.printed import reprint
@@ -19,15 +17,12 @@ from tools.tests.printed import reprint
 
 def measured(port: str | None, flash: bool) -> table.Calibration:
     """All columns that can be had."""
-    with Console(stderr=True).status("assembling") as status:
-        real = None
-        if port is not None:
-            if flash:
-                status.update(f"flashing {port}")
-                board.flash(port)
-            real = board.listen(port, lambda awaited: status.update(f"{port}: {awaited}"))
-        status.update("emulator")
-        return table.Calibration(emulator.measure(), real)
+    real = None
+    if port is not None:
+        if flash:
+            board.flash(port)
+        real = board.listen(port)
+    return table.Calibration(emulator.measure(), real)
 
 
 def main(arguments: list[str]) -> int:
@@ -47,11 +42,7 @@ def main(arguments: list[str]) -> int:
         print(f"calibration: {error}", file=sys.stderr)
         return 2
     wrong = table.wrong_rows(result)
-    console = Console(width=None if sys.stdout.isatty() else 180)
-    console.print(table.table(result))
-    console.print(table.summary(result), highlight=False)
-    for line in wrong:
-        console.print(f"Not as expected: {line}", markup=False, highlight=False)
+    print(table.printed(result), *(f"Not as expected: {line}" for line in wrong), sep="\n")
     return int(bool(wrong))
 
 

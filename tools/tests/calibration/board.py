@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 from boebot.errors import BoardError
@@ -18,8 +17,6 @@ UPLOAD_TIMEOUT_S = 60.0  # a lost byte lets avrdude try for minutes
 ASK_AGAIN_S = 0.5  # while the bootloader waits, nobody hears
 GREETING_S = 20.0
 QUIET_S = 20.0  # no row takes as long
-
-Watch = Callable[[str], None]
 
 
 def flash(port: str) -> None:
@@ -50,8 +47,8 @@ def flash(port: str) -> None:
         raise BoardError(f"avrdude could not flash the board at {port}: {said.strip()}")
 
 
-def listen(port: str, watch: Watch = lambda awaited: None) -> list[int | None]:
-    """All rows, from a board that holds the program; `watch` is called with the name of what comes next.
+def listen(port: str) -> list[int | None]:
+    """All rows, from a board that holds the program.
 
     Raises:
         BoardError: no such port, another program, or it stopped talking.
@@ -72,7 +69,6 @@ def listen(port: str, watch: Watch = lambda awaited: None) -> list[int | None]:
                 heard_at = transport.now()
                 if answer := talk.hear(data):
                     transport.write(answer)
-                watch(talk.awaited)
         return talk.values()
     finally:
         transport.close()

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rich.table import Table
-
 from tools.tests.calibration.emulator import Measured
 from tools.tests.calibration.program import ROWS
 from tools.tests.calibration.rows import Row
 from tools.tests.printed import markdown
 
-COLUMNS = ("what", "unit", "data sheet", "where", "emulator", "board")
-NOT_CONNECTED, NOT_REACHED = "not connected", "–"
-PAGE_COLUMNS = ("what", "data sheet", "where", "emulator")
+COLUMNS = ("what", "data sheet", "where", "emulator")  # and "board" where there is one
+NOT_REACHED = "–"
+WRONG = (": wrong", ": differs")
 
 
 @dataclass(frozen=True)
@@ -75,8 +73,8 @@ def cells(result: Calibration, index: int) -> list[str]:
     row = ROWS[index]
     emulator = _both(row, result.emulator.by_program[index], result.emulator.by_pin[index])
     emulator += f"; known: {row.difference}" if row.difference else ""
-    board = NOT_CONNECTED if result.board is None else _of_board(row, result.board[index])
-    return [row.what, row.unit, row.expected_text, row.source, emulator, board]
+    board = [] if result.board is None else [_of_board(row, result.board[index])]
+    return [row.what, f"{row.expected_text} {row.unit}", row.source, emulator, *board]
 
 
 def summary(result: Calibration) -> str:
@@ -89,24 +87,9 @@ def summary(result: Calibration) -> str:
     return f"As the data sheet says, of {len(ROWS)} rows: {', '.join(parts)}."
 
 
-def table(result: Calibration) -> Table:
-    """For a terminal; group by group."""
-    shown = Table(*COLUMNS, title="Calibration of the emulated board")
-    group = ""
-    for index, row in enumerate(ROWS):
-        if row.group != group:
-            group = row.group
-            shown.add_section()
-            shown.add_row(f"[bold]{group}[/]")
-        shown.add_row(*cells(result, index))
-    return shown
-
-
 def printed(result: Calibration) -> str:
-    """What stands on the documentation's page: the emulator; of instructions only what is wrong somewhere."""
-    rows = []
-    for index, row in enumerate(ROWS):
-        what, unit, expected, where, measured = cells(result, index)[:-1]
-        if row.group != "Instructions" or measured.endswith(": wrong"):
-            rows.append([what, f"{expected} {unit}", where, measured])
-    return f"{summary(result)}\n\n{markdown(PAGE_COLUMNS, rows)}"
+    """The table; of instructions only what is wrong somewhere."""
+    shown = [(row.group, cells(result, index)) for index, row in enumerate(ROWS)]
+    rows = [text for group, text in shown if group != "Instructions" or any(cell.endswith(WRONG) for cell in text)]
+    head = COLUMNS if result.board is None else (*COLUMNS, "board")
+    return f"{summary(result)}\n\n{markdown(head, rows)}"
