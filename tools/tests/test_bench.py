@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console
 
 import copied_process
 from tools.tests.bench import report, scene
@@ -20,6 +19,7 @@ from tools.tests.bench.figures import Figure, Peer, figure
 from tools.tests.printed import MARK
 
 ROOT = Path(__file__).resolve().parents[2]
+RESULT = ROOT / "build" / "bench.json"
 
 
 def a_figure(better: str, target: float | None, *peers: Peer, measure: Any = lambda: 5.0, **more: Any) -> Figure:
@@ -88,15 +88,11 @@ def test_the_table_shows_value_spread_bound_and_peers() -> None:
         report.measure(a_figure("less", 4.0, Peer("somebody", lambda: 2.0), Peer("else", lambda: 10.0))),
         report.failed(a_figure("more", None), RuntimeError("no such thing")),
     ]
-    console = Console(width=140)
-    with console.capture() as shown:
-        console.print(report.table(rows))
-    lines = [text for text in shown.get().splitlines() if "speed of a thing" in text]
-    found = [[cell.strip() for cell in line.split("│")[1:-1]] for line in lines]
+    result = {"computer": report.computer() | {"load_before": 1, "load_after": 2}, "seconds": 90, "complete": True}
+    text = report.printed(result | {"figures": rows})
+    found = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| speed of a thing")]
     assert found[0] == ["speed of a thing", "5", "–", "m/s", "≤ 4", "somebody: 2 (× 2.5); else: 10 (× 0.5)"]
     assert found[1] == ["speed of a thing", "failed", "–", "m/s", "–", "–"]
-    result = {"computer": report.computer() | {"load_before": 1, "load_after": 2}, "seconds": 90, "complete": True}
-    text = report.summary(result | {"figures": rows})
     assert "Took 1.5 minutes." in text and "Missed: speed of a thing." in text
     assert "Failed: speed of a thing: RuntimeError: no such thing." in text
 
@@ -123,11 +119,12 @@ def test_a_pattern_without_a_figure_is_one_sentence() -> None:
 
 
 @pytest.mark.soak
-def test_json_page_and_progress(tmp_path: Path) -> None:
+def test_page_and_progress(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"By hand.\n{MARK}old")
-    done = run("--only", "encodes telemetry", "--json", "--page", str(page))
-    result = json.loads(done.stdout)
+    done = run("--only", "encodes telemetry", "--page", str(page))
+    result = json.loads(RESULT.read_text())
+    assert f"Took {result['seconds'] / 60:.1f} minutes; not all figures." in done.stdout
     assert [row["unit"] for row in result["figures"]] == ["frames/s"] * 2 and result["complete"] is False
     assert "[1/2] Python encodes" in done.stderr and "[2/2]" in done.stderr
     assert done.returncode == int(not all(row["met"] for row in result["figures"]))
@@ -146,7 +143,6 @@ def test_ctrl_c_shows_what_was_measured_so_far() -> None:
         "encodes telemetry",
         "--only",
         "10 simulated minutes",
-        "--json",
     ]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None and process.stdout is not None
@@ -156,7 +152,8 @@ def test_ctrl_c_shows_what_was_measured_so_far() -> None:
             assert got, text
             text += got
         process.send_signal(signal.SIGINT)
-        result = json.loads(process.stdout.read())
+        assert "; not all figures." in process.stdout.read()
+    result = json.loads(RESULT.read_text())
     assert process.returncode == 130
     assert len(result["figures"]) == 2 and result["complete"] is False
 

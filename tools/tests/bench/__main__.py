@@ -1,6 +1,6 @@
 """Measures every figure, prints one table and writes build/bench.json: `make bench`.
 
-    python -m tools.tests.bench [--only PATTERN ...] [--json] [--page FILE] [--list]
+    python -m tools.tests.bench [--only PATTERN ...] [--page FILE] [--list]
 
 Ctrl-C ends it with what was measured so far. The exit code is 1 when a target is missed or a measurement failed, 130
 after Ctrl-C.
@@ -16,8 +16,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-
-from rich.console import Console
 
 from tools.tests.bench import report
 from tools.tests.bench.figures import FIGURES, Figure
@@ -37,25 +35,24 @@ def figures(only: list[str]) -> list[Figure]:
     return [figure for figure in FIGURES if not only or any(part in figure.name for part in only)]
 
 
-def measured(wanted: list[Figure], console: Console) -> Iterator[dict[str, Any]]:
+def measured(wanted: list[Figure]) -> Iterator[dict[str, Any]]:
     """Rows, one after the other, with a line of progress for each. A measurement that fails is a row with its error."""
     for number, figure in enumerate(wanted, 1):
         started = time.monotonic()
-        console.print(f"[{number}/{len(wanted)}] {figure.name} ...", end="", markup=False, highlight=False)
+        print(f"[{number}/{len(wanted)}] {figure.name} ...", end="", file=sys.stderr, flush=True)
         try:
             row = report.measure(figure)
         except Exception as error:  # the others are measured all the same
             row = report.failed(figure, error)
         took = time.monotonic() - started
-        console.print(f" {report.shown(row)} ({took:.0f} s)", markup=False, highlight=False)
+        print(f" {report.shown(row)} ({took:.0f} s)", file=sys.stderr)
         yield row
 
 
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.tests.bench", description="Measures every figure.")
     parser.add_argument("--only", action="append", default=[], metavar="PATTERN", help="figures whose names contain it")
-    parser.add_argument("--json", action="store_true", help="print what build/bench.json holds instead of the table")
-    parser.add_argument("--page", type=Path, metavar="FILE", help="print the table onto this page of the documentation")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="also print it onto this page of the documentation")
     parser.add_argument("--list", action="store_true", help="measure nothing, print the names of the figures")
     chosen = parser.parse_args(arguments)
     wanted = figures(chosen.only)
@@ -70,7 +67,7 @@ def main(arguments: list[str]) -> int:
     rows: list[dict[str, Any]] = []
     stopped = False
     try:
-        for row in measured(wanted, Console(stderr=True, soft_wrap=True)):
+        for row in measured(wanted):
             rows.append(row)
     except KeyboardInterrupt:
         stopped = True
@@ -82,12 +79,7 @@ def main(arguments: list[str]) -> int:
     }
     RESULT.parent.mkdir(exist_ok=True)
     RESULT.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    if chosen.json:
-        print(json.dumps(result, indent=2))
-    else:
-        console = Console(width=None if sys.stdout.isatty() else 160)
-        console.print(report.table(rows))
-        console.print(report.summary(result), markup=False, highlight=False, soft_wrap=True)
+    print(report.printed(result))
     if chosen.page is not None:
         reprint(chosen.page, report.printed(result))
     return 130 if stopped else int(any(not row["met"] for row in rows))

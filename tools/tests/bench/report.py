@@ -1,4 +1,4 @@
-"""Rows of the bench: how one is measured, and how they are shown as a table, in a line, as a page."""
+"""Rows of the bench: how one is measured, and how they are shown in a line and as a table."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import statistics
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-from rich.table import Table
 
 from tools.tests.bench.figures import Figure
 from tools.tests.printed import markdown
@@ -98,15 +96,6 @@ def cells(row: dict[str, Any]) -> list[str]:
     return [row["name"], value, spread(row), row["unit"], target(row), "; ".join(peers) or "–"]
 
 
-def table(rows: list[dict[str, Any]]) -> Table:
-    """The rows as people read them; what misses its target is red."""
-    shown_table = Table(*COLUMNS, title="boebot bench")
-    for row in rows:
-        name, value, *others = cells(row)
-        shown_table.add_row(name, value if row["met"] else f"[bold red]{value}[/]", *others)
-    return shown_table
-
-
 def load() -> float | None:
     """How many programs wanted a processor in the last minute; None where the system does not say."""
     return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
@@ -128,7 +117,7 @@ def computer() -> dict[str, Any]:
 
 
 def summary(result: dict[str, Any]) -> str:
-    """What is to be said beside the table."""
+    """What is to be said above the table."""
     machine = result["computer"]
     lines = [
         f"{machine['processor']}, {machine['processors']} processors, {machine['system']}, Python {machine['python']}; "
@@ -145,6 +134,6 @@ def summary(result: dict[str, Any]) -> str:
 
 
 def printed(result: dict[str, Any]) -> str:
-    """What stands on the documentation's page."""
+    """All of it, in Markdown, as it stands on the documentation's page."""
     rows = [cells(row) for row in result["figures"]]
     return f"{summary(result).replace(chr(10), chr(10) * 2)}\n\n{markdown(COLUMNS, rows)}"
