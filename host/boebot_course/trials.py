@@ -117,6 +117,17 @@ class Log(CognitiveProcess):
         self.rows.append(self.read(self, robot))
 
 
+@dataclass(kw_only=True)
+class Steady(MotorBehavior):
+    """Drives with the same motor signals all the time."""
+
+    left: float
+    right: float
+
+    def step(self, robot: Robot) -> None:
+        robot.drive(self.left, self.right)
+
+
 class Alone:
     """A behavior that runs by itself, on a robot whose readings never change."""
 

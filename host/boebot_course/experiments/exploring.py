@@ -6,22 +6,22 @@ assume it. Rules R1 to R15 are those of docs/reference/navigation.md; nodes lie 
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from boebot.brain import Brain, CognitiveProcess
+from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.navigation import Explore, Lattice, LineMap, Placement
-from boebot.robot import Robot
 from boebot_course.coverage import Coverage
 from boebot_course.experiment import Floats, Measured, Outcome, exactly, experiment
 from boebot_course.paths import floor
-from boebot_course.trials import Trial, trial_seeds, try_once
+from boebot_course.trials import Log, Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, exact_roller, poses_on
 
 Pose = tuple[float, float, float]
@@ -37,23 +37,6 @@ STATUS_COLOURS = {"pending": "#999999", "completed": "#009e73", "unreachable": "
 def explorer(*, second_pass: bool = True) -> Explore:
     """D = 1 m, Δ = 0.3 m, d_min = 0.75 m, L = 3 m."""
     return Explore(speed=0.25, turn_speed=0.1, placement=Placement(), near=0.08, second_pass=second_pass)
-
-
-@dataclass(kw_only=True)
-class Watch(CognitiveProcess):
-    """Writes down how the nodes' states change."""
-
-    explore: Explore
-    changes: list[tuple[float, int, str]] = field(default_factory=list)
-    """time (s), number of the node, its status then"""
-
-    def step(self, robot: Robot) -> None:
-        if self.explore.graph is None:
-            return
-        for node in self.explore.graph.nodes:
-            before = [status for _, number, status in self.changes if number == node.number]
-            if not before or before[-1] != node.status:
-                self.changes.append((robot.time, node.number, node.status))
 
 
 @dataclass(frozen=True)
@@ -133,22 +116,28 @@ def low_obstacle(seed: int) -> Outcome:
     and no other node is nearer than d_min / 3 to it: one node is unreachable, all others are completed.
     """
     explore = explorer(second_pass=False)
-    watch = Watch(explore=explore)
+    log = Log(read=lambda _, robot: (robot.time, {} if explore.graph is None else _statuses(explore)))
     with arena_file("low", LOW) as arena:
-        brain = Brain([Odometry(), watch, explore])
+        brain = Brain([Odometry(), log, explore])
         trial = try_once(brain, exact_roller(), arena, 250.0, pose=LOW_START, seed=seed)
-    assert explore.graph is not None
-    nodes = explore.graph.nodes
-    unreachable = [node for node in nodes if node.status == "unreachable"]
-    wanted = [status for _, number, status in watch.changes if unreachable and number == unreachable[0].number]
+    changes = [after for before, after in itertools.pairwise([(0.0, {}), *log.rows]) if after[1] != before[1]]
+    statuses = _statuses(explore)
+    unreachable = [number for number, status in statuses.items() if status == "unreachable"]
+    was = [now[number] for number in unreachable[:1] for _, now in changes if number in now]
     measured = [
         exactly("unreachable nodes", len(unreachable), 1),
-        exactly("completed nodes among the others", sum(n.status == "completed" for n in nodes), len(nodes) - 1),
-        exactly("it was pending, then unreachable", wanted == ["pending", "unreachable"], 1),
+        exactly("completed nodes among the others", list(statuses.values()).count("completed"), len(statuses) - 1),
+        exactly(
+            "it was pending, then unreachable",
+            [key for key, _ in itertools.groupby(was)] == ["pending", "unreachable"],
+            1,
+        ),
         exactly("the exploration is complete", explore.complete, 1),
     ]
-    times = sorted({time for time, _, _ in watch.changes} | {float(trial.time[-1])})
-    counts = {status: [_status_at(watch, time, status) for time in times] for status in STATUS_COLOURS}
+    times = [*(time for time, _ in changes), float(trial.time[-1])]
+    counts = {
+        status: [list(now.values()).count(status) for _, now in [*changes, changes[-1]]] for status in STATUS_COLOURS
+    }
 
     def draw(figure: Figure) -> None:
         left, right = figure.subplots(1, 2, width_ratios=(1.4, 1))
@@ -161,9 +150,10 @@ def low_obstacle(seed: int) -> Outcome:
     return Outcome(measured, {"time_s": times, **counts}, draw)
 
 
-def _status_at(watch: Watch, time: float, status: str) -> int:
-    latest = {number: now for then, number, now in watch.changes if then <= time}
-    return sum(now == status for now in latest.values())
+def _statuses(explore: Explore) -> dict[int, str]:
+    """Of its nodes, by number."""
+    assert explore.graph is not None
+    return {node.number: node.status for node in explore.graph.nodes}
 
 
 # ---- E39, E40: coverage ----------------------------------------------------------------------------------------------

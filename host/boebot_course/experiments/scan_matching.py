@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -57,37 +59,31 @@ def away(pose: Pose, chance: np.random.Generator, offset: float = OFFSET) -> Pos
 # ---- E52: the error at the true pose ---------------------------------------------------------------------------------
 
 OWN = 5  # scans by the simulated robot
-
-
-def own_scan(pose: Pose, seed: int) -> Scan:
-    """By the laser of a simulated robot that stands there."""
-    taken: list[Scan] = []
-
-    def brain(robot: Robot) -> None:
-        sweep = laser_scan(robot)
-        if sweep is not None and not taken:
-            taken.append(sweep)
-
-    run(brain, robot="roller", arena=ARENA, pose=pose, seconds=0.3, seed=seed, record=False)
-    return taken[0]
-
-
 TURRET_ARENA, TURRET_POSES = "office", 8
 TURRET_MOST = 0.03
 
 
-def turret_scan(pose: Pose, seed: int) -> Scan:
-    """A sweep of the Shield-Bot's sonar, through the AVR image and the line."""
-    sweeps: list[Scan] = []
-    scan = TurretScan()
+def taken_at(pose: Pose, seed: int, look: Callable[[Robot], Scan | None], **terms: Any) -> Scan:
+    """The first scan of a simulated robot that stands there; `look` takes it, `terms` as of `boebot.run`."""
+    taken: list[Scan] = []
 
-    def step(robot: Robot) -> None:
+    def brain(robot: Robot) -> None:
         robot.stop()
-        if not sweeps and (sweep := scan(robot)) is not None:
-            sweeps.append(sweep)
+        if not taken and (scan := look(robot)) is not None:
+            taken.append(scan)
 
-    run(step, robot="shieldbot-turret", arena=TURRET_ARENA, on="avr", pose=pose, seed=seed, seconds=5.0, record=False)
-    return sweeps[0]
+    run(brain, pose=pose, seed=seed, record=False, **terms)
+    return taken[0]
+
+
+def own_scan(pose: Pose, seed: int) -> Scan:
+    """By the laser."""
+    return taken_at(pose, seed, laser_scan, robot="roller", arena=ARENA, seconds=0.3)
+
+
+def turret_scan(pose: Pose, seed: int) -> Scan:
+    """By the Shield-Bot's sonar, through the AVR image and the line."""
+    return taken_at(pose, seed, TurretScan(), robot="shieldbot-turret", arena=TURRET_ARENA, on="avr", seconds=5.0)
 
 
 @experiment(
@@ -129,16 +125,12 @@ def at_the_true_pose(has_turret: bool, seed: int) -> Outcome:
     ]
 
     def draw(figure: Figure) -> None:
-        figure.set_figheight(4.0)
-        left, right = figure.subplots(1, 2)
-        floor(left, floor_plan(load_arena(ARENA), 0.0, 0.0))
-        _draw_scan(left, scans[0], poses[0], "#0072b2")
-        _draw_pose(left, poses[0], "#0072b2")
+        left, right = _beside_its_scan(figure, ARENA, scans[0], poses[0])
         right.plot(range(1, POSES + 1), noisy, "o", ms=4, label="1 % noise")
         right.plot(range(1, OWN + 1), own, "s", mfc="none", ms=6, label="the robot's own laser")
         right.axhline(NOISE, color="0.5", lw=1.0, label="share of noise")
         left.legend(loc="lower left", fontsize=9)
-        right.set(xlabel="pose", ylabel="scan error ε", ylim=(0, 0.016))
+        right.set(ylim=(0, 0.016))
         right.legend(loc="lower right")
 
     x, y, heading = np.array(poses).T
@@ -163,19 +155,26 @@ def _by_turret(seed: int) -> Outcome:
     ]
 
     def draw(figure: Figure) -> None:
-        figure.set_figheight(4.0)
-        left, right = figure.subplots(1, 2)
-        floor(left, floor_plan(load_arena(TURRET_ARENA), 0.0, 0.0))
-        _draw_scan(left, scans[0], poses[0], "#0072b2")
-        _draw_pose(left, poses[0], "#0072b2")
+        left, right = _beside_its_scan(figure, TURRET_ARENA, scans[0], poses[0])
         numbers = range(1, TURRET_POSES + 1)
         left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), frameon=False, fontsize=9)
         right.plot(numbers, there, "o", ms=5, label="at the true pose")
         right.plot(numbers, beside, "s", mfc="none", ms=6, label="beside it")
-        right.set(xlabel="pose", ylabel="scan error ε", ylim=(0, None))
+        right.set(ylim=(0, None))
         right.legend(loc="best", frameon=False)
 
     return Outcome(measured, {"pose": range(1, TURRET_POSES + 1), "error": there, "error_beside": beside}, draw)
+
+
+def _beside_its_scan(figure: Figure, arena: str, scan: Scan, pose: Pose) -> tuple[Axes, Axes]:
+    """A scan in its arena, and axes for the errors at each pose."""
+    figure.set_figheight(4.0)
+    left, right = figure.subplots(1, 2)
+    floor(left, floor_plan(load_arena(arena), 0.0, 0.0))
+    _draw_scan(left, scan, pose, "#0072b2")
+    _draw_pose(left, pose, "#0072b2")
+    right.set(xlabel="pose", ylabel="scan error ε")
+    return left, right
 
 
 def _draw_scan(

@@ -17,15 +17,14 @@ from matplotlib.patches import Circle
 
 from boebot import rates
 from boebot.behaviors import Phototaxis
-from boebot.brain import Brain, MotorBehavior
+from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
 from boebot.devices.light import Phototransistor
-from boebot.robot import Robot
 from boebot.view import style
 from boebot.view.painter import draw_robot
 from boebot_course.experiment import Measured, Outcome, Variant, about, experiment
 from boebot_course.paths import floor
-from boebot_course.trials import Trial, trial_seeds, try_once
+from boebot_course.trials import Steady, Trial, trial_seeds, try_once
 from boebot_course.variants import SMALL_RADIUS, arena_file, at_angle, small_arsim, varied
 
 STARTS = 60
@@ -71,14 +70,6 @@ def seeker(setting: Setting, *, flee: bool = False) -> Brain:
     return Brain([Phototaxis(signal=SIGNAL, dark=setting.dark, flee=flee)])
 
 
-@dataclass(kw_only=True)
-class Straight(MotorBehavior):
-    """Straight ahead."""
-
-    def step(self, robot: Robot) -> None:
-        robot.drive(SIGNAL, SIGNAL)
-
-
 def time_to_lamp(trial: Trial) -> float:
     """When the robot's middle was first within 0.15 m of the lamp (s); infinite: never."""
     near = np.flatnonzero(np.hypot(*trial.path.T) < REACHED_M)
@@ -104,7 +95,9 @@ def straight_time(setting: Setting) -> float:
     robot = msgspec.structs.replace(setting.robot, unit=0) if setting.robot.has_board else setting.robot
     with arena_file("lamp", LAMP) as arena:
         pose = (-AWAY_M, 0.0, 0.0)
-        trial = try_once(Brain([Straight()]), robot, arena, setting.seconds, on=setting.on, pose=pose)
+        trial = try_once(
+            Brain([Steady(left=SIGNAL, right=SIGNAL)]), robot, arena, setting.seconds, on=setting.on, pose=pose
+        )
     return time_to_lamp(trial)
 
 

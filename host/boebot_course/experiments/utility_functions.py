@@ -8,18 +8,17 @@ All by the kit's own utilities, and E64 by a whole brain on a robot.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import boebot
-from boebot.brain import Brain, CognitiveProcess, MotorBehavior, StateVariable, Utility
+from boebot.brain import Brain, CognitiveProcess, StateVariable, Utility
 from boebot.brain.utility import Utilities
 from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
-from boebot_course.trials import Log, decisions
+from boebot_course.trials import Log, Steady, decisions
 
 
 def advanced(functions: list[Utility], variables: dict[str, Floats], step: float) -> Floats:
@@ -214,16 +213,6 @@ def gamma(seed: int) -> Outcome:
     return Outcome(measured, {"time_s": times, "gamma": gammas, "u": values}, draw)
 
 
-@dataclass(kw_only=True)
-class Hold(MotorBehavior):
-    """Drives with one signal."""
-
-    signal: float
-
-    def step(self, robot: Robot) -> None:
-        robot.drive(self.signal, -self.signal)
-
-
 RISE, FALL = 1.0, 4.0  # s
 
 
@@ -238,7 +227,10 @@ def activation(seed: int) -> Outcome:
 
     Expected: The best motor behavior drives, cognitive ones run while u > 0: by (8.4) 0.142 s and 0.292 s late.
     """
-    motor = [Hold(name=f"m{i}", signal=i / 10, utility=Utility(b=i / 10, w={"z": 0.3 - i / 5})) for i in range(3)]
+    motor = [
+        Steady(name=f"m{i}", left=i / 10, right=-i / 10, utility=Utility(b=i / 10, w={"z": 0.3 - i / 5}))
+        for i in range(3)
+    ]
 
     def when(_: CognitiveProcess, robot: Robot) -> float:
         return robot.time

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 
 import boebot
 from boebot.behaviors import Stop
-from boebot.brain import Brain, MotorBehavior, StateVariable, Utility
-from boebot.robot import Robot
+from boebot.brain import Brain, StateVariable, Utility
 from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
-from boebot_course.trials import decisions
+from boebot_course.trials import Steady, decisions
 
 TERMS = 100  # of the sum in (7.3): those beyond are below 1e-25
 
@@ -105,14 +103,6 @@ SAFER = 0.05  # by which p grows in a second
 STEEPNESS = 0.1  # c in tanh(c ...): the utilities to be compared are of the order of 10
 
 
-@dataclass(kw_only=True)
-class Cross(MotorBehavior):
-    """Straight across."""
-
-    def step(self, robot: Robot) -> None:
-        robot.drive(0.5, 0.5)
-
-
 def crosses_from(staying: float, seed: int) -> float:
     """The chance p of getting across from which on a robot crosses that loses `staying` by not crossing; p grows
     evenly. NaN: it never crosses.
@@ -120,7 +110,7 @@ def crosses_from(staying: float, seed: int) -> float:
     (7.5) is linear in p, so that it is a utility function of the kit with the state variable p.
     """
     worst, best = (expected_utility((p, 1 - p), (MEET, HIT)) for p in (0.0, 1.0))
-    cross = Cross(utility=Utility(b=worst, w={"p": best - worst}, c=STEEPNESS, tau=LAG))
+    cross = Steady(left=0.5, right=0.5, utility=Utility(b=worst, w={"p": best - worst}, c=STEEPNESS, tau=LAG))
     stay = Stop(utility=Utility(b=staying, c=STEEPNESS, tau=LAG))
     p = StateVariable("p", lambda robot: SAFER * robot.time)
     brain = Brain([stay, cross], [p], period=BRAIN_STEP)
