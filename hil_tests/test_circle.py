@@ -6,9 +6,33 @@ import numpy as np
 import pytest
 
 import boebot
-from hil_tests.paths import cells_visited, windows_moved
+from boebot.boards import Truth
+from boebot.navigation import Lattice, LineMap
+from boebot.navigation.lattice import cells_of
 
 pytestmark = pytest.mark.emulated
+
+CELL_M, WINDOW_S = 0.2, 5.0
+
+
+def cells_visited(truth: Truth) -> tuple[int, int]:
+    """How many of the room's free cells, those whose centre is free, the robot's middle visited, and how many there
+    are."""
+    plan = LineMap.of("room")
+    shape, centres = cells_of(plan, CELL_M)
+    lattice = Lattice(~plan.is_solid(centres).reshape(shape), CELL_M, *plan.bounds[0].tolist())
+    seen = {lattice.cell_at(x, y) for x, y in zip(truth.x.tolist(), truth.y.tolist(), strict=True)}
+    return sum(bool(lattice.free[cell]) for cell in seen), int(lattice.free.sum())
+
+
+def windows_moved(truth: Truth) -> np.ndarray:
+    """The greatest distance between two places of the robot in each window of that length."""
+    moved = []
+    for start in np.arange(truth.time[0], truth.time[-1] - WINDOW_S, 1.0):
+        inside = (truth.time >= start) & (truth.time <= start + WINDOW_S)
+        x, y = truth.x[inside], truth.y[inside]
+        moved.append(np.hypot(x - x[0], y - y[0]).max())
+    return np.array(moved)
 
 
 @pytest.mark.soak_on_avr

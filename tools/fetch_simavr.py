@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -22,7 +21,6 @@ from pathlib import Path
 CRATE = "simavr-ffi"
 VERSION = "1.2.7"
 SHA256 = "e0e32d831504846abb067b9606891830404a0f847a328086e4b81abbba442c09"
-OLDEST_CARGO = (1, 82)
 
 ROOT = Path(__file__).resolve().parent.parent
 DESTINATION = ROOT / "build" / "simavr"
@@ -47,21 +45,11 @@ def cached_crate() -> Path | None:
     return None
 
 
-def find_cargo() -> str:
-    """The cargo client, checked to be new enough."""
+def download() -> Path:
+    """Lets cargo download the crate into its cache."""
     cargo = shutil.which("cargo")
     if cargo is None:
         raise FetchError("cargo is not installed; simavr comes by it (Debian 12: apt install cargo-web).")
-    answer = subprocess.run([cargo, "--version"], capture_output=True, text=True, check=False).stdout
-    version = re.match(r"cargo (\d+)\.(\d+)", answer)
-    if version is None or (int(version[1]), int(version[2])) < OLDEST_CARGO:
-        raise FetchError(f"{cargo} is {answer.strip() or 'of unknown version'}; 1.82 or newer is needed.")
-    return cargo
-
-
-def download() -> Path:
-    """Lets cargo download the crate into its cache."""
-    cargo = find_cargo()
     # outside the repository, so that cargo looks for no workspace there
     command = [cargo, "info", f"{CRATE}@{VERSION}"]
     result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tempfile.gettempdir())
