@@ -130,30 +130,14 @@ class Receiver:
             self._board.drive(self._pin, Level.HIGH, self._until)
 
 
-class _Line:
-    """The serial line as a Rig reads and writes it."""
-
-    def __init__(self, bench: DeviceBench) -> None:
-        self._bench = bench
-
-    def now(self) -> float:
-        return self._bench.access.now / CYCLES_PER_S
-
-    def write(self, data: bytes) -> None:
-        self._bench.access.send(data)
-
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        del quiet_s
-        self._bench.run(wait_s)
-        return bytes(byte.byte for byte in self._bench.access.receive())
-
-
 class DeviceBench:
-    """A board session whose devices are ours."""
+    """A board session whose devices are ours, and its serial line as a Rig reads and writes it."""
 
     def __init__(self, access: BoardAccess) -> None:
         self.access = self.board = access
-        self.transport = _Line(self)
+        self.transport = self
+        self.now = lambda: access.now / CYCLES_PER_S
+        self.write = access.send
         self.devices: list[TwoWireDevice | Capacitor | Receiver] = []
 
     def run(self, seconds: float) -> None:
@@ -163,6 +147,12 @@ class DeviceBench:
             self.access.advance(min(self.access.now + SLICE, end) if self.devices else end)
             for device in self.devices:
                 device.step()
+
+    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
+        """What the board sends within that time."""
+        del quiet_s
+        self.run(wait_s)
+        return bytes(byte.byte for byte in self.access.receive())
 
     def close(self) -> None:
         """Lets go of the board."""

@@ -14,8 +14,8 @@ from boebot import run
 from boebot.behaviors import Kinesis
 from boebot.brain import Brain
 from boebot.devices.motor import RegulatedMotor
-from boebot.robot import Robot
 from boebot_course.experiment import Floats, Measured, Outcome, about, experiment
+from boebot_course.trials import Log
 from boebot_course.variants import varied
 
 FULL_SPEED = 2.0  # m/s at motor signal 1: half of it is left for turning
@@ -32,22 +32,6 @@ MOTOR = RegulatedMotor(gain_n_s=25.0, torque_maximum_n_m=1000.0)
 def humidity(x: Floats | float, y: Floats | float) -> Floats:
     """H at places (m): half of the floor is humid, in squares like those of a chessboard, without end and border."""
     return np.asarray((np.floor(x / FIELD) + np.floor(y / FIELD)) % 2)
-
-
-class Hygrometer:
-    """H where the robot is: it has no such sensor, but an exact odometer and a map.
-
-    Attributes:
-        places: where it was asked (m).
-    """
-
-    def __init__(self) -> None:
-        self.places: list[tuple[float, float]] = []
-
-    def __call__(self, robot: Robot) -> float:
-        x, y = robot.odometer.x, robot.odometer.y
-        self.places.append((x, y))
-        return float((math.floor(x / FIELD) + math.floor(y / FIELD)) % 2)
 
 
 def humid_share(x: Floats, y: Floats) -> float:
@@ -70,17 +54,22 @@ def wood_louse(seed: int) -> Outcome:
     robot = varied(
         "arsim", "wood louse", body={"wheel_speed_maximum_m_s": FULL_SPEED}, motor_left=MOTOR, motor_right=MOTOR
     )
-    hygrometer = Hygrometer()
-    louse = Kinesis(stimulus=hygrometer, fast=FAST / FULL_SPEED, slow=SLOW / FULL_SPEED)
+    # it has no sensor of humidity, but an exact odometer and a map
+    louse = Kinesis(
+        stimulus=lambda robot: float(humidity(robot.odometer.x, robot.odometer.y)),
+        fast=FAST / FULL_SPEED,
+        slow=SLOW / FULL_SPEED,
+    )
+    places = Log(read=lambda _, robot: (robot.odometer.x, robot.odometer.y))
     run(
-        Brain([louse], period=PERIOD),
+        Brain([louse, places], period=PERIOD),
         robot=robot,
         arena="empty",
         seconds=SECONDS,
         seed=seed,
         record=False,
     )
-    x, y = np.array(hygrometer.places).T
+    x, y = np.array(places.rows).T
     time: Floats = np.arange(len(x), dtype=np.float64) * PERIOD
     wet = humidity(x, y)
     parts = [part.mean() for part in np.array_split(wet, PARTS)]

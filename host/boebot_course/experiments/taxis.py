@@ -65,11 +65,6 @@ SHIELDBOT = Setting(
 )
 
 
-def seeker(setting: Setting, *, flee: bool = False) -> Brain:
-    """The brain of E27."""
-    return Brain([Phototaxis(signal=SIGNAL, dark=setting.dark, flee=flee)])
-
-
 def time_to_lamp(trial: Trial) -> float:
     """When the robot's middle was first within 0.15 m of the lamp (s); infinite: never."""
     near = np.flatnonzero(np.hypot(*trial.path.T) < REACHED_M)
@@ -84,7 +79,7 @@ def trials(setting: Setting, seed: int, *, flee: bool = False, starts: int = STA
         for trial_seed in trial_seeds(seed, starts):
             bearing, heading = (chance.uniform(-math.pi, math.pi) for _ in range(2))
             pose = (AWAY_M * math.cos(bearing), AWAY_M * math.sin(bearing), heading)
-            brain = seeker(setting, flee=flee)
+            brain = Brain([Phototaxis(signal=SIGNAL, dark=setting.dark, flee=flee)])
             terms = {"on": setting.on, "seed": trial_seed, "pose": pose}
             done.append(try_once(brain, setting.robot, arena, setting.seconds, **terms))
     return done
