@@ -18,12 +18,11 @@ import can
 
 from boebot.link import messages
 from boebot.link.frame import Decoder, encode
-from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot_can.frames import CanFrame, FrameMaker
 from boebot_can.load import DEFAULT_BITRATE, frame_bits
 from boebot_can.log import frames_of
-from tools.tests.bench.figures import Peer, figure
+from tools.tests.bench.figures import Peer, figure, ran
 
 SECONDS = 20.0
 PROBES = 1000
@@ -35,7 +34,7 @@ logging.getLogger("can").addHandler(logging.NullHandler())  # else its remarks g
 @cache
 def run_frames() -> list[tuple[float, CanFrame]]:
     """All frames of a run."""
-    result = execute(Request.single("wander", arena="room", on="native", seconds=SECONDS))
+    result = ran(Request.single("wander", arena="room", on="native", seconds=SECONDS))
     return [(sent.time_s, sent.frame) for sent in frames_of(result)]
 
 

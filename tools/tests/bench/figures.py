@@ -10,7 +10,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from boebot.result import RunResult
+from boebot.running.loop import execute
+from boebot.running.tasks import Request
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,14 @@ def figure(
         return measure
 
     return register
+
+
+def ran(request: Request, **terms: Any) -> RunResult:
+    """A run that came to its end; `terms` as of `execute`."""
+    result: RunResult = execute(request, **terms)
+    if result.error is not None:
+        raise result.error
+    return result
 
 
 def loop_s(turns: int) -> float:

@@ -14,9 +14,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from boebot.live.live_view import LiveView
-from boebot.running.loop import execute
 from boebot.running.tasks import Member, Request
-from tools.tests.bench.figures import Peer, figure, loop_s
+from tools.tests.bench.figures import Peer, figure, loop_s, ran
 
 SECONDS = 400.0
 SECONDS_IN_REAL_TIME = 10.0
@@ -77,16 +76,10 @@ def faster(watched: bool) -> float:
     """How many times as fast as real time a run is; `watched`: somebody reads its stream."""
     request = Request.single("wander", arena="room", on="native", seconds=SECONDS, period=0.01)
     if not watched:
-        result = execute(request)
-    else:
-        with contextlib.ExitStack() as stack:
-            view = LiveView(lambda url: None, speed=None)
-            stack.enter_context(looking(read, view.url))
-            stack.callback(view.close)
-            result = execute(request, onlooker=view)
-    if result.error is not None:
-        raise result.error
-    return result.real_time_factor or 0.0
+        return ran(request).real_time_factor or 0.0
+    view = LiveView(lambda url: None, speed=None)
+    with looking(read, view.url), contextlib.closing(view):
+        return ran(request, onlooker=view).real_time_factor or 0.0
 
 
 @figure("live view: unpaced native run with a client that reads, against one without", "×", at_least=0.8, rounds=9,
@@ -115,10 +108,6 @@ def redraws() -> float:
         ]
         request = Request(members=members, arena="room", seconds=SECONDS_IN_REAL_TIME)
         view = LiveView(lambda url: None)
-        with contextlib.ExitStack() as stack:
-            printed = stack.enter_context(looking(draw, view.url))
-            stack.callback(view.close)
-            result = execute(request, onlooker=view)
-    if result.error is not None:
-        raise result.error
+        with looking(draw, view.url) as printed, contextlib.closing(view):
+            ran(request, onlooker=view)
     return float(printed[0])

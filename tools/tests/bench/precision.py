@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from boebot.link import messages
-from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from hil_tests.rig import CYCLES_PER_US, Rig
-from tools.tests.bench.figures import figure
+from tools.tests.bench.figures import figure, ran
 
 SERVO_LEFT, SERVO_RIGHT = 13, 12
 
@@ -38,7 +37,5 @@ def servo_width() -> float:
 
 @figure("frames lost in 10 simulated minutes of wander on the AVR image", "frames", at_most=0)
 def lost_frames() -> float:
-    result = execute(Request.single("wander", arena="room", on="avr", seconds=600.0))
-    if result.error is not None:
-        raise result.error
+    result = ran(Request.single("wander", arena="room", on="avr", seconds=600.0))
     return float((result.lost_frames or 0) + (result.bad_frames or 0))

@@ -7,10 +7,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from tools.tests import resident
-from tools.tests.bench.figures import figure
+from tools.tests.bench.figures import figure, ran
 
 SECONDS = 300.0
 
@@ -18,10 +17,7 @@ SECONDS = 300.0
 def wall_s(record: bool) -> float:
     """Of a run with a brain at every tick."""
     request = Request.single("wander", arena="room", on="native", seconds=SECONDS, period=0.01, record=record)
-    result = execute(request)
-    if result.error is not None:
-        raise result.error
-    return result.wall_time or 0.0
+    return ran(request).wall_time or 0.0
 
 
 @figure(

@@ -6,20 +6,16 @@ import time
 
 from boebot.boards import BoardRequest, open_board
 from boebot.description.robots import load_robot
-from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from tools.tests.bench import peers
-from tools.tests.bench.figures import Peer, figure
+from tools.tests.bench.figures import Peer, figure, ran
 
 ARENA = "room"
 
 
 def times_real_time(on: str, seconds: float, period: float) -> float:
     """Speed of a whole run of the wander brain, as the command prints it."""
-    result = execute(Request.single("wander", arena=ARENA, on=on, seconds=seconds, period=period))
-    if result.error is not None:
-        raise result.error
-    return result.real_time_factor or 0.0
+    return ran(Request.single("wander", arena=ARENA, on=on, seconds=seconds, period=period)).real_time_factor or 0.0
 
 
 @figure(
@@ -72,7 +68,4 @@ def demonstration() -> float:
     request = Request.single(
         "demo", robot="shieldbot-charging", arena="station", on="native", seconds=600.0, period=0.05
     )
-    result = execute(request)
-    if result.error is not None:
-        raise result.error
-    return result.real_time_factor or 0.0
+    return ran(request).real_time_factor or 0.0
