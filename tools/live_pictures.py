@@ -8,7 +8,6 @@ and playwright (the extra `browser`).
 
 from __future__ import annotations
 
-import base64
 import contextlib
 import io
 import os
@@ -28,21 +27,20 @@ from PIL import Image
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-    Film = list[tuple[float, Image.Image]]
-
 PROJECT = Path(__file__).resolve().parents[1]
 IMAGES = PROJECT / "docs" / "images"
 FOLDER = PROJECT / "build" / "pictures"
 ROBOT, ARENA, SEED = "shieldbot-charging", "station", 1
 FILMED_S = 15.0  # length of the run that is filmed
 WIDTH, HEIGHT = 900, 800  # pixels
-EACH_S = 0.1  # from picture to picture
 BEGIN_S = 2.0  # of the film, by the run's time
 MOVE_S = 4.0  # when the pointer begins to move
-AFTER_S = 3.5  # for which the film goes on once the robot is elsewhere
+AFTER_S = 4.5  # for which the film goes on once the robot is elsewhere
 GOAL = (0.6, -0.1)  # m, where it puts it
 COLOURS = 256
+LAST_S = 0.5  # that the film's last picture stays
 LONGEST_S = 60.0  # of waiting
+Place = tuple[float, float]  # on the page (pixels)
 SEVERAL = re.compile(r"^```python\n(# two\.py:.*?)^```$", re.MULTILINE | re.DOTALL)
 """The README's brain of several behaviors."""
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")  # where no browser is to open by itself
@@ -103,74 +101,70 @@ def until(page: Page, expression: str) -> None:
         page.wait_for_timeout(20)
 
 
-def at_robot(page: Page) -> tuple[float, float]:
+def at_robot(page: Page) -> Place:
     """Where the robot is on the page (pixels)."""
     x, y = page.evaluate(_AT, page.evaluate("placeOf(run).slice(0, 2)"))
     return x, y
 
 
-def glide(page: Page, begin: tuple[float, float], end: Callable[[], tuple[float, float]], seconds: float) -> None:
-    """The pointer goes there as a hand would, slowly at first and at last."""
-    begun = time.monotonic()
-    while (part := min(1.0, (time.monotonic() - begun) / seconds)) < 1.0:
-        eased = part * part * (3 - 2 * part)
-        page.mouse.move(*(a + eased * (b - a) for a, b in zip(begin, end(), strict=True)))
-        page.wait_for_timeout(30)
-    page.mouse.move(*end())
+class Film:
+    """Pictures of a page, taken again and again while something goes on there."""
+
+    def __init__(self, page: Page) -> None:
+        self.page, self.pictures, self.times = page, list[Image.Image](), list[float]()
+
+    def take(self) -> None:
+        """One picture."""
+        self.times.append(time.monotonic())
+        self.pictures.append(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB"))
+
+    def until(self, seconds: float) -> None:
+        """Films until that time of the run."""
+        while self.page.evaluate("now") < seconds:
+            self.take()
+
+    def glide(self, begin: Place, end: Callable[[], Place], seconds: float) -> None:
+        """The pointer goes there as a hand would, slowly at first and at last."""
+        begun = time.monotonic()
+        while (part := min(1.0, (time.monotonic() - begun) / seconds)) < 1.0:
+            eased = part * part * (3 - 2 * part)
+            self.page.mouse.move(*(a + eased * (b - a) for a, b in zip(begin, end(), strict=True)))
+            self.take()
+        self.page.mouse.move(*end())
+
+    def write(self, path: Path) -> None:
+        """As an animated picture that begins anew at its end, with the most frequent colours of a few as they are: the
+        page has few, and edges of letters between them."""
+        counts: Counter[tuple[int, int, int]] = Counter()
+        for one in self.pictures[:: len(self.pictures) // 3]:
+            for count, colour in one.getcolors(WIDTH * HEIGHT) or []:
+                counts[colour] += count  # type: ignore[index]
+        palette = Image.new("P", (1, 1))
+        palette.putpalette([part for colour, _ in counts.most_common(COLOURS) for part in colour])
+        first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in self.pictures)
+        ends = [*self.times[1:], self.times[-1] + LAST_S]
+        lasting = [round(1000 * (end - begin)) for begin, end in zip(self.times, ends, strict=True)]
+        first.save(path, save_all=True, append_images=others, duration=lasting, loop=0, optimize=True)
 
 
 def film(page: Page) -> Film:
-    """A stretch of a run, in which the robot is dragged once: pictures with their times by the wall clock (s)."""
+    """A stretch of a run, in which the robot is dragged once."""
     page.evaluate(_POINTER)
     page.click("#shorter")
     begin = (0.72 * WIDTH, 0.38 * HEIGHT)  # where it is in the way of nothing
     page.mouse.move(*begin)
-    taken: list[tuple[float, str]] = []
-    camera = page.context.new_cdp_session(page)
-
-    def keep(frame: dict[str, Any]) -> None:
-        taken.append((frame["metadata"]["timestamp"], frame["data"]))
-        camera.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
-
-    camera.on("Page.screencastFrame", keep)
+    taken = Film(page)
     until(page, f"now >= {BEGIN_S}")
-    camera.send("Page.startScreencast", {"format": "png"})
-    until(page, f"now >= {MOVE_S}")
-    glide(page, begin, lambda: at_robot(page), 0.8)
+    taken.until(MOVE_S)
+    taken.glide(begin, lambda: at_robot(page), 0.8)
     page.mouse.down()
     goal = tuple(page.evaluate(_AT, GOAL))
-    glide(page, at_robot(page), lambda: goal, 1.2)
-    page.wait_for_timeout(150)
+    taken.glide(at_robot(page), lambda: goal, 1.2)
     page.mouse.up()
     end_s = page.evaluate("now") + AFTER_S
-    page.wait_for_timeout(500)
-    glide(page, goal, lambda: begin, 0.9)
-    until(page, f"now >= {end_s}")
-    camera.send("Page.stopScreencast")
-    return [(stamp, Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")) for stamp, data in taken]
-
-
-def write_film(taken: Film, path: Path) -> None:
-    """As an animated picture, at even intervals, that begins anew at its end."""
-    first, last = taken[0][0], taken[-1][0]
-    chosen = [
-        max((one for one in taken if one[0] <= first + number * EACH_S), key=lambda one: one[0])[1]
-        for number in range(int((last - first) / EACH_S) + 1)
-    ]
-    palette = palette_of([chosen[0], chosen[len(chosen) // 2], chosen[-1]])
-    frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in chosen]
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=int(1000 * EACH_S), loop=0, optimize=True)
-
-
-def palette_of(pictures: list[Image.Image]) -> Image.Image:
-    """The most frequent colours of all of them, as they are: the page has few, and edges of letters between them."""
-    counts: Counter[tuple[int, int, int]] = Counter()
-    for one in pictures:
-        for count, colour in one.getcolors(WIDTH * HEIGHT) or []:
-            counts[colour] += count  # type: ignore[index]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([part for colour, _ in counts.most_common(COLOURS) for part in colour])
-    return palette
+    taken.glide(goal, lambda: begin, 0.9)
+    taken.until(end_s)
+    return taken
 
 
 def stills(browser: Browser) -> None:
@@ -211,7 +205,7 @@ def main() -> None:
             taken = film(page)
             until(page, "ended !== null")
             page.close()
-        write_film(taken, IMAGES / "live.gif")
+        taken.write(IMAGES / "live.gif")
         stills(browser)
 
 
