@@ -1,6 +1,6 @@
 """Measures what the frame's protections let through and prints it as tables.
 
-    python -m tools.tests.error_rates [--receiver c|image|bits ...] [--page FILE]
+    python -m tools.tests.error_rates [--page FILE]
 
 Each receiver gets streams with each fault until enough of its frames were damaged to show the allowed rate at 95 %
 confidence. The image's rate is shown for all faults together, as it runs in the emulator. The random numbers are the
@@ -23,7 +23,6 @@ from tools.tests.error_rates.statistics import RATE_ALLOWED, trials_needed
 from tools.tests.error_rates.streams import FAULTS, Tally, pooled, through_c
 from tools.tests.printed import markdown, reprint
 
-RECEIVERS = ("bits", "c", "image")
 PART = 100_000  # rounds in one go; of the image IMAGE_PART
 IMAGE_PART = 20_000
 # Wrong frames to be expected by chance. Only the checksum refuses a frame with a long burst, and of ten million frames
@@ -55,19 +54,15 @@ def through_image(fault: int, damaged: int) -> Tally:
         return until_damaged(image.run, fault, damaged, IMAGE_PART)
 
 
-def jobs(receivers: list[str]) -> Iterator[Callable[[], Result]]:
+def jobs() -> Iterator[Callable[[], Result]]:
     """What has to be measured, the longest first."""
     faults = range(len(FAULTS))
-    if "image" in receivers:
-        yield from (partial(through_image, fault, -(-trials_needed() // len(FAULTS))) for fault in faults)
-    if "bits" in receivers:
-        for end in library.ENDS:
-            for size in reversed(wrong_bits.lengths(end)):
-                yield from (partial(wrong_bits.measure, end, size, bits) for bits in wrong_bits.BITS)
-    if "c" in receivers:
-        for end in library.ENDS:
-            run = partial(through_c, end)
-            yield from (partial(until_damaged, run, fault, damaged_needed(fault)) for fault in faults)
+    yield from (partial(through_image, fault, -(-trials_needed() // len(FAULTS))) for fault in faults)
+    for end in library.ENDS:
+        for size in reversed(wrong_bits.lengths(end)):
+            yield from (partial(wrong_bits.measure, end, size, bits) for bits in wrong_bits.BITS)
+    for end in library.ENDS:
+        yield from (partial(until_damaged, partial(through_c, end), fault, damaged_needed(fault)) for fault in faults)
 
 
 def by_receiver(tallies: list[Tally]) -> list[Tally]:
@@ -123,13 +118,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m tools.tests.error_rates", description=(__doc__ or "").splitlines()[0]
     )
-    parser.add_argument("--receiver", action="append", choices=RECEIVERS, help="only this; may be repeated")
     parser.add_argument("--page", type=Path, help="also print the tables onto this page")
     options = parser.parse_args()
     for end in library.ENDS:
         library.library(end)  # compiled before several processes want it
     with ProcessPoolExecutor(os.cpu_count()) as pool:
-        results = [done.result() for done in [pool.submit(job) for job in jobs(options.receiver or [*RECEIVERS])]]
+        results = [done.result() for done in [pool.submit(job) for job in jobs()]]
     bits = [result for result in results if isinstance(result, wrong_bits.BitTally)]
     streams = by_receiver([result for result in results if isinstance(result, Tally)])
     tables = "\n\n".join([markdown(BIT_HEAD, bit_rows(bits)), markdown(STREAM_HEAD, stream_rows(streams))])
