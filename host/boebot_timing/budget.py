@@ -199,11 +199,6 @@ class Report:
             )
         return found
 
-    @property
-    def is_met(self) -> bool:
-        """Nothing is broken."""
-        return not self.faults
-
     def as_dict(self) -> dict[str, Any]:
         """For programs; units in the keys."""
         found, measured, own, memory = self.responses, self.measured, self.own, self.memory
@@ -257,7 +252,6 @@ def prove(
     measured: Measurement | None = None,
     board: Mapping[str, int] | None = None,
     firmware: Firmware | None = None,
-    like: Report | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Report:
     """The report of an image.
@@ -267,8 +261,7 @@ def prove(
         asked: the load.
         measured: in the emulator, if at all.
         board: largest spans that a board has measured of itself, cycles by task, interrupts in between counted.
-        firmware: the image, if it has been read already.
-        like: its report under another load: what does not depend on that is taken from there.
+        firmware: the image, if it has been read already: what does not depend on the load is worked out once.
         progress: called with the share of its tasks and interrupts that are bounded, 0 to 1.
 
     Raises:
@@ -277,7 +270,7 @@ def prove(
     """
     firmware = firmware or load_firmware(path)
     check(firmware)
-    found = costs(firmware, asked, progress) if like is None else like.costs.under(firmware, asked)
+    found = costs(firmware, asked, progress)
     schedule, sources, busy = found.schedule(firmware), found.sources(firmware, asked), found.busy(firmware, asked)
     answers = responses(schedule, busy)
     gap, ring, taken = _of_link(firmware, found, schedule, (*busy, *found.between(firmware, asked)), asked)
@@ -315,14 +308,6 @@ def _memory(firmware: Firmware, found: Costs, measured: Measurement | None) -> M
     seen = None if measured is None or not measured.lowest_stack else RAM_END - 1 - measured.lowest_stack
     most = max(deepest, seen) if unknown and seen is not None else deepest
     return Memory(firmware.image.ram_bytes, most, seen, firmware.image.flash_bytes, tuple(unknown))
-
-
-def prove_all(path: Path, loads: Mapping[str, Load], measured: Measurement | None = None) -> dict[str, Report]:
-    """The reports of an image under several loads; see `prove`."""
-    firmware, found = load_firmware(path), dict[str, Report]()
-    for name, asked in loads.items():
-        found[name] = prove(path, asked, measured, firmware=firmware, like=next(iter(found.values()), None))
-    return found
 
 
 def _rows(

@@ -19,21 +19,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from avr_timing.bounds.loop_bounds import sleeps
 from avr_timing.bounds.wcet import WorstCase
 from avr_timing.flow.constants import Known
 from avr_timing.flow.loops import Loop, loops_of
 from avr_timing.flow.paths import Graph, Way, longest
-from avr_timing.interrupts.byte_reads import RECEIVE, ByteReads
-from avr_timing.interrupts.interrupts_off import ENTRY, InterruptsOff
-from avr_timing.interrupts.latency import Latencies
+from avr_timing.interrupts.byte_reads import RECEIVE
+from avr_timing.interrupts.interrupts_off import ENTRY
 from avr_timing.interrupts.response import Piece, Schedule, Source
 from avr_timing.program import Program
 from boebot.errors import AnalysisError, TimingError
 from boebot_timing.firmware import Firmware
-from boebot_timing.loads import APART, ENCODERS, NEVER_NEAR, SEND, SENT_WHILE_BUSY, Load
+from boebot_timing.loads import BYTE, ENCODERS, SEND, SENT_WHILE_BUSY, Load
 from boebot_timing.table import TaskRow
 
 SCHEDULER, LOOP = "schedule_poll", "firmware_poll"
@@ -60,13 +59,6 @@ class Costs:
     edges: int  # to look for pin changes
     change: int  # more, to work off one
     changes_due: int  # changes from which on the main loop works them off between slots; fewer wait
-    found_by: Latencies | None = field(default=None, compare=False, repr=False)
-
-    def under(self, firmware: Firmware, load: Load) -> Costs:
-        """The same under another load, on which only the latencies depend."""
-        blocked = InterruptsOff(firmware.program) if self.found_by is None else self.found_by.blocked
-        found = Latencies(blocked, _requests(firmware, load), apart=APART, never_near=NEVER_NEAR, like=self.found_by)
-        return replace(self, latencies=_latencies(firmware, load, found), found_by=found)
 
     def busy(self, firmware: Firmware, load: Load) -> list[Source]:
         """What comes while slots keep the main loop busy: of an overload no more bytes than the receive ring has room
@@ -121,8 +113,7 @@ class Costs:
 
     def of_frames(self, load: Load) -> Source:
         """Frames, the shortest. The link is looked at twice for each: at one of its two delimiters in vain."""
-        interval = load.byte_interval * load.frame_least
-        return Source("frames", 2 * (self.loop + self.frame), interval, bursts=load.frame_bursts)
+        return Source("frames", 2 * (self.loop + self.frame), BYTE * load.frame_least, bursts=load.frame_bursts)
 
     @property
     def idle(self) -> int:
@@ -163,8 +154,7 @@ def costs(firmware: Firmware, load: Load, progress: Callable[[float], None] = la
     Raises:
         TimingError: an interrupt, the scheduler or a poll of the main loop has no bound.
     """
-    program, table = firmware.program, firmware.table
-    worst = WorstCase(program)
+    table, worst = firmware.table, firmware.worst
     tasks, interrupts = {}, {}
     unbounded: dict[str, str] = {}
     rows = len(table.tasks) + len(table.interrupts)
@@ -182,8 +172,7 @@ def costs(firmware: Firmware, load: Load, progress: Callable[[float], None] = la
     for done, row in enumerate(table.interrupts, len(table.tasks) + 1):
         interrupts[row.name] = ENTRY + worst.bound(4 * row.vector).cycles
         progress(done / rows)
-    latencies = Latencies(InterruptsOff(program, worst), _requests(firmware, load), apart=APART, never_near=NEVER_NEAR)
-    charged, heeding = _charged(firmware, worst, interrupts)
+    charged, heeding = _charged(firmware, interrupts)
     edges, change = _edges(firmware)
     loop, scheduler = _rounds(firmware, edges)
     return Costs(
@@ -192,7 +181,7 @@ def costs(firmware: Firmware, load: Load, progress: Callable[[float], None] = la
         interrupts=interrupts,
         charged=charged,
         heeding=heeding,
-        latencies=_latencies(firmware, load, latencies),
+        latencies=_latencies(firmware, load),
         loop=loop,
         round=loop + scheduler,
         around=sum(worst.bound(entry).cycles for entry in firmware.entries_of(AROUND_TASK)),
@@ -200,27 +189,24 @@ def costs(firmware: Firmware, load: Load, progress: Callable[[float], None] = la
         edges=edges,
         change=change,
         changes_due=firmware.constants.changes_due,
-        found_by=latencies,
     )
 
 
-def _requests(firmware: Firmware, load: Load) -> dict[int, list[Source]]:
-    return {row.vector: load.requests(row, firmware.constants) for row in firmware.table.interrupts}
-
-
-def _latencies(firmware: Firmware, load: Load, found: Latencies) -> dict[str, int | None]:
+def _latencies(firmware: Firmware, load: Load) -> dict[str, int | None]:
     """Of a byte none, where bytes may be lost."""
     rows = firmware.table.interrupts
-    return {row.name: None if load.is_overload and row.vector == RECEIVE else found.of(row.vector) for row in rows}
+    requests = {row.vector: load.requests(row, firmware.constants) for row in rows}
+    return {
+        row.name: None if load.is_overload and row.vector == RECEIVE else firmware.latencies.of(row.vector, requests)
+        for row in rows
+    }
 
 
-def _charged(
-    firmware: Firmware, worst: WorstCase, interrupts: Mapping[str, int]
-) -> tuple[dict[str, int], frozenset[str]]:
+def _charged(firmware: Firmware, interrupts: Mapping[str, int]) -> tuple[dict[str, int], frozenset[str]]:
     """See `Costs.charged` and `Costs.heeding`."""
     rows = firmware.table.interrupts
     each = next((interrupts[row.name] for row in rows if row.vector == RECEIVE), 0)
-    found = {row.name: ByteReads(worst, 4 * row.vector) for row in rows if row.vector != RECEIVE}
+    found = {row.name: firmware.latencies.taken(row.vector) for row in rows if row.vector != RECEIVE}
     taking = {name: taken for name, taken in found.items() if taken.takes}
     charged = {name: taken.charged(each) for name, taken in taking.items()}
     return {**interrupts, **charged}, frozenset(name for name, taken in taking.items() if taken.heeds_switch)
@@ -238,7 +224,7 @@ def _edges(firmware: Firmware) -> tuple[int, int]:
     wheel = firmware.entries_of((WHEEL,))
     once = dict.fromkeys(wheel, 0)
     none, one, two = (WorstCase(_passed(program, entry, passes), once).bound(entry).cycles for passes in (0, 1, 2))
-    return none, max(one - none, two - one) + sum(WorstCase(program).bound(callee).cycles for callee in wheel)
+    return none, max(one - none, two - one) + sum(firmware.worst.bound(callee).cycles for callee in wheel)
 
 
 def _rounds(firmware: Firmware, edges: int) -> tuple[int, int]:

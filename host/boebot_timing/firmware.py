@@ -4,24 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from avr_timing.bounds.stack import VECTORS
+from avr_timing.bounds.wcet import WorstCase
 from avr_timing.flow.graph import program_of
+from avr_timing.interrupts.interrupts_off import InterruptsOff
+from avr_timing.interrupts.latency import Latencies
 from avr_timing.program import Program
 from boebot.errors import TimingError
 from boebot.image.elf import Image, read_image
-from boebot_timing.loads import SLOT, TICK
+from boebot_timing.loads import APART, NEVER_NEAR, SLOT, TICK
 from boebot_timing.table import Constants, Table, read_table
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Firmware:
     """An image with its program and its timing table."""
 
     image: Image
     program: Program
     table: Table
+
+    @cached_property
+    def worst(self) -> WorstCase:
+        """Of its functions."""
+        return WorstCase(self.program)
+
+    @cached_property
+    def latencies(self) -> Latencies:
+        """Of its interrupts, under whatever load."""
+        return Latencies(InterruptsOff(self.program, self.worst), apart=APART, never_near=NEVER_NEAR)
 
     @property
     def constants(self) -> Constants:

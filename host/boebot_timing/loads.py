@@ -71,7 +71,6 @@ class Load:
     frame_bursts: tuple[tuple[int, int], ...]
     frame_least: int
     off: frozenset[int] = field(default_factory=frozenset)
-    byte_interval: int = BYTE
     is_overload: bool = False
     may_be_late: frozenset[int] = field(default_factory=frozenset)
 

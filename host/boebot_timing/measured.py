@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -68,22 +68,10 @@ class Measurement:
     by_scenario: dict[str, Measurement] = field(default_factory=dict)  # where there were several
 
 
-def merged(measurements: Iterable[Measurement]) -> Measurement:
-    """Several runs as one: all their spans, the larger of their maxima, the mean of their loads by time; and each
-    scenario by itself, where there are several.
-
-    Raises:
-        ValueError: there is none.
-    """
-    runs = list(measurements)
-    if not runs:
-        raise ValueError("no measurement to merge; expected one at least")
-    if len(runs) == 1:
-        return runs[0]
+def merged(runs: Sequence[Measurement]) -> Measurement:
+    """Runs of several scenarios of one image, one of each, as one: all their spans, the larger of their maxima, the
+    mean of their loads by time; and each by itself."""
     seconds = sum(run.seconds for run in runs)
-    parts = [part for run in runs for part in (run.by_scenario.values() or [run])]
-    names = tuple(dict.fromkeys(name for part in parts for name in part.scenarios))
-    alone = {name: [part for part in parts if part.scenarios == (name,)] for name in names} if len(names) > 1 else {}
     return Measurement(
         tasks=_together([run.tasks for run in runs]),
         interrupts=_together([run.interrupts for run in runs]),
@@ -91,18 +79,17 @@ def merged(measurements: Iterable[Measurement]) -> Measurement:
         seconds=seconds,
         load=sum(run.load * run.seconds for run in runs) / seconds,
         worst_tick=max(run.worst_tick for run in runs),
-        scenarios=names,
+        scenarios=tuple(name for run in runs for name in run.scenarios),
         busiest_tick=max(run.busiest_tick for run in runs),
         between_polls=max(run.between_polls for run in runs),
         tick=next((run.tick for run in runs if run.tick), ()),
         losses={name: sum(run.losses.get(name, 0) for run in runs) for run in runs for name in run.losses},
-        by_scenario={name: merged(some) for name, some in alone.items() if some},
+        by_scenario={run.scenarios[0]: run for run in runs},
     )
 
 
 def _together(parts: list[dict[str, Spans]]) -> dict[str, Spans]:
-    names = dict.fromkeys(name for part in parts for name in part)
-    return {name: _one([part[name] for part in parts if name in part]) for name in names}
+    return {name: _one([part[name] for part in parts]) for name in parts[0]}
 
 
 def _one(spans: list[Spans]) -> Spans:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from avr_timing.bounds.wcet import WorstCase
 from avr_timing.bounds.worst_path import PathRow
 from avr_timing.bounds.worst_path import worst_path as path_of
 from avr_timing.interrupts.interrupts_off import ENTRY
@@ -59,7 +58,7 @@ def worst_path(firmware: Firmware, name: str) -> WorstPath:
         )
     is_interrupt = name in vectors
     entry = 4 * vectors[name] if is_interrupt else firmware.task_entry(name)
-    rows = path_of(WorstCase(firmware.program), entry)
+    rows = path_of(firmware.worst, entry)
     if is_interrupt:
         rows = (PathRow(ACCEPTANCE, None, ENTRY, 1, ()), *rows)
     return WorstPath(name, "interrupt" if is_interrupt else "task", sum(row.cycles for row in rows), rows)

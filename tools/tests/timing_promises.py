@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from boebot_timing.budget import Report, prove_all
+from boebot_timing.budget import Report, prove
 from boebot_timing.emulated.measure import measure_image
+from boebot_timing.firmware import load_firmware
 from boebot_timing.loads import LOADS
 from boebot_timing.measured import Measurement
 
@@ -17,7 +18,8 @@ TICK = 160_000  # cycles
 
 def reports(elf: Path) -> dict[str, Report]:
     """Of an image, measured as `boebot timing` does, under each load by its name."""
-    return prove_all(elf, LOADS, measure_image(elf, seconds=1.0, seed=1))
+    measured, firmware = measure_image(elf, seconds=1.0, seed=1), load_firmware(elf)
+    return {name: prove(elf, load, measured, firmware=firmware) for name, load in LOADS.items()}
 
 
 @dataclass(frozen=True, slots=True)

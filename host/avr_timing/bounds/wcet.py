@@ -16,7 +16,7 @@ from avr_timing.bounds.loop_bounds import check_sleep, marks_of
 from avr_timing.bounds.stack import Stack
 from avr_timing.flow.constants import Context, Known, known, root
 from avr_timing.flow.paths import Graph, Mark, Walk, Way, longest
-from avr_timing.program import Block, Function, Program
+from avr_timing.program import Block, Program
 from boebot.errors import AnalysisError
 
 # Library routines with a loop that runs by an argument, of 16 bits: its lower register (avr-gcc's calling convention).
@@ -48,8 +48,8 @@ class WorstCase:
         self.program = program
         self._given = given or {}
         self._bounds: dict[tuple[int, Context], Bound] = {}
-        self._inside: dict[int, Known] = {}
-        self._marks: dict[int, dict[int, list[Mark]]] = {}
+        self._inside: dict[tuple[int, Context], Known] = {}
+        self._marks: dict[tuple[int, Context], dict[int, list[Mark]]] = {}
         self._stack = Stack(program, self._given)
         self._under_way: list[int] = []
 
@@ -64,34 +64,37 @@ class WorstCase:
 
     def bound(self, entry: int, context: Context | None = None) -> Bound:
         """The same by entry; `context`: registers that hold constants there, else those of any call."""
-        function = self.program.functions[entry]
         if entry in self._given:
             return Bound(self._given[entry], ())
         if entry in self.program.unproven:
             raise AnalysisError(self.program.unproven[entry])
-        key = (entry, root(function) if context is None else context)
+        key = self._key(entry, context)
         if key not in self._bounds:
             with self.program.entered(entry, self._under_way):
-                self._bounds[key] = self._bound(function, key[1])
+                self._bounds[key] = self._bound(*key)
         return self._bounds[key]
 
-    def inside(self, entry: int) -> Known:
-        """A function as any call of it finds it: what is known in it, and the ways that this leaves."""
-        if entry not in self._inside:
-            function = self.program.functions[entry]
-            self._inside[entry] = known(function, root(function))
-        return self._inside[entry]
+    def _key(self, entry: int, context: Context | None) -> tuple[int, Context]:
+        return entry, root(self.program.functions[entry]) if context is None else context
 
-    def marks(self, entry: int) -> dict[int, list[Mark]]:
+    def inside(self, entry: int, context: Context | None = None) -> Known:
+        """A function as such a call finds it: what is known in it, and the ways that this leaves."""
+        key = self._key(entry, context)
+        if key not in self._inside:
+            self._inside[key] = known(self.program.functions[entry], key[1])
+        return self._inside[key]
+
+    def marks(self, entry: int, context: Context | None = None) -> dict[int, list[Mark]]:
         """What is known of the loops in it, at the blocks whose runs it counts."""
-        if entry not in self._marks:
-            self._marks[entry] = marks_of(self.program, self.program.functions[entry], self.inside(entry))
-        return self._marks[entry]
+        key = self._key(entry, context)
+        if key not in self._marks:
+            self._marks[key] = marks_of(self.program, self.program.functions[entry], self.inside(*key))
+        return self._marks[key]
 
-    def _bound(self, function: Function, context: Context) -> Bound:
-        inside = known(function, context)
+    def _bound(self, entry: int, context: Context) -> Bound:
+        function, inside = self.program.functions[entry], self.inside(entry, context)
         ways = {start: self.ways(block, inside) for start, block in inside.function.blocks.items()}
-        marks = marks_of(self.program, function, inside)
+        marks = self.marks(entry, context)
         check_sleep(self.program, inside.function, marks)
         graph = Graph(function.entry, ways, self.program.where, marks)
         walk = longest(graph)

@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
 
-from avr_timing.bounds.loop_bounds import marks_of
 from avr_timing.bounds.wcet import Visit, WorstCase
-from avr_timing.flow.constants import Context, known, root
+from avr_timing.flow.constants import Context, root
 from avr_timing.program import Block
 
 
@@ -74,8 +73,7 @@ class _Lines:
 
     def _worked_out(self, entry: int, context: Context) -> dict[_Place, _Share]:
         function = self.program.functions[entry]
-        inside = known(function, context)
-        marks = marks_of(self.program, function, inside)
+        inside, marks = self.worst.inside(entry, context), self.worst.marks(entry, context)
         found: dict[_Place, _Share] = {}
         for visit in self.worst.bound(entry, context).path:
             block = inside.function.blocks[visit.block]

@@ -4,28 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
     """One instruction: from both operands and C, the result, which may leave 0..255, and V."""
 
-    compute: Callable[[Any, Any, Any], Any]
+    compute: Callable[[int, int, int], int]
     overflow: Callable[[int, int, int], bool]  # from both operands and the byte of the result
     operands: int = 2  # that are registers
     constant: bool = False  # the second one is a number
     carries: bool = False  # C goes in
     chained: bool = False  # Z stays false where it was
     writes: bool = True
-    carry: Callable[[Any, Any], Any] | None = None  # C from the first operand and the whole result; None: it stays
+    carry: Callable[[int, int], bool] | None = None  # C from the first operand and the whole result; None: it stays
 
 
-def _outside(_first: Any, result: Any) -> Any:
-    return (result < 0) | (result > 255)
+def _outside(_first: int, result: int) -> bool:
+    return not 0 <= result <= 255
 
 
-def _lowest(first: Any, _result: Any) -> Any:
+def _lowest(first: int, _result: int) -> bool:
     return first & 1 == 1
 
 
@@ -45,11 +44,11 @@ def _shifted(a: int, _b: int, r: int) -> bool:
     return (r >> 7) != (a & 1)
 
 
-def _less(a: Any, b: Any, c: Any) -> Any:
+def _less(a: int, b: int, c: int) -> int:
     return a - b - c
 
 
-def _more(a: Any, b: Any, c: Any) -> Any:
+def _more(a: int, b: int, c: int) -> int:
     return a + b + c
 
 
@@ -68,7 +67,7 @@ BYTES = {
     "or": Kind(lambda a, b, c: a | b, _never),
     "ori": Kind(lambda a, b, c: a | b, _never, constant=True),
     "eor": Kind(lambda a, b, c: a ^ b, _never),
-    "com": Kind(lambda a, b, c: 255 - a, _never, operands=1, carry=lambda a, r: r >= 0),
+    "com": Kind(lambda a, b, c: 255 - a, _never, operands=1, carry=lambda a, r: True),
     "neg": Kind(lambda a, b, c: -a, lambda a, b, r: r == 0x80, operands=1, carry=_outside),
     "inc": Kind(lambda a, b, c: a + 1, lambda a, b, r: r == 0x80, operands=1),
     "dec": Kind(lambda a, b, c: a - 1, lambda a, b, r: r == 0x7F, operands=1),

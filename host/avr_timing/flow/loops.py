@@ -28,12 +28,7 @@ class Loop(Generic[N]):
 
 
 class IrreducibleError(AnalysisError):
-    """A cycle can be entered at two places; `at` is one of them."""
-
-    def __init__(self, at: object) -> None:
-        place = f"0x{at:04X}" if isinstance(at, int) else at
-        super().__init__(f"the loop at {place} can be entered at two places; expected loops with one entry")
-        self.at = at
+    """A cycle can be entered at two places."""
 
 
 def reverse_postorder(entry: N, successors: Callable[[N], Iterable[N]]) -> list[N]:
@@ -91,8 +86,8 @@ def dominators(order: list[N], before: Mapping[N, list[N]]) -> dict[N, N]:
     return above
 
 
-def natural_loops(order: list[N], successors: Callable[[N], Iterable[N]]) -> list[Loop[N]]:
-    """The outermost loops of a graph given in reverse postorder.
+def natural_loops(order: list[N], successors: Callable[[N], Iterable[N]], where: Callable[[N], str]) -> list[Loop[N]]:
+    """The outermost loops of a graph given in reverse postorder; `where`: what a node is called in messages.
 
     Raises:
         IrreducibleError: a cycle has two entries.
@@ -105,7 +100,10 @@ def natural_loops(order: list[N], successors: Callable[[N], Iterable[N]]) -> lis
         for following in dict.fromkeys(successors(node)):
             if number[following] <= number[node]:
                 if not _dominates(following, node, above):
-                    raise IrreducibleError(following)
+                    raise IrreducibleError(
+                        f"the loop at {where(following)} can be entered at two places; expected loops with one entry, "
+                        "as structured code has"
+                    )
                 latches.setdefault(following, []).append(node)
     loops = [Loop(header, _body(header, ends, before), tuple(ends)) for header, ends in latches.items()]
     return _nest(loops)
@@ -121,7 +119,7 @@ def loops_of(function: Function) -> list[Loop[int]]:
     def successors(start: int) -> list[int]:
         return [edge.to for edge in function.blocks[start].edges]
 
-    return natural_loops(reverse_postorder(function.entry, successors), successors)
+    return natural_loops(reverse_postorder(function.entry, successors), successors, "0x{:04X}".format)
 
 
 def with_parents(function: Function) -> list[tuple[Loop[int], Loop[int] | None]]:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Generic
 
-from avr_timing.flow.loops import IrreducibleError, Loop, N, natural_loops, reverse_postorder
+from avr_timing.flow.loops import Loop, N, natural_loops, reverse_postorder
 from boebot.errors import AnalysisError
 
 
@@ -99,13 +99,7 @@ def longest(graph: Graph[N]) -> Walk[N] | None:
         AnalysisError: a loop has no bound or one that does not hold all of its passes, or two entries.
     """
     order = reverse_postorder(graph.entry, graph.successors)
-    try:
-        loops = natural_loops(order, graph.successors)
-    except IrreducibleError as error:
-        raise AnalysisError(
-            f"the loop at {graph.where(error.at)} can be entered at two places; "  # type: ignore[arg-type]
-            "expected loops with one entry, as structured code has"
-        ) from None
+    loops = natural_loops(order, graph.successors, graph.where)
     ends = _Search(graph, order).region(graph.entry, order, loops, frozenset()).out
     return max((walk for walks in ends.values() for walk in walks if walk), key=lambda walk: walk.cycles, default=None)
 
@@ -233,7 +227,7 @@ def _out(region: _Region[N], mark: Mark, where: str, least: int) -> dict[Way[N],
         for way, pair in region.out.items():
             last = _max(*pair)
             if last is not None:
-                waiting: Walk[N] = _start()
+                waiting: Walk[N] = Walk()
                 waited = waiting.then(Way(way.node, way.node, mark.cycles, waits=True))
                 result[way] = (waited.repeat(once, 1) if once else waited).repeat(last, 1)
         return result
@@ -247,14 +241,10 @@ def _out(region: _Region[N], mark: Mark, where: str, least: int) -> dict[Way[N],
         ends = [(free, passes // least), (over, (passes - 1) // least)]
         for last, count in ends:
             if last is not None and count >= 0:
-                begin: Walk[N] = _start()
+                begin: Walk[N] = Walk()
                 walk = (begin.repeat(full, count) if full else begin).repeat(last, 1)
                 result[way] = _max(result.get(way), walk) or walk
     return result
-
-
-def _start() -> Walk[N]:
-    return Walk()
 
 
 def _max(one: Walk[N] | None, other: Walk[N] | None) -> Walk[N] | None:

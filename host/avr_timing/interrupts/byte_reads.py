@@ -196,7 +196,7 @@ class ByteReads:
             self._idle.append((to, LOAD))
             return [_Step(to, cycles, True)]
         before = sum(each.cycles for each in block.instructions[first:last])
-        kept, switched = while_one_waits(block), behind_test(block, SWITCH)
+        kept, switched = _behind_test(block, STATUS), _behind_test(block, SWITCH)  # of a look: where one waits
         found = []
         for to, cycles, edge in self._behind(place, block):
             waits = edge is None or kept is None or edge == kept
@@ -245,12 +245,7 @@ def _takes(instruction: Instruction) -> bool:
     return instruction.mnemonic == "lds" and instruction.operands[1] == DATA
 
 
-def while_one_waits(block: Block) -> int | None:
-    """The block behind a look, if a byte waits then; None: the block does not end with a look."""
-    return behind_test(block, STATUS)
-
-
-def behind_test(block: Block, address: int) -> int | None:
+def _behind_test(block: Block, address: int) -> int | None:
     """The block behind a test of bit 7 of a register of the UART, if that is set; None: the block ends with none.
 
     A test is a skip on the bit of a register that holds it, or a branch on its sign, which `tst` (`and` of a register

@@ -27,6 +27,7 @@ How often they come, the caller says (`Source`). That is not the rate in the lon
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
 
 from avr_timing.interrupts.byte_reads import RECEIVE, ByteReads
 from avr_timing.interrupts.byte_waits import Line, Other, longest_wait
@@ -38,95 +39,97 @@ from boebot.errors import AnalysisError
 HORIZON = 1 << 20  # cycles, 65 ms: who waits longer waits for ever
 
 
+Requests = Mapping[int, Sequence[Source]]  # by vector, what asks for the interrupt, at most
+
+
 class Latencies:
-    """Of the interrupts of an image, each worked out when it is asked for."""
+    """Of the interrupts of an image. What does not depend on their requests is worked out once."""
 
     def __init__(
         self,
         blocked: InterruptsOff,
-        requests: Mapping[int, Sequence[Source]],
         *,
         apart: Mapping[int, Collection[int]] | None = None,
         never_near: Sequence[int] = (),
-        like: Latencies | None = None,
     ) -> None:
         """
         Args:
             blocked: stretches of the image without interrupts.
-            requests: by vector, what asks for the interrupt, at most.
             apart: by vector, those that never come while this interrupt waits.
             never_near: of these, at most all but one come while a received byte waits.
-            like: those of the same image with other requests: what does not depend on requests is shared.
         """
         self.blocked = blocked
-        self.steps: Steps = Steps(blocked) if like is None else like.steps
-        self.taken: dict[int, ByteReads] = {} if like is None else like.taken
-        self.spans = {vector: blocked.interrupt(vector) for vector in blocked.vectors()}
-        self.requests = requests
-        self.apart: Mapping[int, Collection[int]] = apart or {}
-        self.never_near: Sequence[int | None] = never_near
+        self._taken: dict[int, ByteReads] = {}
+        self._apart: Mapping[int, Collection[int]] = apart or {}
+        self._never_near: Sequence[int | None] = never_near
 
-    def of(self, vector: int) -> int:
+    @cached_property
+    def _steps(self) -> Steps:
+        return Steps(self.blocked)
+
+    def taken(self, vector: int) -> ByteReads:
+        """The bytes that an interrupt takes."""
+        if vector not in self._taken:
+            self._taken[vector] = ByteReads(self.blocked.worst_case, 4 * vector)
+        return self._taken[vector]
+
+    def of(self, vector: int, requests: Requests) -> int:
         """Most cycles from the request of an interrupt to its acceptance. HORIZON: those of higher priority can take
         all the time.
 
         Raises:
             AnalysisError: one of higher priority is in use, and the image does not say how often it can come.
         """
-        others = [number for number in self.spans if number not in self.apart.get(vector, ())]
+        others = [number for number in self.blocked.vectors() if number not in self._apart.get(vector, ())]
         higher = [number for number in others if number < vector]
         for number in higher:
-            if number not in self.requests:
+            if number not in requests:
                 raise AnalysisError(
                     f"{self.blocked.program.path}: interrupt {number} goes before interrupt {vector}, and how often it "
                     "comes is not said; expected requests of it"
                 )
-        lower = max((self.spans[number][0] for number in others if number > vector), default=0)
-        if vector == RECEIVE and self.requests.get(vector):
-            return self._received(higher, lower)
-        wait, after_own = self._behind(lower, higher), self._behind(self.spans[vector][0], higher)
-        own = self.requests.get(vector)
+        lower = max((self.blocked.interrupt(number)[0] for number in others if number > vector), default=0)
+        if vector == RECEIVE and requests.get(vector):
+            return self._received(requests, higher, lower)
+        span = self.blocked.interrupt(vector)[0]
+        wait, after_own = self._behind(requests, lower, higher), self._behind(requests, span, higher)
+        own = requests.get(vector)
         again = own is None or sum(one.requests(wait + after_own + 1) for one in own) > 1
         return max(wait, after_own) if again else wait
 
-    def _received(self, higher: Sequence[int], lower: int) -> int:
+    def _received(self, requests: Requests, higher: Sequence[int], lower: int) -> int:
         """Of a byte, which the receiver keeps until somebody takes it."""
         others: dict[int, Other] = {}
         for number in higher:
-            if (latency := self.of(number)) >= HORIZON:
+            if (latency := self.of(number, requests)) >= HORIZON:
                 return HORIZON
-            others[number] = Other(self._taken(number), self.requests[number], latency, self.spans[number][0])
-        inner = any(self.spans[number][1] is not None for number in higher)
+            others[number] = Other(self.taken(number), requests[number], latency, self.blocked.interrupt(number)[0])
+        inner = any(self.blocked.interrupt(number)[1] is not None for number in higher)
 
         def steps(count: int) -> int:
-            return self.steps.most(count, count if inner else 0)
+            return self._steps.most(count, count if inner else 0)
 
-        own = self._taken(RECEIVE)
+        own = self.taken(RECEIVE)
 
         def wait(without: int | None) -> int:
             near = {number: other for number, other in others.items() if number != without}
-            return longest_wait(Line(own, self.requests[RECEIVE], near, lower, steps), HORIZON)
+            return longest_wait(Line(own, requests[RECEIVE], near, lower, steps), HORIZON)
 
-        return max(map(wait, self.never_near or (None,)))
+        return max(map(wait, self._never_near or (None,)))
 
-    def _taken(self, vector: int) -> ByteReads:
-        if vector not in self.taken:
-            self.taken[vector] = ByteReads(self.blocked.worst_case, 4 * vector)
-        return self.taken[vector]
-
-    def _behind(self, begun: int, higher: Sequence[int]) -> int:
+    def _behind(self, requests: Requests, begun: int, higher: Sequence[int]) -> int:
         """The wait where one that takes this long has just begun."""
         wait, longer = -1, begun
         while longer > wait:
             if longer >= HORIZON:
                 return HORIZON
-            wait, longer = longer, begun + self._meanwhile(higher, longer)
+            wait, longer = longer, begun + self._meanwhile(requests, higher, longer)
         return wait
 
-    def _meanwhile(self, higher: Sequence[int], wait: int) -> int:
+    def _meanwhile(self, requests: Requests, higher: Sequence[int], wait: int) -> int:
         """What those of higher priority and the main program run in that time."""
-        counts = {number: sum(one.requests(wait + 1) for one in self.requests[number]) for number in higher}
-        inner = sum(count for number, count in counts.items() if self.spans[number][1] is not None)
-        return self.steps.most(1 + sum(counts.values()), inner) + sum(
-            count * self.spans[number][0] for number, count in counts.items()
+        counts = {number: sum(one.requests(wait + 1) for one in requests[number]) for number in higher}
+        inner = sum(count for number, count in counts.items() if self.blocked.interrupt(number)[1] is not None)
+        return self._steps.most(1 + sum(counts.values()), inner) + sum(
+            count * self.blocked.interrupt(number)[0] for number, count in counts.items()
         )

@@ -29,9 +29,10 @@ ONCE = 1 << 20
 NOP = " nop\n"
 
 
-def latencies(program: Program, *intervals: int) -> Latencies:
-    """With requests of vectors 1, 2 and so on, so far apart."""
-    return Latencies(InterruptsOff(program), {n: [Source("i", 1, each)] for n, each in enumerate(intervals, 1)})
+def latency(program: Program, vector: int, *intervals: int) -> int:
+    """Of an interrupt; vectors 1, 2 and so on are asked for so far apart."""
+    requests = {n: [Source("i", 1, each)] for n, each in enumerate(intervals, 1)}
+    return Latencies(InterruptsOff(program)).of(vector, requests)
 
 
 # ---- by hand -------------------------------------------------------------------------------------------------------
@@ -44,12 +45,12 @@ def test_those_of_higher_priority_and_what_has_begun(tmp_path: Path) -> None:
     )
     main, rjmp = 1 + 1 + 1 + 1 + 1, 2
     first, second, third = RETI + 1, RETI + 2, RETI + 4
-    found = latencies(assembled(tmp_path, source), ONCE, ONCE, ONCE)
+    program = assembled(tmp_path, source)
     # The longest of lower priority has just begun and returns to `cli`; then those of higher, each with a step.
-    assert found.of(1) == third + main
-    assert found.of(2) == third + main + (first + rjmp)
+    assert latency(program, 1, ONCE, ONCE, ONCE) == third + main
+    assert latency(program, 2, ONCE, ONCE, ONCE) == third + main + (first + rjmp)
     # Nothing is lower: it waits for those of higher priority, and for the stretch that has just begun.
-    assert found.of(3) == main + (first + rjmp) + (second + rjmp)
+    assert latency(program, 3, ONCE, ONCE, ONCE) == main + (first + rjmp) + (second + rjmp)
 
 
 def test_each_return_may_reach_a_further_stretch(tmp_path: Path) -> None:
@@ -136,14 +137,14 @@ def test_stretch_that_ends_in_another_function_makes_every_step_the_longest(tmp_
 
 def test_those_of_higher_priority_may_take_all_the_time(tmp_path: Path) -> None:
     program = assembled(tmp_path, VECTORS + "main: nop\n nop\n rjmp main\n __vector_1: nop\n reti\n __vector_2: reti")
-    assert latencies(program, RETI, ONCE).of(2) == HORIZON
-    assert latencies(program, 2 * RETI + 8, ONCE).of(2) < HORIZON
+    assert latency(program, 2, RETI, ONCE) == HORIZON
+    assert latency(program, 2, 2 * RETI + 8, ONCE) < HORIZON
 
 
 def test_how_often_one_of_higher_priority_comes_must_be_said(tmp_path: Path) -> None:
     program = assembled(tmp_path, VECTORS + "main: rjmp main\n __vector_1: reti\n __vector_2: reti")
     with pytest.raises(AnalysisError, match="interrupt 1 goes before interrupt 2"):
-        Latencies(InterruptsOff(program), {2: [Source("i", 1, 100)]}).of(2)
+        Latencies(InterruptsOff(program)).of(2, {2: [Source("i", 1, 100)]})
 
 
 # ---- a machine -----------------------------------------------------------------------------------------------------
@@ -252,8 +253,8 @@ def test_no_machine_waits_longer(
     if handlers[-1][1]:
         intervals = [*intervals[:-1], 4_000]  # it does not ask again before its body has returned
     sources = {n: [Source("i", 1, each, late)] for n, each in enumerate(intervals, 1)}
-    found = Latencies(InterruptsOff(program), sources)
-    limits = {vector: found.of(vector) for vector in sources}
+    found = Latencies(InterruptsOff(program))
+    limits = {vector: found.of(vector, sources) for vector in sources}
     draw = Random(seed)
     for _ in range(12):
         requests = {}

@@ -45,7 +45,7 @@ def wait(program: Program, intervals: Sequence[int], byte: int = BYTE) -> int:
     """Of a byte; the interrupts 1, 2 ... come so far apart, 19 once."""
     requests = {n: [Source("i", 1, each)] for n, each in enumerate(intervals, 1)}
     requests |= {RECEIVE: [Source("bytes", 1, byte)], RECEIVE + 1: [Source("i", 1, ONCE)]}
-    return Latencies(InterruptsOff(program), requests).of(RECEIVE)
+    return Latencies(InterruptsOff(program)).of(RECEIVE, requests)
 
 
 # ---- in C --------------------------------------------------------------------------------------------------------
@@ -234,7 +234,7 @@ def test_no_byte_waits_longer(
     )
     vectors = (1, 2, RECEIVE + 1)
     requests = {n: [Source("i", 1, each)] for n, each in zip(vectors, intervals, strict=True)}
-    limit = Latencies(InterruptsOff(program), requests | {RECEIVE: [Source("bytes", 1, byte)]}).of(RECEIVE)
+    limit = Latencies(InterruptsOff(program)).of(RECEIVE, requests | {RECEIVE: [Source("bytes", 1, byte)]})
     draw = Random(seed)
     for _ in range(10):
         times = {

@@ -36,8 +36,6 @@ class Line:
         self.seed = 0
         self.free = 0
         """the cycle at which the last byte sent so far has arrived"""
-        self.sent = 0
-        """frames sent so far"""
         self.acknowledges = True
         """events are acknowledged when they come"""
         self._sequence = self._number = 0
@@ -51,7 +49,6 @@ class Line:
         """Sends a message, not before cycle `at`; returns the cycle at which its last byte has arrived."""
         wire = frame.encode(message.ID, self._sequence, message.pack(), self.seed or frame.SEED)
         self._sequence = (self._sequence + 1) & 0xFF
-        self.sent += 1
         begin = max(at, self.free, self.bench.now)
         self.bench.access.send(wire, at=begin)
         self.free = begin + len(wire) * BYTE_CYCLES

@@ -6,7 +6,6 @@ phases are swept. Bytes are in line.py.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,9 +18,7 @@ from sim_bridge.boards import avr
 from sim_bridge.boards.board import LEVELS, BoardAccess, Edge, Level
 
 CYCLES_PER_US = 16
-SLOT_CYCLES = 40_000  # 2.5 ms (tasks.def)
 TICK_CYCLES = 160_000
-SERVO_FRAME_CYCLES = 320_000
 SLICE_CYCLES = 8_000  # 0.5 ms: shorter than the time from a Ping's trigger to its echo
 AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
 ECHO_DELAY_CYCLES = 750 * CYCLES_PER_US  # from the trigger's end to the echo (Parallax #28015, hold-off)
@@ -119,25 +116,20 @@ class Bench:
 
 
 class PulseTrain:
-    """A pin, high until then, that changes its level every `period` cycles from `first` on, up to `last`."""
+    """A pin, high until then, that changes its level every `period` cycles from `first` on."""
 
-    def __init__(self, pin: int, period: int, first: int, last: int | None = None) -> None:
-        self.pin, self.period, self.first, self.last = pin, period, first, last
+    def __init__(self, pin: int, period: int, first: int) -> None:
+        self.pin, self.period, self.first = pin, period, first
         self.edges = range(first, first, period)
         """cycles at which it changed, queued ones included"""
 
     def queue(self, bench: Bench, until: int) -> None:
         """See Source."""
-        end = until if self.last is None else min(until, self.last + 1)
-        due = range(self.edges.stop, end, self.period)
+        due = range(self.edges.stop, until, self.period)
         if due:
             level = Level.HIGH if len(self.edges) % 2 else Level.LOW
             bench.access.wave(self.pin, self.period, due.start, len(due), level)
             self.edges = range(self.first, due[-1] + self.period, self.period)
-
-    def count(self, cycle: int) -> int:
-        """Edges up to that cycle."""
-        return bisect_right(self.edges, cycle)
 
 
 def coprime_periods(edges_per_s: int, count: int) -> list[int]:

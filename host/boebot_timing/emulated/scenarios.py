@@ -279,6 +279,6 @@ def load(
         ]
         bench.sources.append(Deaf(line, first))
         return turning
-    signals = [(numbers.signal - 10_000, 10_000 - numbers.signal // 2)]
-    bench.sources.append((FullLine if scenario == "overload" else EachTick)(line, first, signals, probes=False))
+    signals = (numbers.signal - 10_000, 10_000 - numbers.signal // 2)
+    bench.sources.append((FullLine if scenario == "overload" else EachTick)(line, first, signals))
     return turning

@@ -1,13 +1,12 @@
 """What is watched of an image in the emulator, by the names in its ELF file, and what the records of a run amount to:
 spans of its tasks and interrupts, its load, its worst tick, its lowest stack.
 
-A task is a function NAME_task, an interrupt whatever stands behind a vector that the program uses. Names are those of
-the image's timing table; an interrupt without a row there is called by its vector (data sheet, table 12-6).
+Tasks and interrupts are those of the image's timing table: a task is a function NAME_task. (An image that uses others
+is refused: firmware.py.)
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,6 @@ from sim_bridge.boards.avr import FUNCTION_IDS, Watch
 SLOT_VECTOR = 12  # TIMER1_COMPB: begins each slot (hal_avr.h)
 SLOTS_PER_TICK = 4
 PATIENCE = 50 * TICK_CYCLES  # without sleep: the program hangs; longer than its start takes
-TASK = re.compile(r"(\w+)_task\Z")
 POLL = "link_poll"
 
 
@@ -51,19 +49,9 @@ def watched(path: Path) -> Watched:
     """What there is to watch in an image."""
     image, table = read_image(path), read_table(path)
     functions = {s.name: s.address for s in image.symbols if s.kind in ("STT_FUNC", "STT_NOTYPE")}
-    tasks = {row.name: f"{row.name}_task" for row in table.tasks} or {
-        match[1]: match[0] for name in functions if (match := TASK.match(name))
-    }
-    found = {name: functions[symbol] for name, symbol in tasks.items() if symbol in functions}
-    if POLL in functions:
-        found[POLL] = functions[POLL]
-    rows = {row.vector: row.name for row in table.interrupts}
-    default = functions.get("__bad_interrupt")
-    vectors = {
-        vector: rows.get(vector, f"vector_{vector}")
-        for vector in range(1, 26)
-        if vector in rows or functions.get(f"__vector_{vector}", default) != default
-    }
+    symbols = {row.name: f"{row.name}_task" for row in table.tasks} | {POLL: POLL}
+    found = {name: functions[symbol] for name, symbol in symbols.items() if symbol in functions}
+    vectors = {row.vector: row.name for row in sorted(table.interrupts, key=lambda row: row.vector)}
     return Watched(tuple(found.values()), tuple(found), vectors)
 
 

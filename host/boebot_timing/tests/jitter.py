@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from boebot.link import messages
 from boebot_timing.emulated.line import Heard
-from boebot_timing.emulated.loads import SERVO_FRAME_CYCLES
 from boebot_timing.emulated.losses import Losses, losses
 from boebot_timing.tests import latency_limits as limits
 from boebot_timing.tests.jitter_run import CENTRE, GAIN, MIRROR, Run
-from boebot_timing.tests.latency_limits import Limits
+from boebot_timing.tests.latency_limits import SERVO_FRAME_CYCLES, Limits
 
 CYCLES_PER_US = 16
 SAME_WIDTH = 16  # cycles by which a pulse may differ from the set-point's
@@ -61,7 +60,7 @@ def _of(quantity: str, values: Iterable[int], may: Limits) -> Distribution:
 
 
 def width_of(side: str, signals: tuple[int, int]) -> int:
-    """Cycles of the pulse that a set-point asks for: centre + gain x signal (motion.c), exact for `traffic.SIGNALS`."""
+    """Cycles of the pulse that a set-point asks for: centre + gain x signal (motion.c), exact for `SIGNALS`."""
     signal = signals[0] if side == "left" else signals[1]
     return CENTRE + MIRROR[side] * GAIN * signal // 10_000
 

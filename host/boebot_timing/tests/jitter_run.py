@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import pin_number
@@ -15,7 +16,7 @@ from boebot.link import messages
 from boebot_timing.emulated.line import Line
 from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Contact, Ping, PulseTrain, wheels, with_noise
 from boebot_timing.emulated.scenarios import EDGES_PER_S
-from boebot_timing.emulated.traffic import EachTick, FullLine
+from boebot_timing.emulated.traffic import SETPOINT_PERIOD, EachTick, FullLine
 from sim_bridge.boards.board import Level
 
 Progress = Callable[[float], None]
@@ -27,6 +28,62 @@ DRAIN_TICKS = 20  # after a run, for what is under way
 # cycles, from one closing to the next: what remains of whole ticks, and of whole sweeps, sweeps both evenly
 CONTACT_PERIODS = {"whisker left": 2_178_887, "whisker right": 2_338_897}
 CONTACT_CLOSED = 1_120_000  # cycles
+PROBE_PERIOD = 311_009  # cycles; shares no factor with the tick
+HOLD = 1_113_007  # cycles from one change of the motor signals to the next: three servo frames at least
+SIGNALS = ((3000, -3000), (-1500, 4500))  # in 1/10000; the widths of all of them are whole cycles
+
+
+class Change(NamedTuple):
+    """A set-point that asks for other pulses than the one before: the cycle at which its last byte had come."""
+
+    arrived: int
+    signals: tuple[int, int]
+
+
+class Probe(NamedTuple):
+    """A question for the board's time: the cycle at which its last byte had come."""
+
+    arrived: int
+    token: int
+
+
+class Asking(EachTick):
+    """Other set-points now and then, and with them probes of the board's clock; what was asked is kept."""
+
+    PROBED_AFTER = SETPOINT_PERIOD // 3  # cycles from a set-point to a probe
+
+    def __init__(self, line: Line, first: int) -> None:
+        super().__init__(line, first, SIGNALS[0])
+        self.changes: list[Change] = []
+        self.probes: list[Probe] = []
+        self.newest = self._change_at = self._probe_at = first
+        """`newest`: the cycle at which the last byte of the last set-point has arrived"""
+        self.muted = False
+        """no set-point more"""
+
+    def setpoint(self, at: int) -> int:
+        """See EachTick."""
+        if self.muted:
+            return at
+        changed = at >= self._change_at
+        if changed:
+            self._change_at += HOLD
+            self.signals = SIGNALS[(len(self.changes) + 1) % len(SIGNALS)]
+        self.newest = super().setpoint(at)
+        if changed:
+            self.changes.append(Change(self.newest, self.signals))
+        if at >= self._probe_at:
+            self._probe_at += PROBE_PERIOD
+            token = len(self.probes) & 0xFFFF
+            arrived = self.line.send(messages.ClockProbe(token), at + self.PROBED_AFTER)
+            self.probes.append(Probe(arrived, token))
+        return self.newest
+
+
+class AskingWithoutAGap(Asking, FullLine):
+    """The same on a full line."""
+
+    PROBED_AFTER = 0
 
 
 @dataclass
@@ -42,7 +99,7 @@ class Run:
     pins: dict[str, int]
     begun: int
     ended: int
-    traffic: EachTick | FullLine
+    traffic: Asking
     encoders: list[list[PulseTrain]]  # lines by wheel; none of a wheel that has a noisy one
     contacts: dict[str, Contact]
     ping: Ping
@@ -59,7 +116,7 @@ def drive(bench: Bench, load: str, seconds: float, seed: int, share: Progress, e
     prepare(line)
     first = bench.now + TICK_CYCLES + seed * PHASE_STEP % TICK_CYCLES
     lines = [tuple(pin for name, pin in pins.items() if name.startswith(f"encoder {side}")) for side in MIRROR]
-    traffic: EachTick | FullLine = FullLine(line, first) if load == "overload" else EachTick(line, first)
+    traffic = AskingWithoutAGap(line, first) if load == "overload" else Asking(line, first)
     turning = wheels([one for one in lines if one], edges_per_s, first)
     noisy = load == "overload" and bool(turning)
     run = Run(

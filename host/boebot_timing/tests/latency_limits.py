@@ -12,7 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from boebot_timing.emulated.line import BYTE_CYCLES
-from boebot_timing.emulated.loads import SERVO_FRAME_CYCLES, SLOT_CYCLES, TICK_CYCLES
+from boebot_timing.emulated.loads import TICK_CYCLES
+
+SLOT_CYCLES, SERVO_FRAME_CYCLES = TICK_CYCLES // 4, 2 * TICK_CYCLES  # tasks.def
 
 
 class Limits(NamedTuple):
