@@ -8,7 +8,7 @@ count are bounded by the language: a count of at least the width of the operand 
 
 from __future__ import annotations
 
-from avr_timing.flow.constants import KEEPS, Known, State, once_round
+from avr_timing.flow.constants import Known, State, keeps_flags, once_round
 from avr_timing.flow.loops import Loop
 from avr_timing.flow.registers import is_call, written
 from avr_timing.program import Block, Function, Instruction, Program
@@ -85,6 +85,8 @@ def _counted(block: Block, loop: Loop[int], known: Known, entering: list[State],
     if counting is None:
         return None
     registers, step, instructions = counting
+    if branch.mnemonic in ("brcc", "brcs") and instructions[-1].mnemonic == "dec":  # which keeps C
+        return None
     for start in loop.nodes:
         for instruction in known.function.blocks[start].instructions:
             if instruction in instructions:
@@ -112,7 +114,7 @@ def _counting(
     """The counter whose flags the branch behind these instructions reads: its registers, the lowest first, which need
     not stand together; its step; its instructions."""
     rest = list(instructions)
-    while rest and rest[-1].mnemonic in KEEPS:
+    while rest and keeps_flags(rest[-1]):
         rest.pop()
     if not rest:
         return None

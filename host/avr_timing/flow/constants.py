@@ -16,13 +16,12 @@ from typing import NamedTuple
 
 from avr_timing.flow.arithmetic import BYTES
 from avr_timing.flow.instructions import BRANCHES, SKIPS
-from avr_timing.flow.registers import ZERO, is_call, pushes_only, written
+from avr_timing.flow.registers import SREG, ZERO, is_call, pushes_only, written
 from avr_timing.program import Block, Edge, Function, Instruction
 
 ARGUMENTS = range(8, 26)  # registers in which values are handed to a callee
-SREG_IO, SREG_DATA = 0x3F, 0x5F
 VECTORS_END = 4 * 26  # addresses below are interrupt vectors: there r1 may hold anything
-# What changes neither C, Z, N nor V.
+# What changes neither C, Z, N nor V; `out` where it does not write SREG (keeps_flags).
 KEEPS = BRANCHES | SKIPS
 KEEPS |= frozenset(("ldi", "mov", "movw", "ld", "ldd", "lds", "lpm", "pop", "in", "bld", "swap"))
 KEEPS |= frozenset(("st", "std", "sts", "out", "push", "sbi", "cbi", "nop", "wdr", "sleep", "sei", "cli", "bst"))
@@ -51,12 +50,12 @@ class Part(NamedTuple):
 class State:
     """What is known at a place: registers by number, flags by letter (of these C, Z, N, V and T are followed), and
     registers that are parts of unknown words. None of these may be changed. `carried`: C is what the low byte of that
-    word carried when so much was added."""
+    word carried when so much was added, or, where that was subtracted (True), what it borrowed."""
 
     registers: dict[int, int] = field(default_factory=dict)
     flags: dict[str, bool] = field(default_factory=dict)
     parts: dict[int, Part] = field(default_factory=dict)
-    carried: tuple[Part, int] | None = None
+    carried: tuple[Part, int, bool] | None = None
 
     def merge(self, other: State) -> State:
         """What holds on both ways."""
@@ -221,8 +220,7 @@ def step(instruction: Instruction, state: State) -> State:
         kept = {r: part for r, part in state.parts.items() if r not in changed}
         return State(_without(state.registers, changed) | {ZERO: 0}, {}, kept)
     registers = _without(state.registers, written(instruction))
-    writes_flags = (name == "out" and operands[0] == SREG_IO) or (name == "sts" and operands[0] == SREG_DATA)
-    flags = {} if writes_flags or (name not in KEEPS and not pushes_only(instruction)) else state.flags
+    flags = state.flags if keeps_flags(instruction) else {}
     for register, value in (*_pointer(name, operands, state), *_moved(name, operands, state)):
         registers[register] = value
     if name in SETS:
@@ -236,6 +234,12 @@ def step(instruction: Instruction, state: State) -> State:
         flags = _transfer(state) | _word(name, operands, state, registers)
     parts, carried = _parts(instruction, state, registers, flags)
     return State(registers, flags, parts, carried)
+
+
+def keeps_flags(instruction: Instruction) -> bool:
+    """Whether an instruction changes neither C, Z, N nor V. `sts` to SREG is refused (graph.py)."""
+    name = instruction.mnemonic
+    return pushes_only(instruction) or (name in KEEPS and not (name == "out" and instruction.operands[0] == SREG))
 
 
 def _transfer(state: State) -> dict[str, bool]:
@@ -275,13 +279,13 @@ def _moved(name: str, operands: tuple[int, ...], state: State) -> Iterator[tuple
 
 def _parts(
     instruction: Instruction, state: State, registers: dict[int, int], flags: dict[str, bool]
-) -> tuple[dict[int, Part], tuple[Part, int] | None]:
+) -> tuple[dict[int, Part], tuple[Part, int, bool] | None]:
     """The parts of unknown words behind an instruction, and the carry that one has left. What a comparison or a
     difference of two parts says goes to `registers` and `flags`."""
     name, operands, old = instruction.mnemonic, instruction.operands, state.parts
     changed = written(instruction)
     new = {r: part for r, part in old.items() if r not in changed} if changed else old.copy()
-    carried = state.carried if name in KEEPS else None
+    carried = state.carried if keeps_flags(instruction) else None
     if name in ("mov", "movw"):
         new.update(_copied(instruction, state, new))
     elif name in ("adiw", "sbiw"):
@@ -326,7 +330,7 @@ def _arithmetic(
     new: dict[int, Part],
     registers: dict[int, int],
     flags: dict[str, bool],
-) -> tuple[Part, int] | None:
+) -> tuple[Part, int, bool] | None:
     """Of a part and a number, or of two parts. Returns the carry that it leaves, where the next instruction can use
     it."""
     to, part = operands[0], state.parts.get(operands[0])
@@ -346,11 +350,12 @@ def _arithmetic(
         if part.high:
             return None
         new[to] = part._replace(more=part.more + number & 0xFFFF)
-        return None if name in ("inc", "dec") else (part, number)
-    if part.high and state.carried is not None and state.carried[0] == part._replace(high=False):
-        whole = part._replace(more=part.more + state.carried[1] + (number << 8) & 0xFFFF)
+        return None if name in ("inc", "dec") else (part, number, name != "add")
+    low_before, added, is_borrow = state.carried or (None, 0, False)
+    if part.high and low_before == part._replace(high=False) and is_borrow == (name != "adc"):
+        whole = part._replace(more=part.more + added + (number << 8) & 0xFFFF)
         new[to] = whole
-        low = part._replace(more=part.more + state.carried[1] & 0xFFFF, high=False)
+        low = part._replace(more=part.more + added & 0xFFFF, high=False)
         new.update({r: whole._replace(high=False) for r, one in list(new.items()) if one == low})
     return None
 
@@ -372,10 +377,14 @@ def _difference_of(
     more = one.more - other.more & 0xFFFF
     if not one.high and name in ("sub", "cp"):
         flags["Z"] = more & 0xFF == 0
+        if flags["Z"]:
+            flags["C"] = False
         if name == "sub":
             registers[to] = more & 0xFF
-    elif one.high and name == "cpc" and "Z" in state.flags and (more == 0 or not state.flags["Z"] or more & 0xFF == 0):
-        flags["Z"] = state.flags["Z"] and more == 0
+    elif one.high and name == "cpc" and state.flags.get("Z") is False:
+        flags["Z"] = False
+    elif one.high and name == "cpc" and "Z" in state.flags and state.flags.get("C") is False and more & 0xFF == 0:
+        flags["Z"] = more == 0
 
 
 def _pointer(name: str, operands: tuple[int, ...], state: State) -> Iterator[tuple[int, int]]:

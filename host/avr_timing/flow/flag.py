@@ -10,10 +10,9 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from avr_timing.flow.registers import pushes_only, written
+from avr_timing.flow.registers import SREG, pushes_only, written
 from avr_timing.program import Instruction
 
-SREG = 0x3F  # I/O address
 FRAME = 28  # Y, avr-gcc's frame pointer
 
 
@@ -52,7 +51,7 @@ def after(instruction: Instruction, state: State, clobbered: frozenset[int] | No
     all that the calling convention lets it); what it does to the flag is for the caller to know.
     """
     name, operands = instruction.mnemonic, instruction.operands
-    on = _on(state.flag)
+    on = state.flag is not Flag.OFF
     flags = [{Flag.ONE_MORE: Flag.JUST_ON, Flag.JUST_ON: Flag.ON}.get(state.flag, state.flag)]
     if name == "cli":
         flags = [Flag.OFF]
@@ -63,10 +62,6 @@ def after(instruction: Instruction, state: State, clobbered: frozenset[int] | No
         flags = ([_set(state.flag)] if copy is not False else []) + ([Flag.OFF] if copy is not True else [])
     copies, pushed = _copies(instruction, state, on, written(instruction) if clobbered is None else clobbered)
     return [State(flag, copies, pushed) for flag in flags]
-
-
-def _on(flag: Flag) -> bool:
-    return flag is not Flag.OFF
 
 
 def _set(flag: Flag) -> Flag:

@@ -15,6 +15,7 @@ def _words(text: str) -> frozenset[str]:
 
 
 REGISTERS = 32  # at data addresses 0 to 31
+SREG = 0x3F  # I/O address
 ZERO = 1  # holds zero wherever compiled code does not multiply
 CALL_CLOBBERED = frozenset((0, 1, *range(18, 28), 30, 31))
 NO_RESULT = _words(

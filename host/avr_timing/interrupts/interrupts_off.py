@@ -16,9 +16,10 @@ from dataclasses import dataclass, field
 
 from avr_timing.bounds.stack import VECTORS
 from avr_timing.bounds.wcet import WorstCase
-from avr_timing.flow.flag import SREG, Flag, State, after
+from avr_timing.flow.flag import Flag, State, after
 from avr_timing.flow.loops import with_parents
 from avr_timing.flow.paths import Graph, Way, longest
+from avr_timing.flow.registers import SREG
 from avr_timing.program import REFUSED, Block, Function, Instruction, Program
 from boebot.errors import AnalysisError
 

@@ -68,6 +68,10 @@ def test_frames_of_the_compiler(tmp_path: Path, size: int, flags: tuple[str, ...
         ("main: push r24\n ret", "returns at .* with 1 bytes"),
         ("main: pop r24\n ret", "more is popped"),
         (f"main: {UNKNOWN} ret", "stack pointer gets a value"),
+        (
+            "main: in r28, SPL\n in r29, SPH\n subi r28, 5\n out SREG, r2\n sbci r29, 0\n out SPH, r29",
+            "stack pointer gets",
+        ),
         (f"main: {TAKE} 1: push r24\n dec r25\n brne 1b\n {GIVE} ret", "one depth at each place"),
     ],
 )

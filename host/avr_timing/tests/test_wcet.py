@@ -85,6 +85,10 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
         (STEPPED, 2 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
         (STEPPED.replace("ldi r24, 3", "ldi r24, 3\n ldi r26, 250\n ldi r27, 1"), 4 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 +
         4),
+        (STEPPED.replace("add r24, r26\n adc r25, r27", "movw r24, r26\n subi r24, 0xFD\n sbci r25, 0xFF"),
+         2 + 1 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
+        ("main: movw r30, r26\n ldi r24, 255\n ldi r25, 1\n add r24, r25\n cpc r27, r31\n breq 1f\n nop\n nop\n 1: ret",
+         5 + 1 + 2 + 4),  # what was added came to 0 with a carry
         (STEPPED.replace("ld r0, X+", "st X+, r0"), 2 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
         (STEPPED.replace("add r24, r26\n adc r25, r27", "movw r24, r26\n adiw r24, 3"),
          2 + 1 + 1 + 2 + 3 * (2 + 1 + 1 + 2) - 1 + 4),
@@ -96,8 +100,8 @@ def cycles_of(folder: Path, source: str, name: str = "main") -> int:
     ],
     ids=["straight", "branch", "branch taken", "skip", "call", "two calls", "EEPROM halts", "tail call", "while",
          "nested", "counted", "counted below zero", "two bytes", "256 times", "three bytes", "up to 1000", "shifted",
-         "flag", "bit of another", "up to a pointer", "up to a known one", "stored", "from a copy", "waits",
-         "waits asleep", "counts naps"],
+         "flag", "bit of another", "up to a pointer", "up to a known one", "from a difference",
+         "zero with a carry", "stored", "from a copy", "waits", "waits asleep", "counts naps"],
 )  # fmt: skip
 def test_counted_by_hand(tmp_path: Path, source: str, cycles: int) -> None:
     assert cycles_of(tmp_path, source) == cycles
@@ -140,6 +144,12 @@ def test_planted_change_raises_the_bound_by_what_it_takes(tmp_path: Path, old: s
         ("main: ldi r24, 7\n 1: sleep\n dec r24\n brne 1b\n ret", "main waits asleep at"),
         ("main: 1: bounded 0xFFFFFFFF, 9\n rcall f\n sbis 5, 0\n rjmp 1b\n ret\n f: sleep\n ret", "f waits asleep at"),
         (STEPPED.replace("cp r26, r24", "cp r30, r24"), "has no bound"),
+        # C that was not left by the count, nor by the lower byte, or the other way round
+        ("main: cp r22, r23\n ldi r24, 5\n 1: dec r24\n brcc 1b\n ret", "has no bound"),
+        ("main: ldi r24, 5\n 1: in r0, SREG\n dec r24\n out SREG, r0\n brne 1b\n ret", "has no bound"),
+        (STEPPED.replace("adc r25", "out SREG, r18\n adc r25"), "has no bound"),
+        ("main: movw r24, r26\n subi r26, 5\n adc r27, r1\n1: ld r0, X+\n cp r26, r24\n cpc r27, r25\n brne 1b\n ret",
+         "has no bound"),
     ],
 )  # fmt: skip
 def test_refused_with_the_place(tmp_path: Path, source: str, words: str) -> None:
