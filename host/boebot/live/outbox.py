@@ -13,6 +13,7 @@ import msgspec
 Message = dict[str, Any]
 EVENTS = 500  # of a kind, that wait at most
 LETTERS = 20_000  # printed, that wait at most
+_NEWEST = frozenset({"chunk", "state", "end"})  # kinds of which one waits at most; a run's end never before its chunks
 
 
 class Outbox:
@@ -28,22 +29,20 @@ class Outbox:
         self.ready = asyncio.Event()
         self._lock = threading.Lock()
         self._first: list[Message] = []  # must be sent, and before the rest
-        self._chunk: Message | None = None
-        self._state: Message | None = None
+        self._newest: dict[str, Message] = {}  # by their kinds, in the order in which they came
 
     def begin(self, run: Message, past: list[Message]) -> None:
         """A run begins, or the page comes in the middle of it: what it needs first. Nothing else counts any more."""
         with self._lock:
-            self._first, self._chunk, self._state = [run, *past], None, None
+            self._first, self._newest = [run, *past], {}
 
     def put(self, message: Message) -> None:
         """Something for the page."""
         with self._lock:
             kind = message["type"]
-            if kind == "chunk":
-                self._chunk = message if self._chunk is None else merged(self._chunk, message)
-            elif kind == "state":
-                self._state = message
+            if kind in _NEWEST:
+                older = self._newest.pop(kind, None)
+                self._newest[kind] = merged(older, message) if older is not None and kind == "chunk" else message
             elif len(self._first) < EVENTS:
                 self._first.append(message)
 
@@ -51,13 +50,13 @@ class Outbox:
     def is_waiting(self) -> bool:
         """There is something in it."""
         with self._lock:
-            return bool(self._first or self._chunk or self._state)
+            return bool(self._first or self._newest)
 
     def take(self) -> list[str]:
         """All of it, to be sent in this order."""
         with self._lock:
-            waiting = [*self._first, *filter(None, (self._chunk, self._state))]
-            self._first, self._chunk, self._state = [], None, None
+            waiting = [*self._first, *self._newest.values()]
+            self._first, self._newest = [], {}
         return [_text(message) for message in waiting]
 
 

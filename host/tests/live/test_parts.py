@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import threading
 import time
 from collections import deque
@@ -172,6 +173,14 @@ def test_slow_page_gets_the_newest_and_what_must_not_be_lost() -> None:
     assert '"number":2' in text and "left" in text and "right" in text and '"printed":"1\\n2\\n"' in text
     assert '{"name":"a","n":2}' in text and '{"name":"b","n":1}' in text and '{"name":"a","n":1}' not in text
     assert box.take() == []
+
+
+def test_end_of_a_run_comes_after_its_last_chunk() -> None:
+    """Also where both have waited; and the newest state is not told before an older one."""
+    box = Outbox()
+    for message in (chunk(1), {"type": "state", "state": 1}, chunk(2), {"type": "end"}):
+        box.put(message)
+    assert [json.loads(text)["type"] for text in box.take()] == ["state", "chunk", "end"]
 
 
 def test_switches_outlast_a_stretch_without_a_step_of_the_brain() -> None:
