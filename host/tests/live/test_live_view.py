@@ -29,6 +29,7 @@ from boebot.view.replay import content
 from command import boebot, heed_signals
 
 LIMIT_S = 30.0
+SLOWLY = ("--speed", "0.01")  # a run hardly goes on until its page is there, and says how fast
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")  # without them no page opens by itself
 
 
@@ -200,11 +201,12 @@ def test_two_pages_one_drives(endless: Run) -> None:
 def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "out"
     robot = ("--robot", "shieldbot-charging", "--arena", "showcase")
-    run = Run("run", "demo", *robot, "--view", "--seconds", "3", "--out", str(folder), "--json")
+    run = Run("run", "demo", *robot, "--view", "--seconds", "3", "--out", str(folder), "--json", *SLOWLY)
     with run.stream() as stream:
         page = Page(stream)
         page.until("run")
         page.say(type="pause")
+        page.say(type="speed", speed=1)
         page.state(lambda state: state["paused"])
         page.do("place", x=0.0, y=0.0, heading=1.0)
         state = page.state(lambda state: state["touched"] == 1)
@@ -236,16 +238,18 @@ def test_interventions_are_recorded_and_repeated_bit_by_bit(tmp_path: Path, caps
 
 
 def test_page_begins_a_run_afresh_also_after_its_end() -> None:
-    """What the page switches off is no longer of another magnitude. The run lasts until the page is there."""
+    """What the page switches off is no longer of another magnitude."""
     given = ("--imperfection", "tyre_grip=0.3")
-    run = Run("run", "wander", "--view", "--seconds", "1", "--speed", "4", "--json", *given)
+    run = Run("run", "wander", "--view", "--seconds", "1", "--json", *given, *SLOWLY)
     with run.stream() as stream:
         page = Page(stream)
+        page.say(type="speed", speed=4)
         assert page.until("end")["again"]
         page.say(type="restart", seed=7, without=["slipp"])
         assert "; did you mean 'slip'?" in page.until("refused")["sentence"]
         page.say(type="restart", seed=7, without=["slip"])
         assert page.until("run")["live"]["seed"] == 7
+        page.say(type="speed", speed=4)
         table = page.until("end")["tables"][0]
         assert (table["without"], table["imperfections"]) == ("slip", None)
     code, out, error = run.end()
@@ -268,9 +272,10 @@ def test_ctrl_c_ends_a_run_that_stands_still() -> None:
 
 
 def test_ctrl_c_at_the_end_of_a_run_leaves_what_came_of_it() -> None:
-    run = Run("run", "wander", "--view", "--seconds", "60", "--speed", "max", "--json")
+    run = Run("run", "wander", "--view", "--seconds", "60", "--json", *SLOWLY)
     with run.stream() as stream:
         page = Page(stream)
+        page.say(type="speed", speed=None)
         page.until("end")
         run.process.send_signal(signal.SIGTERM)
         code, out, error = run.end()
@@ -286,14 +291,15 @@ def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> Non
     )
     short = tmp_path / "short.py"
     short.write_text("def main(robot):\n    robot.wait(0.5)\n")
-    run = Run("run", str(brain), str(short), "--view", "--seconds", "2", "--json")
+    run = Run("run", str(brain), str(short), "--view", "--seconds", "2", "--json", *SLOWLY)
     with run.stream() as stream:
         page = Page(stream)
         assert len(page.until("run")["runs"]) == 2
+        page.say(type="speed", speed=1)
         chunk = page.until("chunk", where=lambda chunk: chunk["printed"] and chunk["runs"][0]["layers"])
         assert chunk["printed"].startswith("hello")
         assert [one["name"] for one in chunk["runs"][0]["shown"]["numbers"]] == ["x"]
-        ended = page.until("chunk", where=lambda chunk: chunk["state"]["time"] > 1.0)["runs"][1]
+        ended = page.until("chunk", where=lambda chunk: chunk["state"]["time"] > 1.5)["runs"][1]
         assert times_of(ended) == pytest.approx([0.55], abs=0.06), "the newest once more"
         last = page.until("chunk", where=lambda chunk: times_of(chunk["runs"][0])[-1] > 1.99)
         assert last["state"]["time"] == pytest.approx(2.0, abs=0.05), "up to the end"
@@ -304,6 +310,8 @@ def test_several_robots_and_what_a_brain_prints_and_shows(tmp_path: Path) -> Non
         assert f"{short}, line 1: " in page.until("end")["ended"]
         short.write_text(whole)
         page.say(type="restart", seed=1, without=[])
+        page.until("run")
+        page.say(type="speed", speed=1)
         page.until("end")
     code, out, error = run.end()
     assert code == 0, error
@@ -337,7 +345,7 @@ def test_served_robot_is_shown_and_driven_only_by_who_has_its_port() -> None:
     with run.stream() as stream:
         page = Page(stream)
         assert page.until("run")["live"]["can"] == []
-        first = page.until("chunk")["state"]["time"]
+        first = page.state()["time"]
         page.do("hand", left=1, right=1)
         assert "is driven by the program that has its port" in page.until("refused")["sentence"]
         assert page.state(lambda state: state["time"] > first + 0.2)
