@@ -52,7 +52,8 @@ struct robot {
   brown_out brown_out;
   battery *battery;
   double held_supply;
-  buffer received, truth, looks, tones;
+  buffer received, received_at, truth, looks, tones;
+  bool is_stamped;
   edge_log edges;
   uint64_t last_byte, listen_from, reset_at, contacts;
   ...;

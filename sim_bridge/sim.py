@@ -410,6 +410,24 @@ class SimRobot:
             data += self._view[:count]
         return data
 
+    def follow_line(self) -> None:
+        """From now on the outside's bit rate is always the board's own, as its registers say, and `receive_stamped`
+        says when each byte has come.
+
+        Raises:
+            BoardError: the robot has no board.
+        """
+        self._need_board("a line")
+        self.handle.is_stamped = True
+        lib.robot_line_rate(self.handle, 0)
+
+    def receive_stamped(self) -> list[tuple[int, int]]:
+        """Bytes that left the board since the last call, each with the cycle at which it had come."""
+        data, at = self.receive(), self.handle.received_at
+        cycles = np.frombuffer(ffi.buffer(at.data + at.start, at.count)[:], "<u8") if at.count else ()
+        at.start = at.count = 0
+        return list(zip(map(int, cycles), data, strict=True))
+
     def send(self, data: bytes | bytearray | memoryview) -> None:
         """Bytes to the board, from now on.
 

@@ -83,6 +83,12 @@ class NotRealisableError(BoebotError):
     """A robot, a brain's period and a line that cannot go together in time."""
 
 
+class MissingTextError(BoebotError):
+    """A program did not print the text that was waited for."""
+
+    brief = "timed out"
+
+
 class AnalysisError(BoebotError):
     """An image cannot be read or followed, or something in it has no bound."""
 

@@ -152,7 +152,8 @@ typedef struct {
    * end. Returns how many, at most `capacity`. */
   size_t (*receive)(board *self, uint8_t *bytes, uint64_t *cycles, size_t capacity);
 
-  /* Bit rate of the outside's side of the line, default 500,000. */
+  /* Bit rate of the outside's side of the line, default 500,000. 0: always the board's own, as its registers say;
+   * emulated ATmega328P only. */
   void (*line_rate)(board *self, uint32_t baud);
 
   /* Resets the microcontroller at its next instruction. Time and what drives its pins from outside stay; POWER also

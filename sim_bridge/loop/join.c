@@ -29,6 +29,7 @@ static void destroy_robot(robot *r) {
   for (int i = 0; i < r->part_count; i++) free(r->parts[i]);
   free(r->parts);
   buffer_free(&r->received);
+  buffer_free(&r->received_at);
   buffer_free(&r->truth);
   buffer_free(&r->looks);
   buffer_free(&r->tones);

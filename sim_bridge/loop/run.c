@@ -114,6 +114,7 @@ static void take_bytes(robot *r) {
     if (room == NULL) return;
     const size_t count = r->board->op->receive(r->board, room, cycles, CHUNK);
     if (count > 0) r->last_byte = cycles[count - 1];
+    if (r->is_stamped) buffer_append(&r->received_at, cycles, count * sizeof *cycles);
     r->received.count += count;
     if (count < CHUNK) return;
   }
@@ -181,6 +182,6 @@ void robot_send(robot *self, const uint8_t *bytes, size_t count) {
 }
 
 void robot_line_rate(robot *self, uint32_t baud) {
-  self->idle = line_idle_cycles(baud);
+  if (baud > 0) self->idle = line_idle_cycles(baud);
   self->board->op->line_rate(self->board, baud);
 }

@@ -45,6 +45,7 @@ FOLDER = Path(__file__).resolve().parent
 _OTHERS = (FOLDER.parent, *map(get_path, ("stdlib", "purelib", "platlib")))  # the kit, Python, other packages
 _NOBODYS = ("<frozen ", *(f"{folder}{os.sep}" for folder in _OTHERS))  # what files begin with that are not the user's
 PYTHON, TOML = ".py", ".toml"  # what brains are written in
+PROGRAMS = (".elf", ".hex")  # for the board: they drive a robot in place of a brain
 _executing: set[tuple[Path, int]] = set()  # files that are being loaded, each with its thread
 
 
@@ -63,6 +64,11 @@ class LoadedBrain:
     """The brain of processes behind `step`, if it is one: its `steps` and `switches` record the run."""
     main: MainBrain | None = None
     """What runs `main(robot)` behind `step`, if that is the brain."""
+
+    @property
+    def is_program(self) -> bool:
+        """It is a program for the board, and there is no brain."""
+        return self.path is not None and self.path.suffix in PROGRAMS
 
     @property
     def is_over(self) -> bool:
@@ -111,6 +117,8 @@ def load_brain(source: object) -> LoadedBrain:
         return source
     if isinstance(source, str | Path):
         path = _find(source)
+        if path.suffix in PROGRAMS:
+            return LoadedBrain(as_utf8(path.name), lambda robot: None, path=path)
         if path.suffix == TOML:
             from boebot.brain import composition
 
@@ -202,10 +210,10 @@ def _first_line(error: BaseException) -> str:
 
 def _find(source: str | Path) -> Path:
     path = Path(source)
-    if path.suffix in (PYTHON, TOML) or len(path.parts) > 1:
+    if path.suffix in (PYTHON, TOML, *PROGRAMS) or len(path.parts) > 1:
         if path.is_file():
             return path.resolve()
-        raise BrainError(f"there is no brain file {path}; expected a Python or TOML file")
+        raise BrainError(f"there is no file {path}; expected a Python or TOML file, or a program, ELF or HEX")
     files = bundled_files()
     if str(source) in files:
         return files[str(source)]

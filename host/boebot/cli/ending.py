@@ -97,7 +97,7 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
         ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{_changed(table)}"),
         ("time", f"{result.run_time:g} s{faster}"),
         ("way", ", ".join(way)),
-        ("brain", _brain(result)),
+        ("program", f"SHA-256 {result.program[:16]}...") if result.program else ("brain", _brain(result)),
         ("ended", table["ended"] + _touched(result)),
     ]
 

@@ -157,7 +157,7 @@ def _place(result: Run, step: int) -> str:
 def _repeat(folder: Path, trust: bool) -> None:
     """`trust`: a brain that came with the record is run without asking."""
     run = recorded(folder)
-    if run.foreign and not trust and sys.stdin is not None and sys.stdin.isatty():
+    if run.needs_trust and not trust and sys.stdin is not None and sys.stdin.isatty():
         output.say(run.warning)
         trust = typer.confirm("run it?", err=True)
     with (

@@ -1,4 +1,5 @@
-"""`boebot run BRAIN`: a brain drives a robot, emulated or real; or several robots share one simulated world."""
+"""`boebot run BRAIN`: a brain drives a robot, emulated or real, or a program drives an emulated one; or several robots
+share one simulated world."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ import typer
 from boebot.brains import bundled
 from boebot.cli import options, output, quantity, streams
 from boebot.cli.ending import detail, end
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, MissingTextError
 from boebot.record import run_folder
 from boebot.running.tasks import Member, Request
 
@@ -28,6 +29,10 @@ Several robots in one simulated world:
   boebot run wander chase.py                two robots, a brain for each
 
   boebot run wander --robots 2 --pose 0.5,0.5,90deg --pose 1.5,0.5,180deg
+
+A program for the Arduino Uno drives in place of a brain; what it prints is shown with its time:
+
+  boebot run blink.elf --expect-text ready --timeout 2000
 
 An option that is given once goes for all of them; given several times, it goes to robot 1, 2 and so on.
 
@@ -44,7 +49,8 @@ def run(
             metavar="BRAIN",
             autocompletion=options.complete_brains,
             help="What drives it: a bundled brain by its name, a Python file with step(robot), main(robot), a class "
-            "Brain or brain = Brain([...]), or a TOML file of processes; several: a robot for each.",
+            "Brain or brain = Brain([...]), a TOML file of processes, or a program for the Uno, ELF or HEX; several: a "
+            "robot for each.",
         ),
     ],
     on: options.RunOn = None,
@@ -105,6 +111,21 @@ def run(
     pins: Annotated[
         bool, typer.Option("--pins", help="Record the output edges of emulated boards, too: stream pins of the record.")
     ] = False,
+    expect_text: Annotated[
+        str,
+        typer.Option(
+            metavar="TEXT", help="Of a program: the run ends when this was printed; if it never is, with an error."
+        ),
+    ] = "",
+    fail_text: Annotated[
+        str, typer.Option(metavar="TEXT", help="Of a program: that this was printed is an error, and ends the run.")
+    ] = "",
+    timeout: Annotated[
+        int | None, typer.Option(metavar="MS", min=1, help="Length of the run in simulated ms, in place of --seconds.")
+    ] = None,
+    timeout_exit_code: Annotated[
+        int, typer.Option(metavar="N", min=0, max=255, help="Exit code where --expect-text was not printed in time.")
+    ] = 42,
     view: options.View = False,
     speed: options.Speed = None,
     view_port: options.ViewPort = None,
@@ -137,12 +158,14 @@ def run(
         ],
         arena=arena,
         on=on,
-        seconds=seconds,
+        seconds=seconds if timeout is None else timeout / 1000,
         seed=seed,
         realtime=realtime,
         step_timeout=step_timeout,
         force_timing=force_timing,
         pins=pins,
+        expect_text=expect_text,
+        fail_text=fail_text,
     )
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
@@ -152,7 +175,11 @@ def run(
             run_it = shown.enter_context(options.runner(view=view, speed=speed, port=view_port, waits=True))
             shown.enter_context(streams.kept(for_the_answer=json))
             result = run_it(request, progress, folder)
-        end(result, out, wanted)
+        try:
+            end(result, out, wanted)
+        except MissingTextError as error:
+            error.exit_code = timeout_exit_code
+            raise
 
 
 run.__doc__ = _HELP

@@ -55,6 +55,14 @@ class Stamping(Protocol):
 
 
 @runtime_checkable
+class Following(Transport, Stamping, Protocol):
+    """A transport whose line can have the board's own bit rate."""
+
+    def follow(self) -> None:
+        """From now on the line has whatever rate the board sets, and each byte is a piece of `read_stamped`."""
+
+
+@runtime_checkable
 class BaudSelectable(Protocol):
     """A transport whose line has a bit rate that the host chooses."""
 

@@ -71,6 +71,8 @@ class Run:
         layout: of a robot without a board: where the readings of each of its devices stand.
         brain_names: of a brain of processes: names of its parts; None: a brain of another kind.
         parameters: of the brain that were set for this run, by name, as "avoid.turn".
+        program: SHA-256 of the file of the program that drove the robot in place of firmware and brain, in hexadecimal
+            digits; None: a brain did.
         made_of: of a brain of processes: classes and parameters of its processes, their utilities, and state variables,
             as the run began (docs/reference/run-files.md).
     """
@@ -110,6 +112,7 @@ class Run:
     long_steps: int | None = None
     longest_step: float | None = None
     unrealisable: str | None = None
+    program: str | None = None
 
     def __repr__(self) -> str:
         """One line; the figures are in `table()`, everything else in the attributes."""
@@ -234,9 +237,9 @@ class Run:
     @cached_property
     def hash(self) -> str | None:
         """SHA-256 of what really happened and of what the brain commanded, step by step, in hexadecimal digits; of a
-        real robot of the commands. Runs that are equal have the same (docs/reference/run-files.md). Of a record that
+        real robot of the commands; where a program drove it, of what it printed in place of commands. Runs that are equal have the same (docs/reference/run-files.md). Of a record that
         is cut: of what it holds. None: the run was not recorded."""
-        return self.record.digest("truth", "command") if self.is_recorded else None
+        return self.record.digest("truth", "serial" if self.program else "command") if self.is_recorded else None
 
     @property
     def ticks(self) -> int | None:
@@ -323,6 +326,7 @@ class Run:
             "firmware": None if identity is None else text(identity.firmware_version),
             "compiler": None if identity is None else text(identity.compiler),
             "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
+            "program_hash": self.program,
             "hash": self.hash,
             "ended": "complete" if self.error is None else why(self.error),
         }

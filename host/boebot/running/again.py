@@ -16,6 +16,7 @@ from boebot.arenas import load_arena
 from boebot.boards import is_live
 from boebot.brain import Brain
 from boebot.brain.composition import composed
+from boebot.brains import PROGRAMS
 from boebot.errors import BoebotError, as_utf8
 from boebot.record.blocks import Row
 from boebot.record.reading import CutError, attachments_of
@@ -29,7 +30,7 @@ from boebot.running.sources import arena_file, brain_files, write_copies
 from boebot.running.tasks import Member, Request
 
 BEYOND_S = 1.0  # by which the repetition of a record that is cut is longer than it
-_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "waits", "shifts")
+_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "serial", "waits", "shifts")
 """Streams whose times are of the transport's clock, or near it."""
 
 
@@ -99,8 +100,17 @@ class Recorded:
     @property
     def warning(self) -> str:
         """What `foreign` means, in words."""
-        names = ", ".join(name for files in self.foreign.values() for name in files)
+        names = ", ".join(self._foreign_brains)
         return f"the record brings a brain that is not the file on this computer, {names}; it could do all that you may"
+
+    @property
+    def needs_trust(self) -> bool:
+        """One of `foreign` is run on this computer, and not on an emulated board."""
+        return bool(self._foreign_brains)
+
+    @property
+    def _foreign_brains(self) -> list[str]:
+        return [name for files in self.foreign.values() for name in files if Path(name).suffix not in PROGRAMS]
 
     @property
     def seconds(self) -> float:
@@ -131,7 +141,7 @@ def recorded(path: Path) -> Recorded:
     error = results[0].error
     if isinstance(error, CutError) and error.lost:
         raise CutError(f"{path} cannot be repeated: {error}; expected a record that is not damaged inside", error.lost)
-    if not any(result.record.count("command") for result in results):
+    if not any(result.program or result.record.count("command") for result in results):
         raise BoebotError(f"there is nothing to compare in {path}: the run has no commands; {EXPECTED}")
     asked = json.loads(attached.get(BEGIN, b"{}")).get("request")
     if asked is None:
@@ -154,7 +164,7 @@ def again(run: Recorded, progress: Progress | None = None, *, trust: bool = Fals
         BoebotError: it cannot be repeated, as a bundled arena has changed; there is such a file, and no trust.
         KeyboardInterrupt: Ctrl-C.
     """
-    if run.foreign and not trust:
+    if run.needs_trust and not trust:
         raise BoebotError(f"{run.warning}; expected --trust (trust=True) if you know whose it is")
     with tempfile.TemporaryDirectory() as folder:
         files = {said["brain"]: said["brain"] for said in run.asked["members"]}
@@ -199,6 +209,8 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         step_timeout=math.inf,
         force_timing=asked["force_timing"],
         pins=asked.get("pins", False),
+        expect_text=asked["expect_text"],
+        fail_text=asked["fail_text"],
     )
 
 
@@ -260,7 +272,7 @@ def _comparable_s(result: RunResult) -> float:
     """Up to when a run is a function of its record: all of it, or up to the last step before Ctrl-C."""
     if not isinstance(result.error, KeyboardInterrupt):
         return math.inf
-    return result.record.span("command")[1]
+    return result.record.span("readings" if result.program else "command")[1]
 
 
 def _end(result: RunResult) -> str:

@@ -128,6 +128,7 @@ def about(driver: Driver, task: Task) -> Mapping[str, Any]:
         "parameters": task.parameters,
         "made_of": task.made_of,
         "unrealisable": task.unrealisable,
+        "program": task.program,
     }
 
 
@@ -186,9 +187,13 @@ class _Robot:
                 self.result = self._result(driver)  # now: later is the others' time
 
     def _driver(self) -> Driver:
-        """Who drives it: over the link to its board, or direct."""
+        """Who drives it: over the link to its board, or direct; or the program on its board does."""
         driver: Driver
-        if self.task.board.robot.has_board:
+        if self.task.brain.is_program:
+            from boebot.running.program_driver import ProgramDriver
+
+            driver = ProgramDriver(cast(BoardSession, self.session), self.task)
+        elif self.task.board.robot.has_board:
             from boebot.record import figures
             from boebot.running.board_driver import BoardDriver
 

@@ -37,12 +37,15 @@ def run(
     pins: bool = False,
     view: bool = False,
     parameters: Mapping[str, Any] | None = None,
+    expect_text: str = "",
+    fail_text: str = "",
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
     Args:
         brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)` or
-            `main(robot)`, or object or class with `step(robot)`.
+            `main(robot)`, or object or class with `step(robot)`; or the ELF or HEX file of a program for the Uno, which
+            drives the emulated robot by itself: what it prints is printed, each line with its time.
         robot: bundled name, .toml file, or a description; with a board or without.
         pose: where it starts: x (m), y (m), heading (rad). None: the arena's start.
         period: s from step to step of the brain. None: the brain's PERIOD, or 0.05.
@@ -66,6 +69,8 @@ def run(
             begin it afresh: the result is that of the last run (docs/how-to/watch-a-run.md).
         parameters: of a brain of processes, by name, for this run, such as {"avoid.turn": 0.4, "avoid.utility.b": -1.0}
             (docs/how-to/several-behaviors.md).
+        expect_text: of a program: the run is over once this was printed; not printed in time is an error.
+        fail_text: of a program: that this was printed is an error.
         progress: called with the run's time so far (s), about ten times a second.
 
     Raises:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -23,6 +24,7 @@ from boebot.record.record import Record
 from boebot.running.driver import check_time_to_live
 
 DEFAULT_PERIOD = 0.05  # s
+PROGRAM_BOARD = "avr"  # the only emulated one that runs any program
 _OF_ONE = {"pose", "period", "without", "parameters", "imperfections"}
 
 
@@ -45,7 +47,7 @@ class _NamesFiles:
     def __post_init__(self) -> None:
         for name in vars(self).keys() & {"arena", "brain", "robot"}:
             value = getattr(self, name)
-            is_name = not isinstance(value, str | Path) or Path(value).suffix not in (brains.PYTHON, brains.TOML)
+            is_name = not isinstance(value, str | Path) or Path(value).suffix not in (brains.PYTHON, brains.TOML, *brains.PROGRAMS)
             if not is_name and os.path.isfile(value):  # noqa: PTH113 (no error where it is too long)
                 object.__setattr__(self, name, Path(value).absolute())
 
@@ -85,7 +87,8 @@ class Request(_NamesFiles):
 
     Attributes:
         members: the robots; several share one simulated world.
-        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins: as of `boebot.run`.
+        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text: as of
+            `boebot.run`.
         record: what happens is recorded.
     """
 
@@ -99,6 +102,8 @@ class Request(_NamesFiles):
     force_timing: bool = False
     record: bool = True
     pins: bool = False
+    expect_text: str = ""
+    fail_text: str = ""
 
     @classmethod
     def single(
@@ -126,6 +131,8 @@ class Request(_NamesFiles):
             switch = getattr(self, name)
             if not isinstance(switch, bool):
                 raise BoebotError(f"{name} is {switch!r}; expected True or False")
+        expect("expect_text", self.expect_text, "a text", str)
+        expect("fail_text", self.fail_text, "a text", str)
         expect("members", self.members, "a list of boebot.Member", list, tuple)
         if not self.members:
             raise BoebotError("there is no robot to run; expected at least one Member")
@@ -143,6 +150,8 @@ class Request(_NamesFiles):
             "realtime": self.realtime,
             "force_timing": self.force_timing,
             "pins": self.pins,
+            "expect_text": self.expect_text,
+            "fail_text": self.fail_text,
             "members": [
                 {
                     "brain": _brain_file(task.brain),
@@ -170,6 +179,8 @@ class Request(_NamesFiles):
             except BoebotError as error:
                 raise of_robot(error, number, len(self.members)) from None
         kind = default_board([task.board.robot for task in tasks]) if self.on is None else self.on
+        if any(task.brain.is_program for task in tasks):
+            kind = _board_of_programs(self, tasks)
         if self.pins and (is_live(kind) or not any(task.board.robot.has_board for task in tasks)):
             raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
         for task in tasks:
@@ -195,6 +206,8 @@ class Task:
     """of the brain that were set for this run, by name"""
     made_of: MadeOf | None = None
     """the brain, if it is one of processes"""
+    program: str | None = None
+    """SHA-256 of the program's file, if one drives the robot, in hexadecimal digits"""
     unrealisable: str | None = None
     """why sensors, period and line do not go together in time, where the run was forced all the same"""
 
@@ -216,13 +229,28 @@ def of_robot(error: BaseException, number: int, count: int) -> BaseException:
     return named
 
 
+def _board_of_programs(request: Request, tasks: Sequence[Task]) -> str:
+    """What programs run on.
+
+    Raises:
+        BoebotError: something else is asked for.
+    """
+    for task in tasks:
+        name, robot = task.brain.name, task.board.robot
+        if task.brain.is_program and not robot.has_board:
+            raise BoebotError(f"{name} is a program for a board, and robot {robot.name!r} has none")
+    if request.on not in (None, PROGRAM_BOARD):
+        raise BoebotError(f"a program runs on the emulated ATmega328P, {PROGRAM_BOARD!r}; got {request.on!r}")
+    return PROGRAM_BOARD
+
+
 def _task(member: Member, request: Request, number: int) -> Task:
     """The run of the `number`-th robot, from 1."""
     expect("seed", member.seed, "a whole number or None", Integral, type(None))
     expect("parameters", member.parameters, 'values by name, as in {"avoid.turn": 0.4}', Mapping, type(None))
     given = member.parameters or {}
     loaded, description, period_s = prepare(member.brain, member.robot, member.period)
-    finding = check_timing(description, period_s)
+    finding = None if loaded.is_program else check_timing(description, period_s)
     if finding is not None and not request.force_timing:
         raise NotRealisableError(f"{finding.why} ({finding.see}; --force-timing runs it all the same)")
     now: Mapping[str, Any] = {}
@@ -244,6 +272,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         pose=_pose(member.pose),
         without=_names("without", member.without),
         imperfections={} if member.imperfections is None else checked(member.imperfections),
+        image=str(loaded.path) if loaded.is_program else None,
     )
     return Task(
         brain=loaded,
@@ -253,6 +282,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         parameters={name: now[name] for name in given},
         made_of=made_of,
         seed=int(request.seed) + number - 1 if member.seed is None else int(member.seed),
+        program=hashlib.sha256(loaded.path.read_bytes()).hexdigest() if loaded.is_program and loaded.path else None,
         unrealisable=None if finding is None else finding.why,
     )
 

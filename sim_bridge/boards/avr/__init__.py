@@ -1,4 +1,4 @@
-"""The emulated ATmega328P: `create` makes a board from an ELF image.
+"""The emulated ATmega328P: `create` makes a board from an image.
 
 The extension behind it contains simavr and is GPL-3.0-or-later; this module imports without it.
 """
@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from boebot import resources
 from boebot.errors import AnalysisError, BoardError
-from boebot.files import regular
-from boebot.image.chip import assumed_chip
+from boebot.image.program import Program, read_program
 from sim_bridge.boards.board import EmulatedBoard
 
-ERROR_SIZE = 200
 FUNCTION_IDS = 64  # id of the first watched function; below are vectors
 
 SPAN = np.dtype(  # avr_span of avr_spans.h; cycles
@@ -62,24 +60,17 @@ def _extension() -> Any:
 
 
 class AvrBoard(EmulatedBoard):
-    """An emulated Arduino Uno. `assumed`: a sentence where the image does not say for which chip it is, or ""."""
+    """An emulated Arduino Uno. `assumed`: a sentence where its program does not say for which chip it is, or ""."""
 
-    def __init__(self, elf: bytes, path: Path) -> None:
-        """Powers on a board whose flash holds the program of an ELF file, which is at `path`.
-
-        Raises:
-            BoardError: it is no such file, or one for another chip.
-        """
+    def __init__(self, program: Program) -> None:
+        """Powers on a board with that program in flash."""
         extension = _extension()
-        try:
-            assumed = assumed_chip(f"the firmware image {path}", elf)
-        except AnalysisError as refused:
-            raise BoardError(str(refused)) from None
-        error = extension.ffi.new("char[]", ERROR_SIZE)
-        board = extension.lib.avr_board_create(elf, len(elf), error, ERROR_SIZE)
+        flash, eeprom = (extension.ffi.from_buffer("uint8_t[]", part) for part in (program.flash, program.eeprom))
+        loaded = (flash, eeprom, program.begin, program.code_end, program.variables_end)
+        board = extension.lib.avr_board_create(extension.ffi.new("avr_program *", loaded))
         if not board:
-            raise BoardError(f"the firmware image {path} cannot be loaded: {extension.ffi.string(error).decode()}")
-        super().__init__(extension, board, "emulated ATmega328P", elf=path, assumed=assumed)
+            raise MemoryError("emulated board")
+        super().__init__(extension, board, "emulated ATmega328P", elf=program.elf, assumed=program.assumed)
 
     def one_by_one(self) -> None:
         """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""
@@ -120,10 +111,14 @@ class AvrBoard(EmulatedBoard):
         return int(self.lib.avr_board_lowest_stack(self.handle))
 
 
-def create(elf: Path) -> AvrBoard:
-    """A board, powered on, with the program of an ELF file in flash."""
+def create(image: Path) -> AvrBoard:
+    """A board, powered on, with the program of an ELF or HEX file in flash.
+
+    Raises:
+        BoardError: it cannot be read, or is no program for this chip.
+    """
     try:
-        image = regular(elf).read_bytes()
-    except OSError as error:
-        raise BoardError(f"the firmware image {elf} cannot be read: {error.strerror}") from error
-    return AvrBoard(image, elf)
+        program = read_program(image)
+    except AnalysisError as refused:
+        raise BoardError(str(refused)) from None
+    return AvrBoard(program)

@@ -165,13 +165,22 @@ static void hear_simavr(avr_t *avr, const int level, const char *format, va_list
        "nothing is there; here it is RAM again");
 }
 
-board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size) {
+/* A program that begins in the boot section has its reset there (27.6: the fuse BOOTRST). */
+static void load(avr_board *b, const avr_program *program) {
+  memcpy(b->avr->flash, program->flash, AVR_BOARD_FLASH_SIZE);
+  memcpy(b->eeprom.cells, program->eeprom, BOARD_EEPROM_SIZE);
+  b->code_end = program->code_end;
+  b->variables_end = program->variables_end;
+  b->avr->reset_pc = program->begin;
+  if (program->begin == 0) b->code_begin = 1; /* address 0 is for resets: a jump there is noticed */
+}
+
+board *avr_board_create(const avr_program *program) {
   avr_global_logger_set(hear_simavr);
   avr_board *b = calloc(1, sizeof *b);
   avr_t *avr = b ? avr_make_mcu_by_name("atmega328p") : NULL;
   if (!avr) {
     free(b);
-    snprintf(error, error_size, "there is no memory for an emulated board");
     return NULL;
   }
   b->base.op = &OPERATIONS;
@@ -183,10 +192,7 @@ board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t err
   avr_init(avr);
   enlarge_flash(avr);
   memset(avr->serial, 0, sizeof avr->serial); /* simavr's is another one each time */
-  if (!image_load(b, elf, size, error, error_size)) {
-    destroy(&b->base);
-    return NULL;
-  }
+  load(b, program);
   usart_line_rate(b, 500000);
   b->reset_wanted = 1u << BOARD_RESET_POWER;
   restart(b);

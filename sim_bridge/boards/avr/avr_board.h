@@ -11,9 +11,17 @@
 #include "../board.h"
 
 /* python: begin */
-/* A board with the program of an ELF file (its bytes, not its name) in flash, powered on at cycle 0. On failure NULL,
- * and one sentence in `error`. */
-board *avr_board_create(const uint8_t *elf, size_t size, char *error, size_t error_size);
+/* A program as it lies in the chip's memories. */
+typedef struct {
+  const uint8_t *flash;   /* AVR_BOARD_FLASH_SIZE bytes */
+  const uint8_t *eeprom;  /* BOARD_EEPROM_SIZE bytes */
+  uint32_t begin;         /* where the reset leads: 0, or into the boot section */
+  uint32_t code_end;      /* behind the last byte that can be an instruction */
+  uint16_t variables_end; /* first address of data memory behind the variables */
+} avr_program;
+
+/* A board with that program, powered on at cycle 0; NULL: there is no memory for it. */
+board *avr_board_create(const avr_program *program);
 
 /* For tests of what else is faster: from now on each instruction is executed by itself, and by simavr's core. */
 void avr_board_one_by_one(board *self);

@@ -248,6 +248,7 @@ typedef struct {
   uint8_t buffered;
   /* the outside */
   uint32_t line_bit_time; /* in cycles << 16 */
+  bool line_follows;      /* it is the board's own */
   uint64_t line_free;     /* when the line's last byte ends, cycles << 16 */
   line_queue to_board;
   line_queue from_board;
@@ -481,8 +482,5 @@ void spans_request_gone(avr_board *b, uint8_t vector);
 void spans_woke(avr_board *b);
 void spans_restart(avr_board *b);
 void spans_free(avr_board *b);
-
-/* avr_image.c */
-bool image_load(avr_board *b, const uint8_t *elf, size_t size, char *error, size_t error_size);
 
 #endif

@@ -24,6 +24,7 @@ enum { RX_MASK = 1, TX_MASK = 2 };                                              
 #define LINE_BITS 10u /* of the outside's frames */
 #define FRACTION 16   /* binary places of the times on the line */
 #define SLOWEST_BAUD 300u
+#define FOLLOWS 0u /* a rate: the board's own */
 
 /* ---- the line ---- */
 
@@ -280,6 +281,7 @@ static void update_settings(avr_board *b) {
   u->data_bits = sizes[(data[REG_UCSR0C] >> 1 & 3) | (data[REG_UCSR0B] & UCSZ2)];
   u->has_parity = data[REG_UCSR0C] & UPM1;
   u->frame_bits = (uint8_t)(2 + u->data_bits + (u->has_parity ? 1 : 0) + (data[REG_UCSR0C] & USBS ? 1 : 0));
+  if (u->line_follows) usart_line_rate(b, FOLLOWS);
   plan_receiver(b);
 }
 
@@ -355,8 +357,10 @@ size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capa
 }
 
 void usart_line_rate(avr_board *b, uint32_t baud) {
-  if (baud < SLOWEST_BAUD) baud = SLOWEST_BAUD;
-  b->usart.line_bit_time = (uint32_t)(((uint64_t)BOARD_CLOCK_HZ << FRACTION) / baud);
+  b->usart.line_follows = baud == FOLLOWS;
+  if (baud != FOLLOWS && baud < SLOWEST_BAUD) baud = SLOWEST_BAUD;
+  const uint32_t own = b->usart.bit_time < 1u << FRACTION ? b->usart.bit_time << FRACTION : UINT32_MAX;
+  b->usart.line_bit_time = baud == FOLLOWS ? own : (uint32_t)(((uint64_t)BOARD_CLOCK_HZ << FRACTION) / baud);
   if (b->usart.outside_start != NEVER) plan_outside(b);
 }
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
+from boebot.image.program import elf_program
 from sim_bridge.boards.avr import AvrBoard, create
 from sim_bridge.boards.board import BoardAccess
 from sim_bridge.sessions.world import AVR, open_on
@@ -105,7 +106,7 @@ def written(writes: list[tuple[int, int]], *, reads: bool = True) -> BoardAccess
     program = b"".join(word.to_bytes(2, "little") for word in code)
     assert len(program) <= ROOM
     before, behind = frame()
-    board = AvrBoard(before + program.ljust(ROOM, b"\0") + behind, Path("program.elf")).access()
+    board = AvrBoard(elf_program(Path("program.elf"), before + program.ljust(ROOM, b"\0") + behind)).access()
     board.run(4 * ROOM)
     return board
 

@@ -1,0 +1,87 @@
+"""Drives a robot by the program on its board: nobody speaks the kit's protocol, what the program prints is text.
+
+The host only lets time pass, keeps what comes with the time of each byte, and sends what a person types
+(`boebot.running.hands`). The run is over when its time is up, or when the program has printed what was looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from boebot.boards import BoardSession
+from boebot.devices.readings import Readings
+from boebot.errors import BoardError, MissingTextError, printable
+from boebot.link.transport import Following
+from boebot.robot import Robot
+from boebot.running.driver import TICK_S, Driver, Status, step_limit
+from boebot.running.monitor import Monitor
+from boebot.running.tasks import Task
+
+PERIOD_S = 0.02  # from one look at what a person wants to the next
+STREAM = "serial"  # of the record: each byte that the program has sent, with the time of its end
+
+
+class ProgramDriver(Driver):
+    """See `boebot.running.driver.Driver`. Its `layout` is empty: the host reads no device."""
+
+    def __init__(self, session: BoardSession, task: Task) -> None:
+        """Raises BoardError where the board's line cannot be listened to at its own bit rate."""
+        line = session.transport
+        if not isinstance(line, Following):
+            raise BoardError(f"{line.name} runs no program of its own; expected the emulated ATmega328P (--on avr)")
+        line.follow()
+        self.session, self.task, self._line = session, task, line
+        self.description = task.board.robot
+        self.robot = Robot(self.description.name, PERIOD_S, task.seed)
+        self.step_limit = step_limit(task.request.step_timeout)
+        self.period_s, self.tick_s = PERIOD_S, TICK_S
+        self.link = self.identity = None
+        self.layout = {}
+        self._monitor = Monitor(_show, task.request.expect_text, task.request.fail_text)
+
+    def begin(self) -> None:
+        """The program has begun by itself."""
+
+    def steps(self) -> Iterator[float]:
+        """See `boebot.running.driver.Driver`.
+
+        Raises:
+            BoardError: the program has crashed, or has printed what it must not.
+            MissingTextError: it has not printed what was expected.
+        """
+        request, line, tick = self.task.request, self._line, 0
+        time_s = line.now()
+        while not self._monitor.found and time_s < request.seconds:
+            self._put_aside(time_s, tick)
+            yield time_s
+            for _ in range(round(PERIOD_S / TICK_S)):
+                self._hear(min(TICK_S, request.seconds - line.now()))
+                tick += 1
+                self._put_aside(time_s := line.now(), tick)
+                if self._monitor.failed:
+                    raise BoardError(f"the program printed {printable(request.fail_text)!r}; expected that it does not")
+        if request.expect_text and not self._monitor.found:
+            expected = f"{printable(request.expect_text)!r} within {request.seconds:g} s"
+            raise MissingTextError(f"the program did not print what was expected, {expected}")
+
+    def _hear(self, wait_s: float) -> None:
+        for time_s, data in self._line.read_stamped(wait_s, wait_s):
+            self.task.record.append(STREAM, time_s, data)
+            self._monitor.hear(time_s, data)
+        self._monitor.wait(self._line.now())
+
+    def _put_aside(self, time_s: float, tick: int) -> None:
+        self.task.record.append_readings(time_s, Readings(tick, 0, (), ()), 0.0, 0.0)
+
+    def end(self) -> None:
+        """What is still on the line; the program goes on while others do."""
+        self._hear(0.0)
+        self._monitor.close()
+
+    def status(self) -> Status:
+        """See `boebot.running.driver.Driver`."""
+        return Status(run_time=self._line.now(), clock_offset=0.0, late_steps=0, notices=list(self.session.notes()))
+
+
+def _show(time_s: float, line: str) -> None:
+    print(f"{time_s:10.4f}  {printable(line)}", flush=True)
