@@ -179,9 +179,11 @@ def names(text: str | None) -> tuple[str, ...]:
 
 
 @contextlib.contextmanager
-def runner(*, view: bool, speed: float | None, port: int | None, waits: bool) -> Iterator[Callable[..., Any]]:
+def runner(
+    *, view: bool, speed: float | None, port: int | None, waits: bool, types: bool = False
+) -> Iterator[Callable[..., Any]]:
     """What carries out a request as `boebot.running.loop.execute` does, in the live view that those options want.
-    `waits`: as of `run_viewed`.
+    `waits`: as of `run_viewed`. `types`: what is typed at the terminal goes to the program that drives the robot.
 
     Raises:
         BoebotError: the port is taken, or options of a live view are given without one.
@@ -191,7 +193,12 @@ def runner(*, view: bool, speed: float | None, port: int | None, waits: bool) ->
             raise BoebotError("--speed and --view-port are of a live view; expected --view with them")
         from boebot.running.loop import execute
 
-        yield execute
+        if types:
+            from boebot.cli.typist import Typist
+
+            yield functools.partial(execute, onlooker=Typist())
+        else:
+            yield execute
         return
     from boebot.live.session import opened, run_viewed
 

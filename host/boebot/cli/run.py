@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from boebot.brains import bundled
+from boebot.brains import PROGRAMS, bundled
 from boebot.cli import options, output, quantity, streams
 from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError, MissingTextError
@@ -167,12 +167,13 @@ def run(
         expect_text=expect_text,
         fail_text=fail_text,
     )
+    types = count == 1 and Path(brain[0]).suffix in PROGRAMS
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
             title = name if on is None else f"{name} on {on}"
             progress = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
-            run_it = shown.enter_context(options.runner(view=view, speed=speed, port=view_port, waits=True))
+            run_it = shown.enter_context(options.runner(view=view, speed=speed, port=view_port, waits=True, types=types))
             shown.enter_context(streams.kept(for_the_answer=json))
             result = run_it(request, progress, folder)
         try:

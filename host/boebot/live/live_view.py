@@ -245,7 +245,7 @@ class Heard:
 
 def _possible(robots: Sequence[Hands]) -> frozenset[str]:
     """What people may do to that run."""
-    can = {"hand"}
+    can = {"type" if all(robot.driver.is_program for robot in robots) else "hand"}
     if any(sliders(robot.task.brain) for robot in robots):
         can.add("parameters")
     first = robots[0]

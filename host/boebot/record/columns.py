@@ -360,6 +360,20 @@ class VehicleColumns(Columns):
         self.odometry = pose if place is None else pose.placed(*place)
 
 
+class ProgramColumns(VehicleColumns):
+    """Of a robot that a program of the user's drives: what it reads, and what its motors get, it does not say."""
+
+    @property
+    def signals(self) -> tuple[Floats, Floats]:
+        """See `Columns`: not known."""
+        unknown = np.full(len(self), np.nan)
+        return unknown, unknown
+
+    def own_columns(self) -> list[Column]:
+        """See `Columns`: none."""
+        return []
+
+
 def restarts(ticks: NDArray[np.uint32]) -> Bools:
     """Where a board was reset since the tick before; its count of ticks rolls over after 2^32."""
     return np.asarray(np.diff(ticks, prepend=ticks[:1]).astype(np.int32) < 0, dtype=np.bool_)
@@ -461,7 +475,8 @@ class Reader:
             robot |= {"track": track, "true_pose": track.at(at), "contact": track.contact_at(at)}
         if self._layout is not None:
             row = readings_row(max((where.stop for where in self._layout.values()), default=0))
-            return VehicleColumns(raw=ticks.table(row), **robot)
+            kind = ProgramColumns if self._robot.has_board else VehicleColumns
+            return kind(raw=ticks.table(row), **robot)
         raw = ticks.table(_TELEMETRY)
         slow = {
             kind: self._held(kind, rows[name], time, raw["tick"]) for name, kind in MESSAGES.items() if name in rows

@@ -62,7 +62,13 @@ class Parameter(Intervention, frozen=True):
     value: float
 
 
-Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter
+class Typed(Intervention, frozen=True):
+    """Text goes to the program that drives the robot, by its board's serial line."""
+
+    text: Annotated[str, msgspec.Meta(max_length=1000)]
+
+
+Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter | Typed
 _DECODER: msgspec.json.Decoder[Deed] = msgspec.json.Decoder(Deed)
 
 
@@ -88,6 +94,8 @@ def in_words(data: bytes) -> str:
             return f"moving shape {index + 1} put at {x:.2f}, {y:.2f} m"
         case Parameter(name, value):
             return f"{name} = {value:g}"
+        case Typed(text):
+            return f"typed {text!r}"
 
 
 def touched(record: Record) -> int:

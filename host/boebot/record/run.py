@@ -239,7 +239,7 @@ class Run:
         """SHA-256 of what really happened and of what the brain commanded, step by step, in hexadecimal digits; of a
         real robot of the commands; where a program drove it, of what it printed in place of commands. Runs that are equal have the same (docs/reference/run-files.md). Of a record that
         is cut: of what it holds. None: the run was not recorded."""
-        return self.record.digest("truth", "serial" if self.program else "command") if self.is_recorded else None
+        return self.record.digest("truth", "to_host" if self.program else "command") if self.is_recorded else None
 
     @property
     def ticks(self) -> int | None:

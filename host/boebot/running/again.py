@@ -30,7 +30,7 @@ from boebot.running.sources import arena_file, brain_files, write_copies
 from boebot.running.tasks import Member, Request
 
 BEYOND_S = 1.0  # by which the repetition of a record that is cut is longer than it
-_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "serial", "waits", "shifts")
+_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "waits", "shifts")
 """Streams whose times are of the transport's clock, or near it."""
 
 

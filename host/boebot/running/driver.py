@@ -53,6 +53,7 @@ class Driver(Protocol):
         link: to its board; None: it has none.
         identity: what the board says of itself; None: there is no board.
         layout: where the readings of each device stand; None: they come by the link.
+        is_program: a program on its board drives the robot, and no brain.
     """
 
     session: BoardSession | VehicleSession
@@ -64,6 +65,7 @@ class Driver(Protocol):
     link: Link | None
     identity: Identity | None
     layout: Layout | None
+    is_program: bool = False
 
     def begin(self) -> None:
         """Makes the robot ready to move.
@@ -79,6 +81,14 @@ class Driver(Protocol):
         Raises:
             BoebotError: the robot cannot go on.
         """
+
+    def type(self, text: str) -> None:
+        """Text for the program that drives the robot.
+
+        Raises:
+            BoebotError: a brain does.
+        """
+        raise BoebotError(f"a brain drives robot {self.description.name!r}; only a program takes what is typed")
 
     def end(self) -> None:
         """Stops the motors and lets go of the robot, whatever happened before."""

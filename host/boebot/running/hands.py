@@ -24,6 +24,7 @@ from boebot.record.interventions import (
     Shape,
     Stop,
     Tally,
+    Typed,
     interventions,
 )
 from boebot.record.record import Record
@@ -103,6 +104,10 @@ class Hands:
                 self.driver.session.place(x, y, heading)
             case Shape(index, x, y, heading):
                 self.driver.session.place_shape(index, x, y, heading)
+            case Typed(text):
+                self.driver.type(text)
+            case _ if self.driver.is_program:
+                raise BoebotError("a program drives this robot, no brain: it takes what is typed")
             case _:
                 self.held = carry_out(one, self.driver.robot, self.task.brain, self.held)
 

@@ -17,8 +17,6 @@ from boebot.running.driver import TICK_S, Driver, Status, step_limit
 from boebot.running.monitor import Monitor
 from boebot.running.tasks import Task
 
-PERIOD_S = 0.02  # from one look at what a person wants to the next
-STREAM = "serial"  # of the record: each byte that the program has sent, with the time of its end
 
 
 class ProgramDriver(Driver):
@@ -32,12 +30,14 @@ class ProgramDriver(Driver):
         line.follow()
         self.session, self.task, self._line = session, task, line
         self.description = task.board.robot
-        self.robot = Robot(self.description.name, PERIOD_S, task.seed)
+        self.robot = Robot(self.description.name, TICK_S, task.seed)
         self.step_limit = step_limit(task.request.step_timeout)
-        self.period_s, self.tick_s = PERIOD_S, TICK_S
+        self.period_s = self.tick_s = TICK_S
         self.link = self.identity = None
         self.layout = {}
-        self._monitor = Monitor(_show, task.request.expect_text, task.request.fail_text)
+        self._monitor = Monitor(self._show, task.request.expect_text, task.request.fail_text)
+
+    is_program = True
 
     def begin(self) -> None:
         """The program has begun by itself."""
@@ -50,28 +50,31 @@ class ProgramDriver(Driver):
             MissingTextError: it has not printed what was expected.
         """
         request, line, tick = self.task.request, self._line, 0
-        time_s = line.now()
+        self._put_aside(time_s := line.now(), tick)
         while not self._monitor.found and time_s < request.seconds:
-            self._put_aside(time_s, tick)
             yield time_s
-            for _ in range(round(PERIOD_S / TICK_S)):
-                self._hear(min(TICK_S, request.seconds - line.now()))
-                tick += 1
-                self._put_aside(time_s := line.now(), tick)
-                if self._monitor.failed:
-                    raise BoardError(f"the program printed {printable(request.fail_text)!r}; expected that it does not")
+            self._hear(min(TICK_S, request.seconds - time_s))
+            tick += 1
+            self._put_aside(time_s := line.now(), tick)
+            if self._monitor.failed:
+                raise BoardError(f"the program printed {printable(request.fail_text)!r}; expected that it does not")
         if request.expect_text and not self._monitor.found:
             expected = f"{printable(request.expect_text)!r} within {request.seconds:g} s"
             raise MissingTextError(f"the program did not print what was expected, {expected}")
 
     def _hear(self, wait_s: float) -> None:
         for time_s, data in self._line.read_stamped(wait_s, wait_s):
-            self.task.record.append(STREAM, time_s, data)
+            self.task.record.append("to_host", time_s, data)
             self._monitor.hear(time_s, data)
         self._monitor.wait(self._line.now())
 
     def _put_aside(self, time_s: float, tick: int) -> None:
         self.task.record.append_readings(time_s, Readings(tick, 0, (), ()), 0.0, 0.0)
+
+    def type(self, text: str) -> None:
+        """See `boebot.running.driver.Driver`."""
+        self.task.record.append("to_board", self._line.now(), text.encode())
+        self._line.write(text.encode())
 
     def end(self) -> None:
         """What is still on the line; the program goes on while others do."""
@@ -82,6 +85,6 @@ class ProgramDriver(Driver):
         """See `boebot.running.driver.Driver`."""
         return Status(run_time=self._line.now(), clock_offset=0.0, late_steps=0, notices=list(self.session.notes()))
 
-
-def _show(time_s: float, line: str) -> None:
-    print(f"{time_s:10.4f}  {printable(line)}", flush=True)
+    def _show(self, time_s: float, line: str) -> None:
+        who = f"robot {self.task.number}: " if len(self.task.request.members) > 1 else ""
+        print(f"{time_s:10.4f}  {who}{printable(line)}", flush=True)

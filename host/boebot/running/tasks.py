@@ -206,6 +206,8 @@ class Task:
     """of the brain that were set for this run, by name"""
     made_of: MadeOf | None = None
     """the brain, if it is one of processes"""
+    number: int = 1
+    """of the robot"""
     program: str | None = None
     """SHA-256 of the program's file, if one drives the robot, in hexadecimal digits"""
     unrealisable: str | None = None
@@ -277,6 +279,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
     return Task(
         brain=loaded,
         request=request,
+        number=number,
         board=board,
         period_s=period_s,
         parameters={name: now[name] for name in given},

@@ -66,6 +66,7 @@ const receive = {
     spanBegin = 0;
     chooseRobot(runs.indexOf(run));
     setControls(true);
+    if (can.has("type")) hide("printed", false);
   },
   chunk(message) {
     message.runs.forEach((rows, k) => {
@@ -281,6 +282,11 @@ function tellPrinted(text) {
   hide("printed", false);
   if (atEnd) it.scrollTop = it.scrollHeight;
 }
+$("typing").addEventListener("submit", e => {
+  e.preventDefault();
+  act({ kind: "typed", text: $("typed").value + "\n" });
+  $("typed").value = "";
+});
 function robotState() {
   return (state && state.robots && state.robots[runs.indexOf(run)]) || {};
 }

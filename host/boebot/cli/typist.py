@@ -1,0 +1,35 @@
+"""What is typed at the terminal during a run goes to the program that drives the robot, line by line."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Iterable
+from queue import SimpleQueue
+
+from boebot.record.interventions import Deed, Typed
+from boebot.running.hands import Onlooker
+
+ROOM = 1000  # bytes that are read at once
+
+
+class Typist(Onlooker):
+    """Reads standard input beside the run, from when it begins."""
+
+    def __init__(self) -> None:
+        self._typed: SimpleQueue[str] = SimpleQueue()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+        """To the first robot, which has no other one beside it."""
+        while number == 0 and not self._typed.empty():
+            yield Typed(self._typed.get())
+
+    def _read(self) -> None:
+        # not by sys.stdin, whose lock a thread that waits there would keep until Python has ended
+        try:
+            while data := os.read(sys.stdin.fileno(), ROOM):
+                self._typed.put(data.decode("utf-8", "replace"))
+        except (OSError, ValueError, AttributeError):  # there is none, or none to read from
+            return
