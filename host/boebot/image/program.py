@@ -27,6 +27,7 @@ FLASH_SIZE, EEPROM_SIZE = 0x8000, 1024  # bytes
 RAM_BEGIN, RAM_END = 0x100, 0x900
 BOOT_BEGIN = 0x7000  # of the largest boot section
 DATA_SPACE, EEPROM_SPACE = 0x800000, 0x810000  # where ELF files have these memories
+OTHER_SPACES = 0x820000  # from here on fuses, lock bits, signature
 SIZE_MAXIMUM = 64 << 20  # bytes of a file
 
 
@@ -119,7 +120,7 @@ class _Memory:
     def put(self, address: int, data: bytes) -> None:
         """Bytes at an address as files have it."""
         into, at = (self._flash, address) if address < DATA_SPACE else (self._eeprom, address - EEPROM_SPACE)
-        if not data or at >= 0x10000:  # fuses, lock bits, signature
+        if not data or address >= OTHER_SPACES:
             return
         if at < 0 or at + len(data) > len(into):
             raise AnalysisError(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from boebot.record.brain_record import each_part, each_switch, names_in, shown_in
-from boebot.record.columns import Columns
+from boebot.record.columns import Columns, ProgramColumns
 from boebot.record.columns import columns as pieces
 from boebot.record.record import KINDS
 from boebot.record.run_folder import FORMAT
@@ -34,10 +34,10 @@ def _columns(part: Columns, names: Mapping[str, bool]) -> dict[str, list[str]]:
         "time_s": _cells(part.time, 4),
         "tick": _cells(part.raw["tick"]),
         **{name: _cells(values, digits) for name, (values, digits) in part.columns().items()},
-        "command": [KINDS[kind] for kind in part.command["kind"].tolist()],
-        "command_left": _cells(part.command["left"], 4),
-        "command_right": _cells(part.command["right"], 4),
     }
+    if not isinstance(part, ProgramColumns):  # there a brain commands
+        table["command"] = [KINDS[kind] for kind in part.command["kind"].tolist()]
+        table["command_left"], table["command_right"] = (_cells(part.command[side], 4) for side in ("left", "right"))
     shown = shown_in(part.showing.rows(), names).at(part.time)
     table |= {f"shown_{name}": _cells(values, 6) for name, values in shown.numbers.items()}
     table |= {f"shown_{name}": texts for name, texts in shown.texts.items()}

@@ -1,0 +1,179 @@
+"""Any program for the Uno drives the emulated robot: what it prints and is told, how its run ends and is repeated."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+
+import boebot
+from boebot.errors import BoardError
+from boebot.record.interventions import Deed, Typed
+from boebot.record.run_folder import locked
+from boebot.result import RunResult, read_run
+from boebot.running.hands import Onlooker
+from boebot.running.loop import execute
+from boebot.running.tasks import Request
+
+pytestmark = pytest.mark.emulated
+
+# Prints "ready", then what it was told in capitals; "!" makes it go wild, "s" turns the left servo for a second.
+SOURCE = """
+#include <avr/io.h>
+#include <util/delay.h>
+static void put(char byte) { while (!(UCSR0A & 1 << UDRE0)) {} UDR0 = byte; }
+static void wild(void) { ((void (*)(void))0x3F00)(); }
+int main(void) {
+  UBRR0 = 16000000 / 16 / BAUD - 1;
+  UCSR0B = 1 << RXEN0 | 1 << TXEN0;
+  DDRB = 1 << 5;
+  for (const char *c = "ready\\r\\n"; *c; c++) put(*c);
+  for (;;) {
+    while (!(UCSR0A & 1 << RXC0)) {}
+    char byte = UDR0;
+    if (byte == '!') wild();
+    for (int i = 0; byte == 's' && i < 50; i++) {
+      PORTB = 1 << 5;
+      _delay_us(1700);
+      PORTB = 0;
+      _delay_ms(18.3);
+    }
+    put(byte >= 'a' && byte <= 'z' ? byte - 32 : byte);
+  }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Path]:
+    """Builds the program at a bit rate: an ELF file, and beside it a HEX file."""
+
+    def built(baud: int) -> Path:
+        folder = tmp_path_factory.mktemp("program")
+        (folder / "talk.c").write_text(SOURCE)
+        flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", f"-DBAUD={baud}L", "-Os", "-g", "-Wall", "-Wno-array-bounds"]
+        subprocess.run(["avr-gcc", *flags, "-o", folder / "talk.elf", folder / "talk.c"], check=True)
+        subprocess.run(["avr-objcopy", "-O", "ihex", folder / "talk.elf", folder / "talk.hex"], check=True)
+        return folder / "talk.elf"
+
+    return built
+
+
+@pytest.fixture(scope="module")
+def program(build: Callable[[int], Path]) -> Path:
+    return build(9600)
+
+
+def command(*arguments: object, typed: str = "") -> subprocess.CompletedProcess[str]:
+    """The command, with that on its standard input."""
+    words = [sys.executable, "-m", "boebot", *map(str, arguments)]
+    return subprocess.run(words, input=typed, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("baud", [2400, 38400])
+def test_the_monitor_has_the_rate_that_the_program_sets(build: Callable[[int], Path], baud: int, tmp_path: Path) -> None:
+    run = boebot.run(build(baud), seconds=0.1, out=tmp_path)
+    rows = run.record.rows("to_host")
+    assert b"".join(data for _, data in rows) == b"ready\r\n"
+    bit_s = (16_000_000 // 16 // baud) / 1e6  # as UBRR0 gives it
+    times = [time for time, _ in rows]
+    assert times[1] - times[0] == pytest.approx(10 * bit_s, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "sentence"),
+    [
+        (("--expect-text", "ready"), 0, ""),
+        (("--timeout", "100"), 0, ""),
+        (("--expect-text", "no such", "--timeout", "100"), 42, "did not print what was expected, 'no such' within 0.1 s"),
+        (("--expect-text", "no such", "--timeout", "100", "--timeout-exit-code", "7"), 7, "did not print"),
+        (("--fail-text", "ead"), 1, "the program printed 'ead'; expected that it does not"),
+        (("--timeout", "0"), 2, "--timeout"),
+        (("--on", "native"), 1, "a program runs on the emulated ATmega328P, 'avr'; got 'native'"),
+        (("--on", "/dev/ttyACM0"), 1, "a program runs on the emulated ATmega328P, 'avr'; got '/dev/ttyACM0'"),
+        (("--robot", "roller"), 1, "talk.hex is a program for a board, and robot 'roller' has none"),
+    ],
+)
+def test_exit_codes_say_what_was_printed(program: Path, options: tuple[str, ...], code: int, sentence: str) -> None:
+    done = command("run", program.with_suffix(".hex"), *options)
+    assert (done.returncode, sentence in done.stderr) == (code, True)
+    assert code == 2 or ("robot" in sentence) or ("avr" in sentence) or re.search(r"0\.00\d\d  ready\n", done.stdout)
+
+
+class Typing(Onlooker):
+    """Types those texts, each once the run is that old (s)."""
+
+    def __init__(self, **texts: str) -> None:
+        self.texts = {float(time.removeprefix("at_").replace("_", ".")): text for time, text in texts.items()}
+
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+        for due_s in [due_s for due_s in self.texts if due_s <= time_s + 1e-9]:
+            yield Typed(self.texts.pop(due_s))
+
+
+def run(program: Path, folder: Path, seconds: float, typed: Typing) -> RunResult:
+    request = Request.single(brain=program, arena="empty", seconds=seconds, without=["slip"])
+    with locked(folder) as kept:
+        result: RunResult = execute(request, None, kept, typed)
+    return result
+
+
+def test_what_is_typed_reaches_the_program_and_its_run_is_repeated_bit_by_bit(program: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copy(program, tmp_path))
+    result = run(copy, tmp_path / "run", 0.3, Typing(at_0="lost", at_0_1="hello"))
+    assert b"".join(data for _, data in result.record.rows("to_host")) == b"ready\r\nHELLO"
+    assert result.error is None and result.touched == 2
+    copy.unlink()  # the record has it
+    again = command("replay", tmp_path / "run", "--again")
+    assert again.returncode == 0 and "bit-equal" in again.stdout, again.stderr
+    read = read_run(tmp_path / "run").robots[0]
+    assert (read.program, read.hash) == (result.program, result.hash)
+
+
+def test_its_pulses_turn_the_wheel_on_that_pin(program: Path, tmp_path: Path) -> None:
+    """The left servo alone goes forward for a second: the robot turns right about its right wheel."""
+    result = run(program, tmp_path, 2.0, Typing(at_0_1="s"))
+    assert result.truth is not None
+    angle = result.truth.heading[-1] - result.truth.heading[0]
+    assert angle < -0.5
+    assert result.true_distance == pytest.approx(-angle * 0.105 / 2, rel=0.05)
+
+
+def test_a_program_that_runs_wild_is_one_sentence_with_its_place(program: Path, tmp_path: Path) -> None:
+    done = command("run", program, "--seconds", "1", "--realtime", "--out", tmp_path, typed="")
+    assert done.returncode == 0
+    result = run(program, tmp_path, 1.0, Typing(at_0_1="!"))
+    assert isinstance(result.error, BoardError)
+    assert re.search(r"crashed at 0\.1\d\d s: .* goes to 0x7E00, but ends at 0x", str(result.error))
+    assert result.run_time == pytest.approx(0.1, abs=0.02)
+    read = read_run(tmp_path).robots[0]
+    assert str(read.error) == str(result.error)
+
+
+def test_elf_and_hex_do_the_same(program: Path) -> None:
+    one, other = (boebot.run(path, seconds=0.2) for path in (program, program.with_suffix(".hex")))
+    assert one.hash == other.hash and one.program != other.program
+
+
+def test_brain_and_program_share_a_world(program: Path) -> None:
+    results = boebot.run_together([boebot.Member(brain=program), boebot.Member(brain="wander")], "room", 1.0, on="avr")
+    program_run, brain_run = results.robots
+    assert program_run.program and program_run.record.count("to_host") == 7
+    assert brain_run.program is None and brain_run.steps > 10
+
+
+def test_csv_has_no_columns_of_what_the_host_does_not_know(program: Path, tmp_path: Path) -> None:
+    boebot.run(program, seconds=0.1, out=tmp_path)
+    assert command("report", tmp_path, "--as", "csv").returncode == 0
+    heading = (tmp_path / "run.csv").read_text().splitlines()[0].split(",")
+    assert heading == ["time_s", "tick", "true_x_m", "true_y_m", "true_heading_rad", "true_contact"]
+    assert (tmp_path / "to_host.bin").read_bytes() == b"ready\r\n"
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["program_hash"] == hashlib.sha256(program.read_bytes()).hexdigest()
