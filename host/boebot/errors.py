@@ -59,6 +59,12 @@ class InterruptedRunError(BoebotError):
     """Ctrl-C ended a run; its figures are printed and its files written."""
 
 
+class CallError(BoebotError):
+    """Something is asked for that does not go together, or is not there: wrong usage."""
+
+    exit_code = 2
+
+
 class RobotError(BoebotError):
     """A robot description is wrong."""
 

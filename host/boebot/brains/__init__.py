@@ -33,7 +33,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from boebot import arguments, slips
-from boebot.errors import BrainError, as_utf8, did_you_mean
+from boebot.errors import BrainError, CallError, as_utf8, did_you_mean
 from boebot.pausable_thread import leave_copy
 from boebot.robot import Robot
 
@@ -107,6 +107,20 @@ def bundled_files() -> dict[str, Path]:
     return {path.stem: path for path in FOLDER.iterdir() if path.suffix in (PYTHON, TOML) and path.stem[0] != "_"}
 
 
+def load_program(source: object) -> LoadedBrain | None:
+    """The program for the board in a file; None: that names no such file.
+
+    Raises:
+        CallError: it is not there.
+    """
+    if not isinstance(source, str | Path) or Path(source).suffix not in PROGRAMS:
+        return None
+    path = Path(source)
+    if not path.is_file():
+        raise CallError(f"there is no program {path}; expected an ELF or HEX file")
+    return LoadedBrain(as_utf8(path.name), lambda robot: None, path=path.resolve())
+
+
 def load_brain(source: object) -> LoadedBrain:
     """The brain in a file, of a bundled name, or the function, class, object or module itself.
 
@@ -117,8 +131,6 @@ def load_brain(source: object) -> LoadedBrain:
         return source
     if isinstance(source, str | Path):
         path = _find(source)
-        if path.suffix in PROGRAMS:
-            return LoadedBrain(as_utf8(path.name), lambda robot: None, path=path)
         if path.suffix == TOML:
             from boebot.brain import composition
 
@@ -210,10 +222,12 @@ def _first_line(error: BaseException) -> str:
 
 def _find(source: str | Path) -> Path:
     path = Path(source)
-    if path.suffix in (PYTHON, TOML, *PROGRAMS) or len(path.parts) > 1:
+    if path.suffix in PROGRAMS:
+        raise BrainError(f"{path} is a program for a board; expected a brain, a Python or TOML file")
+    if path.suffix in (PYTHON, TOML) or len(path.parts) > 1:
         if path.is_file():
             return path.resolve()
-        raise BrainError(f"there is no file {path}; expected a Python or TOML file, or a program, ELF or HEX")
+        raise BrainError(f"there is no brain file {path}; expected a Python or TOML file")
     files = bundled_files()
     if str(source) in files:
         return files[str(source)]

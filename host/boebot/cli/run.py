@@ -14,11 +14,12 @@ import typer
 from boebot.brains import PROGRAMS, bundled
 from boebot.cli import options, output, quantity, streams
 from boebot.cli.ending import detail, end
-from boebot.errors import BoebotError, MissingTextError
+from boebot.errors import BoebotError, CallError, MissingTextError
 from boebot.record import run_folder
 from boebot.running.tasks import Member, Request
 
 DEFAULT_ROBOT = "shieldbot"
+SECONDS = 60.0
 TURN = 2 * math.pi + 1e-9  # rad
 _HELP = f"""Let a brain drive a robot, and say what happened.
 
@@ -78,7 +79,7 @@ def run(
     arena: options.ArenaName = None,
     seconds: Annotated[
         float, typer.Option(metavar="TIME", parser=quantity.parser("s"), help="Length of the run by the board's clock.")
-    ] = 60.0,
+    ] = SECONDS,
     seed: options.Seed = 1,
     period: options.Period = None,
     without: options.Without = None,
@@ -140,6 +141,8 @@ def run(
     """See `_HELP`."""
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
     ideal, imperfect = options.names(without), options.magnitudes(imperfection)
+    if timeout is not None and seconds != SECONDS:
+        raise CallError("--seconds and --timeout both say how long the run is; expected one of them")
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     assigned = _assigned(parameters or [], count)

@@ -248,7 +248,9 @@ class Run:
 
     @property
     def whiskers(self) -> list[str]:
-        """Names of the robot's whiskers."""
+        """Names of the robot's whiskers that are read; none where a program drives it, which does not say."""
+        if self.program:
+            return []
         return [name for name, device in self.robot.device.items() if device.on and device.READING is Whisker]
 
     @property

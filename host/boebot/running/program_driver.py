@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from boebot.boards import BoardSession
 from boebot.devices.readings import Readings
 from boebot.errors import BoardError, MissingTextError, printable
+from boebot.link.messages import Status as StatusBits
 from boebot.link.transport import Following
 from boebot.robot import Robot
 from boebot.running.driver import TICK_S, Driver, Status, step_limit
@@ -69,7 +70,7 @@ class ProgramDriver(Driver):
         self._monitor.wait(self._line.now())
 
     def _put_aside(self, time_s: float, tick: int) -> None:
-        self.task.record.append_readings(time_s, Readings(tick, 0, (), ()), 0.0, 0.0)
+        self.task.record.append_readings(time_s, Readings(tick, int(StatusBits.MOTORS_ENABLED), (), ()), 0.0, 0.0)
 
     def type(self, text: str) -> None:
         """See `boebot.running.driver.Driver`."""

@@ -16,7 +16,7 @@ from boebot.boards import DIRECT, BoardRequest, default_board, is_live
 from boebot.brains import LoadedBrain
 from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
-from boebot.errors import BoebotError, BrainError, NotRealisableError
+from boebot.errors import BoebotError, BrainError, CallError, NotRealisableError
 from boebot.guests import CHECKS, guests
 from boebot.imperfections import checked
 from boebot.record.brain_record import MadeOf
@@ -47,7 +47,8 @@ class _NamesFiles:
     def __post_init__(self) -> None:
         for name in vars(self).keys() & {"arena", "brain", "robot"}:
             value = getattr(self, name)
-            is_name = not isinstance(value, str | Path) or Path(value).suffix not in (brains.PYTHON, brains.TOML, *brains.PROGRAMS)
+            suffixes = (brains.PYTHON, brains.TOML, *brains.PROGRAMS)
+            is_name = not isinstance(value, str | Path) or Path(value).suffix not in suffixes
             if not is_name and os.path.isfile(value):  # noqa: PTH113 (no error where it is too long)
                 object.__setattr__(self, name, Path(value).absolute())
 
@@ -235,14 +236,14 @@ def _board_of_programs(request: Request, tasks: Sequence[Task]) -> str:
     """What programs run on.
 
     Raises:
-        BoebotError: something else is asked for.
+        CallError: something else is asked for.
     """
     for task in tasks:
         name, robot = task.brain.name, task.board.robot
         if task.brain.is_program and not robot.has_board:
-            raise BoebotError(f"{name} is a program for a board, and robot {robot.name!r} has none")
+            raise CallError(f"{name} is a program for a board, and robot {robot.name!r} has none")
     if request.on not in (None, PROGRAM_BOARD):
-        raise BoebotError(f"a program runs on the emulated ATmega328P, {PROGRAM_BOARD!r}; got {request.on!r}")
+        raise CallError(f"a program runs on the emulated ATmega328P, {PROGRAM_BOARD!r}; got {request.on!r}")
     return PROGRAM_BOARD
 
 
@@ -313,7 +314,7 @@ def prepare(
     expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
     expect("period", period, "seconds or None", Real, type(None))
     description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
-    loaded = brains.load_brain(brain)
+    loaded = brains.load_program(brain) or brains.load_brain(brain)
     period_s = float(period if period is not None else loaded.period or DEFAULT_PERIOD)
     if description.has_board:
         check_time_to_live(period_s)
