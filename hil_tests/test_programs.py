@@ -78,7 +78,7 @@ def command(*arguments: object, typed: str = "") -> subprocess.CompletedProcess[
 
 
 @pytest.mark.parametrize("baud", [2400, 38400])
-def test_the_monitor_has_the_rate_that_the_program_sets(build: Callable[[int], Path], baud: int, tmp_path: Path) -> None:
+def test_the_monitor_has_the_rate_of_the_program(build: Callable[[int], Path], baud: int, tmp_path: Path) -> None:
     run = boebot.run(build(baud), seconds=0.1, out=tmp_path)
     rows = run.record.rows("to_host")
     assert b"".join(data for _, data in rows) == b"ready\r\n"
@@ -92,7 +92,11 @@ def test_the_monitor_has_the_rate_that_the_program_sets(build: Callable[[int], P
     [
         (("--expect-text", "ready"), 0, ""),
         (("--timeout", "100"), 0, ""),
-        (("--expect-text", "no such", "--timeout", "100"), 42, "did not print what was expected, 'no such' within 0.1 s"),
+        (
+            ("--expect-text", "no such", "--timeout", "100"),
+            42,
+            "did not print what was expected, 'no such' within",
+        ),
         (("--expect-text", "no such", "--timeout", "100", "--timeout-exit-code", "7"), 7, "did not print"),
         (("--fail-text", "ead"), 1, "the program printed 'ead'; expected that it does not"),
         (("--timeout", "0"), 2, "--timeout"),

@@ -176,7 +176,9 @@ def run(
         with contextlib.ExitStack() as shown:
             title = name if on is None else f"{name} on {on}"
             progress = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
-            run_it = shown.enter_context(options.runner(view=view, speed=speed, port=view_port, waits=True, types=types))
+            run_it = shown.enter_context(
+                options.runner(view=view, speed=speed, port=view_port, waits=True, types=types)
+            )
             shown.enter_context(streams.kept(for_the_answer=json))
             result = run_it(request, progress, folder)
         try:

@@ -123,9 +123,8 @@ class _Memory:
         if not data or address >= OTHER_SPACES:
             return
         if at < 0 or at + len(data) > len(into):
-            raise AnalysisError(
-                f"{self._what} cannot be loaded: its {len(data)} bytes at address 0x{address:X} do not fit into an {CHIP}"
-            )
+            what = f"its {len(data)} bytes at address 0x{address:X}"
+            raise AnalysisError(f"{self._what} cannot be loaded: {what} do not fit into an {CHIP}")
         into[at : at + len(data)] = data
         if into is self._flash:
             self.flash_end = max(self.flash_end, at + len(data))

@@ -237,8 +237,9 @@ class Run:
     @cached_property
     def hash(self) -> str | None:
         """SHA-256 of what really happened and of what the brain commanded, step by step, in hexadecimal digits; of a
-        real robot of the commands; where a program drove it, of what it printed in place of commands. Runs that are equal have the same (docs/reference/run-files.md). Of a record that
-        is cut: of what it holds. None: the run was not recorded."""
+        real robot of the commands; where a program drove it, of what it printed in place of commands. Runs that are
+        equal have the same (docs/reference/run-files.md). Of a record that is cut: of what it holds. None: the run was
+        not recorded."""
         return self.record.digest("truth", "to_host" if self.program else "command") if self.is_recorded else None
 
     @property

@@ -1,7 +1,8 @@
 """The serial monitor of a program: what it prints, line by line with its time, and what to look for in it.
 
-Bytes become text as UTF-8; what is none is shown as escapes such as \\xff. A line ends with \\n; a \\r before it belongs to
-the end. A line that has no end yet is shown once the program has printed nothing for a while, so that a prompt is seen.
+Bytes become text as UTF-8; what is none is shown as escapes such as \\xff. A line ends with \\n; a \\r before it
+belongs to the end. A line that has no end yet is shown once the program has printed nothing for a while, so that a
+prompt is seen.
 """
 
 from __future__ import annotations

@@ -19,7 +19,6 @@ from boebot.running.monitor import Monitor
 from boebot.running.tasks import Task
 
 
-
 class ProgramDriver(Driver):
     """See `boebot.running.driver.Driver`. Its `layout` is empty: the host reads no device."""
 

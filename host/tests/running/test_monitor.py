@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from boebot.running.monitor import LINE_MAXIMUM, PATIENCE_S, Monitor
 
 
-def heard(*pieces: tuple[float, bytes], expected: str = "", unwanted: str = "") -> tuple[Monitor, list[tuple[float, str]]]:
+def heard(
+    *pieces: tuple[float, bytes], expected: str = "", unwanted: str = ""
+) -> tuple[Monitor, list[tuple[float, str]]]:
     shown: list[tuple[float, str]] = []
     monitor = Monitor(lambda time_s, line: shown.append((time_s, line)), expected, unwanted)
     for time_s, data in pieces:
