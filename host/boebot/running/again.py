@@ -209,8 +209,8 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         step_timeout=math.inf,
         force_timing=asked["force_timing"],
         pins=asked.get("pins", False),
-        expect_text=asked["expect_text"],
-        fail_text=asked["fail_text"],
+        expect_text=asked.get("expect_text", ""),
+        fail_text=asked.get("fail_text", ""),
     )
 
 
