@@ -82,7 +82,9 @@ class Load:
 
     def requests(self, row: InterruptRow, constants: Constants) -> list[Source]:
         """What asks for an interrupt at the worst, one by one; a noisy line stops its interrupt soon."""
-        return densest(row, constants) if self.is_overload and row.vector == ENCODERS else self.sources(row, 1)
+        if self.is_overload and row.vector == ENCODERS:  # those of a storm, before it masks itself
+            return [Stream(close=constants.changes_storm - 1).source(row, 1)]
+        return self.sources(row, 1)
 
 
 _EDGE_TO_EDGE = 9_600  # of servo pulses and ends of bursts, the closest: the turret's shortest pulse, 600 us (servo.h)
@@ -125,8 +127,11 @@ SENT_WHILE_BUSY = (
     (127 + _LONGEST_OF_POLL, 1 << 30),
     (_TELEMETRY + _DEVICES + _OWN + _LONGEST + 2 * _EVENT + _ANSWERS, TICK),
 )
-# What a board says by itself, at its fastest.
-_SENDING = Stream(BYTE, parts=((_TELEMETRY, TICK), (_DEVICES, 2 * TICK), (_OWN, 4 * TICK), (_HELLO, 20 * TICK)))
+# What a board says by itself, at its fastest. The first byte goes on to the shift register, and a second is asked for
+# at once (data sheet, 20.6.3: UDRE0).
+_SENDING = Stream(
+    BYTE, close=1, parts=((_TELEMETRY, TICK), (_DEVICES, 2 * TICK), (_OWN, 4 * TICK), (_HELLO, 20 * TICK))
+)
 # 100,000 edges/s stop the interrupt after some five, and then the line until the tick ends; two ticks may be close.
 _LIGHT = Stream(2 * TICK)  # the edge of a light sensor, once in a servo frame
 _NOISE = Stream(160, ((16, TICK),))
@@ -155,7 +160,7 @@ LOADS: dict[str, Load] = {
         "100,000 edges/s on one",
         {
             RECEIVE: (Stream(BYTE),),
-            SEND: (Stream(BYTE),),
+            SEND: (Stream(BYTE, close=1),),
             ENCODERS: (*(Stream(16_000_000 // 4_000),) * 3, _NOISE),  # what comes on a noisy line is its noise
             EDGE: (_SERVO_EDGES,),
             CARRIER: (_SWEEP,),
@@ -185,28 +190,10 @@ LOADS["everything"] = replace(
 )
 
 
-# What can come at the worst, whatever the load, where the table's interval is not the least.
-_DENSEST: dict[int, Stream] = {
-    CARRIER: _SWEEP,
-    CAPTURE: _ECHOES,
-    EDGE: _SERVO_EDGES,
-    SEND: Stream(close=1),  # the first byte goes on to the shift register at once
-    EEPROM: Stream(close=1),  # ready when it is first asked
-    TWO_WIRE: _COMPASS,
-}
-
-
 # Never together, by the slots of a servo frame (tasks.def): no edge of a servo comes within 2,500 cycles of a burst,
 # and a burst, which begins with a slot, has ended long before the next one.
 NEVER_NEAR = (EDGE, CARRIER)
 APART = {EDGE: frozenset({CARRIER}), SLOT: frozenset({CARRIER})}
-
-
-def densest(row: InterruptRow, constants: Constants) -> list[Source]:
-    """The most requests of an interrupt in any time, one by one."""
-    if row.vector == ENCODERS:  # those of a storm, before it masks itself
-        return [Stream(close=constants.changes_storm - 1).source(row, 1)]
-    return [_DENSEST.get(row.vector, Stream()).source(row, 1)]
 
 
 def load_named(name: str) -> Load:

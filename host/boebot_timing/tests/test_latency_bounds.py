@@ -11,7 +11,7 @@ from avr_timing.program import Program
 from boebot import resources
 from boebot.description import robots
 from boebot_timing.emulated.measure import run
-from boebot_timing.loads import ENCODERS, LOADS, TICK
+from boebot_timing.loads import ENCODERS, LOADS, SEND, TICK
 from boebot_timing.table import read_table
 
 pytestmark = pytest.mark.emulated
@@ -55,3 +55,17 @@ def test_noise_asks_no_oftener_than_the_overload_says() -> None:
     came = found.spans[(found.spans["id"] == ENCODERS) & (found.spans["begin"] >= found.loaded_from)]["begin"]
     in_a_tick = np.searchsorted(came, came + TICK) - np.arange(len(came))
     assert 100 < in_a_tick.max() <= sum(one.requests(TICK) for one in LOADS["overload"].sources(row, 1))
+
+
+@pytest.mark.parametrize("load", ["figures", "overload"])
+def test_sending_asks_no_oftener_than_the_load_says(load: str) -> None:
+    """The first byte goes on to the shift register, and the next is asked for at once: two within 100 cycles."""
+    (row,) = (row for row in read_table(IMAGE).interrupts if row.vector == SEND)
+    found = run(IMAGE, robots.load_robot("shieldbot-quad"), load, 0.1, seed=3, losses=False)
+    sent = found.spans[(found.spans["id"] == SEND) & (found.spans["begin"] >= found.loaded_from)]
+    asked = np.sort(sent["begin"].astype(np.int64) - sent["latency"])
+    assert np.diff(asked).min() < 100
+    (source,) = LOADS[load].sources(row, 1)
+    for more in range(1, 300):
+        closest = (asked[more:] - asked[:-more]).min()
+        assert more + 1 <= source.requests(int(closest) + 1), f"{more + 1} within {closest} cycles"
