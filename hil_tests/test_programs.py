@@ -14,7 +14,9 @@ from pathlib import Path
 import pytest
 
 import boebot
-from boebot.errors import BoardError
+from boebot.boards import BoardRequest, open_board
+from boebot.description.robots import load_robot
+from boebot.errors import BoardError, CallError
 from boebot.record.interventions import Deed, Typed
 from boebot.record.run_folder import locked
 from boebot.result import RunResult, read_run
@@ -182,3 +184,24 @@ def test_csv_has_no_columns_of_what_the_host_does_not_know(program: Path, tmp_pa
     assert (tmp_path / "to_host.bin").read_bytes() == b"ready\r\n"
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["program_hash"] == hashlib.sha256(program.read_bytes()).hexdigest()
+
+
+def test_a_robot_of_programs_is_driven_by_them_alone(program: Path, tmp_path: Path) -> None:
+    """Its left servo is on a pin that the kit's firmware has no servo on, and its uart is nobody's."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'extends = "shieldbot"\nname = "mine"\nfirmware = "none"\nremove = ["uart"]\n'
+        "[device.servo_left]\npin = 4\n[device.buzzer]\npin = 13"
+    )
+    result = boebot.run(program, robot=mine, arena="empty", seconds=0.2, expect_text="ready")
+    assert result.robot.name == "mine"
+    refused = "robot 'mine' has no firmware of the kit, .*; expected .*: boebot run FILE --robot mine"
+    with pytest.raises(CallError, match=refused):
+        boebot.run("wander", robot=mine)
+    for board in ("native", "avr", "/dev/null"):
+        with pytest.raises(CallError, match=refused):
+            open_board(board, BoardRequest(robot=load_robot(mine)))
+    for words in (["doctor", "avr"], ["timing"], ["serve", "--tcp", "0"]):
+        done = command(*words, "--robot", mine)
+        assert (done.returncode, done.stdout) == (2, ""), done.stderr
+        assert re.search(refused, " ".join(done.stderr.split()))

@@ -8,14 +8,14 @@ The kinds are found in the sources of `host/boebot/devices`, by the standard lib
 from __future__ import annotations
 
 import ast
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import robot_files
+
 ROOT = Path(__file__).resolve().parents[1]
 DEVICES = ROOT / "host" / "boebot" / "devices"
-ROBOTS = ROOT / "protocol" / "robots"
 STUB = DEVICES / "attributes.pyi"
 
 HEAD = '''"""Made by protocol/generate.py; do not edit."""
@@ -88,8 +88,8 @@ def readings() -> dict[str, set[str]]:
         by_tag[kind.tag] = f"{owner.module}.{owner.reading}"
         for usual in next((one.names for one in line if one.names), ()):
             found.setdefault(usual, set()).add(by_tag[kind.tag])
-    for path in sorted(ROBOTS.glob("*.toml")):
-        for device, table in tomllib.loads(path.read_text(encoding="utf-8")).get("device", {}).items():
+    for robot in robot_files.load_all():
+        for device, table in robot.devices.items() if robot.takes_brain else ():
             if table.get("type") in by_tag:
                 found.setdefault(device, set()).add(by_tag[table["type"]])
     return found

@@ -27,8 +27,13 @@ class Robot(NamedTuple):
 
     @property
     def pin_map(self) -> str:
-        """Of the board's firmware; "" without a board."""
-        return str(self.table.get("pin_map", "")) if self.table["board"] != NO_BOARD else ""
+        """Of the board's firmware; "" without a board, and where it runs none of the kit's."""
+        return str(self.table.get("pin_map", "")) if self.table["board"] != NO_BOARD and self.takes_brain else ""
+
+    @property
+    def takes_brain(self) -> bool:
+        """Whether a brain can drive it: by the kit's firmware, or directly."""
+        return bool(self.table.get("firmware", "kit") == "kit")
 
     @property
     def has_image(self) -> bool:

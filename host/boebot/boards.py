@@ -303,6 +303,7 @@ def open_world(url: str, requests: Sequence[BoardRequest]) -> World:
         check_board(url, robot)
     if is_live(url):
         (request,) = requests
+        request.robot.expect_kit()
         if request.without or request.imperfections:
             raise BoardError(f"the robot at {url!r} is as it is built: imperfections are for simulated runs")
         if request.pose is not None:

@@ -273,6 +273,7 @@ def _robot(path: Path, reader: _LogReader, robot: str | None) -> RobotDescriptio
     if robot is None and name not in robot_names():
         raise BoebotError(f"the board in {path} says that it is {name!r}, which is no bundled robot; expected --kind")
     described = load_robot(robot or name)
+    described.expect_kit()
     if not described.has_board:
         raise BoebotError(f"robot {described.name!r} has no board; expected one like that in {path}, {name!r}")
     other = {}

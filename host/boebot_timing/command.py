@@ -113,6 +113,7 @@ def timing(
         if seed < 0:
             raise TimingError(f"{seed} is no seed; expected --seed 0 or more")
         description = load_robot(robot)
+        description.expect_kit()
         asked = loads.load_named(load)
         if out is not None:
             make_folder(out)
@@ -204,6 +205,7 @@ def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
     """
     if elf is not None or not robot.has_board:
         return elf
+    robot.expect_kit()
     image = resources.folder("images") / f"{robot.pin_map}.elf"
     if not image.is_file():
         raise TimingError(f"there is no image {image}; {resources.remedy('firmware')}, or name one by --elf F")

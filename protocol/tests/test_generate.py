@@ -115,7 +115,16 @@ def test_an_older_python_gets_one_sentence() -> None:
     assert (done.returncode, done.stderr) == (1, sentence)
 
 
-@pytest.mark.parametrize("name", [name for name in robot_names() if load_robot(name).has_board])
+def test_a_robot_of_programs_has_no_image(tmp_path: Path) -> None:
+    file = tmp_path / "lab.toml"
+    file.write_text('extends = "shieldbot"\nname = "shieldbot"\nfirmware = "none"\n[device.buzzer]\npin = 5')
+    lab = robot_files.load(file)
+    assert (lab.pin_map, lab.has_image, lab.takes_brain) == ("", False, False)
+
+
+@pytest.mark.parametrize(
+    "name", [one.name for one in map(load_robot, robot_names()) if one.has_board and one.takes_brain]
+)
 def test_the_generator_and_the_library_read_robots_alike(name: str) -> None:
     ours, library = robot_files.load(PROTOCOL / "robots" / f"{name}.toml"), load_robot(name)
     assert ours.pin_map == library.pin_map

@@ -9,7 +9,7 @@ import pytest
 from boebot.description.robots import load_robot, robot_names
 from boebot.devices.device import pin_name, pin_number
 from boebot.devices.encoder import QuadratureEncoder
-from boebot.errors import RobotError
+from boebot.errors import CallError, RobotError
 
 
 def variant(tmp_path: Path, text: str) -> Path:
@@ -108,9 +108,8 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
             r"variant\.toml:4: device\.buzzer\.pin: whisker_left and buzzer cannot share pin 5",
         ),
         (
-            "[device.ping_rear]\ntype = 'ping'\npin = 8\nposition_m = [0, 0]\nheading_rad = 0.0\nbeam_rad = 0.7\n"
-            "range_min_m = 0.02\nrange_max_m = 3.0\nperiod_ticks = 5",
-            "device.ping_rear is ping; expected the name ping, which the firmware knows",
+            "remove = ['compass']\n[device.feeler]\ntype = 'whisker'\npin = 'A5'\nroot_m = [0, 0]\ntip_m = [1, 0]",
+            "device.feeler is whisker; expected the name whisker_left or whisker_right, which the firmware knows; ",
         ),
         (
             "remove = ['light_right']\n[device.horn]\ntype = 'buzzer'\npin = 6",
@@ -132,7 +131,10 @@ def test_classic_robots_servos_run_on_the_pack_and_the_shieldbots_on_the_regulat
         ("[body]\nmass_kg = inf", "body.mass_kg: expected a finite number"),
         ("[device.infrared_left]\nheading_rad = nan", "device.infrared_left.heading_rad: expected a finite number"),
         ("remove = 'ping'", "remove: expected a list of devices, got 'ping'"),
-        ("remove = ['uart']", "device.uart is missing or off; every robot needs it"),
+        (
+            "remove = ['uart']",
+            'device.uart is missing or off; the kit\'s firmware needs it; or firmware = "none" for a robot that runs',
+        ),
         ("[device.servo_left]\non = false", r"variant\.toml:2: device\.servo_left is missing or off"),
         ("[device.light_right]\npin = 10", "light_right.pin is pin 10, which cannot do that; expected 0, 1, 2"),
         (
@@ -153,6 +155,52 @@ def test_wrong_type_at_the_top_is_refused(tmp_path: Path, text: str) -> None:
     file = tmp_path / "odd.toml"
     file.write_text(text)
     with pytest.raises(RobotError, match=r"odd\.toml: (extends|device): expected"):
+        load_robot(file)
+
+
+PROGRAMS = 'firmware = "none"\nremove = ["uart", "encoder_left"]\n'
+
+
+def test_a_robot_of_programs_has_any_device_on_any_pin_under_any_name(tmp_path: Path) -> None:
+    """What only the kit's firmware needs binds no robot that does not run it: names, its pins, timers, devices that are
+    off, those that are always there; and devices that only hear share a pin."""
+    robot = load_robot(
+        variant(
+            tmp_path,
+            PROGRAMS
+            + "[device.servo_left]\npin = 6\n"  # light_right's, which is off
+            + "[device.encoder_right]\npin = 13\n"
+            + "[device.horn]\ntype = 'buzzer'\npin = 6\n"
+            + "[device.ping_rear]\ntype = 'ping'\npin = 2\nposition_m = [0, 0]\nheading_rad = 3.0\nbeam_rad = 0.7\n"
+            + "range_min_m = 0.02\nrange_max_m = 3.0\nperiod_ticks = 5\n"
+            + "[device.infrared_right]\non = false",
+        )
+    )
+    assert not robot.takes_brain and robot.device["servo_left"].pins() == {"": 6}
+    with pytest.raises(CallError, match=r"expected a program of your own: boebot run FILE --robot shieldbot$"):
+        robot.expect_kit()
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[device.ping]\npin = 7", r"variant\.toml:5: device\.ping\.pin: whisker_right and ping cannot share pin 7$"),
+        ("[device.ping]\npin = 20", "there is no pin 20"),
+        (
+            "[device.battery]\non = true\npin = 4",
+            r"variant\.toml:6: device\.battery\.pin is pin 4, which cannot do that; expected A0, A1, A2, A3, A4, A5$",
+        ),
+    ],
+)
+def test_what_hurts_any_board_is_refused_in_a_robot_of_programs_too(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(RobotError, match=sentence):
+        load_robot(variant(tmp_path, PROGRAMS + text))
+
+
+def test_a_robot_without_a_board_runs_no_programs(tmp_path: Path) -> None:
+    file = tmp_path / "lab.toml"
+    file.write_text("extends = 'arsim'\nfirmware = 'none'")
+    with pytest.raises(RobotError, match=r"lab\.toml:2: firmware is 'none', but a robot without a board runs none"):
         load_robot(file)
 
 

@@ -139,15 +139,27 @@ static void *new_part(robot *r, size_t size) {
   return calloc(1, size);
 }
 
+/* Whether one of the robot's parts drives that pin. */
+static int is_driven(const robot *r, uint8_t pin) {
+  int found = 0;
+  for (int i = 0; i < r->part_count; i++) {
+    for (int k = 0; k < PART_PINS; k++) {
+      const part_pin *other = &r->parts[i]->pins[k];
+      found |= other->pin == pin && (other->role & PART_DRIVES) != 0;
+    }
+  }
+  return found;
+}
+
 /* The robot has the part from now on; it hears its pins, beginning with what the board does to them now. A part is
- * refused, and freed, where another one hears one of its pins already, or gives the voltage there. */
+ * refused, and freed, where another one drives one of its pins or gives the voltage there, or as many as can hear it do. */
 static int join(robot *r, part *p) {
   for (int i = 0; i < PART_PINS; i++) {
     const uint8_t pin = p->pins[i].pin;
     if (!is_pin(pin)) continue;
-    const int heard = (p->pins[i].role & PART_HEARS) && r->hears[pin] != NULL;
+    const int full = (p->pins[i].role & PART_HEARS) && r->hears[pin][HEARING_PARTS - 1] != NULL;
     const int given = (p->pins[i].role & PART_ANALOG) && r->analog[pin - BOARD_FIRST_ANALOG_PIN] != NULL;
-    if (!heard && !given) continue;
+    if (!full && !given && !((p->pins[i].role & PART_DRIVES) && is_driven(r, pin))) continue;
     free(p);
     return SIM_PIN_TAKEN;
   }
@@ -157,7 +169,9 @@ static int join(robot *r, part *p) {
     if (!is_pin(pin)) continue;
     if (p->pins[i].role & PART_ANALOG) r->analog[pin - BOARD_FIRST_ANALOG_PIN] = p;
     if (!(p->pins[i].role & PART_HEARS)) continue;
-    r->hears[pin] = p;
+    part **last = r->hears[pin];
+    while (*last != NULL) last++;
+    *last = p;
     const uint8_t level = r->board->op->output(r->board, pin);
     if (level != BOARD_LOW) p->op->edge(p, r->board->op->now(r->board), pin, level);
   }

@@ -33,7 +33,7 @@ enum {
   SIM_WRONG_BOARD = -2,
   SIM_BAD_ARGUMENT = -3,
   SIM_NOT_FREE = -4,  /* something is in that place: arena, obstacle on its way, robot */
-  SIM_PIN_TAKEN = -5, /* another device listens there */
+  SIM_PIN_TAKEN = -5, /* another device drives that pin, or too many hear it */
 };
 
 /* One row of the truth. */

@@ -11,8 +11,9 @@ void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
   robot *self = context;
   if (pin >= BOARD_PIN_COUNT) return;
   edge_log_add(&self->edges, cycle, pin, level);
-  part *p = self->hears[pin];
-  if (p != NULL && !p->unplugged) p->op->edge(p, cycle, pin, level);
+  for (part **p = self->hears[pin]; *p != NULL; p++) {
+    if (!(*p)->unplugged) (*p)->op->edge(*p, cycle, pin, level);
+  }
 }
 
 double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {

@@ -11,6 +11,7 @@
 #include "world/world.h"
 
 #define SIM_NEVER UINT64_MAX
+#define HEARING_PARTS 7 /* at most, at one pin */
 
 /* A moving shape's clock as the record of waits has it. */
 typedef struct {
@@ -28,7 +29,7 @@ struct robot {
   chassis chassis;
   part **parts;
   int part_count;
-  part *hears[BOARD_PIN_COUNT];
+  part *hears[BOARD_PIN_COUNT][HEARING_PARTS + 1]; /* of each pin, up to the first NULL */
   part *analog[BOARD_ANALOG_COUNT];
   brown_out brown_out;
   battery *battery;   /* NULL: a supply that never sags */

@@ -21,7 +21,7 @@
 
 #define PART_GUARD BOARD_GUARD_CYCLES
 #define PART_NO_PIN 255u
-#define PART_PINS 2 /* at most, of one part */
+#define PART_PINS 8 /* at most, of one part */
 
 /* What a part does with its pin. */
 enum {

@@ -67,7 +67,7 @@ def done(status: int, what: str) -> None:
     if status == lib.SIM_NO_MEMORY:
         raise MemoryError("simulation")
     why = {
-        lib.SIM_PIN_TAKEN: "another device listens on its pins",
+        lib.SIM_PIN_TAKEN: "another device drives one of its pins, or too many listen there",
         lib.SIM_WRONG_BOARD: "it was built for another interface of boards",
     }
     raise BoardError(f"{what} cannot be joined to the simulation: {why.get(status, 'a value is out of its range')}")

@@ -181,6 +181,8 @@ def _add(sim: Sim, kind: BoardKind | None, request: BoardRequest, pose: tuple[fl
     board = None
     if kind is not None and request.robot.has_board:
         image = request.image
+        if image is None:
+            request.robot.expect_kit()
         board = kind.make(kind.find(request.robot.pin_map) if image is None else image_file(image))
     try:
         return sim.add(board, request.robot, pose=pose, without=request.without, imperfections=request.imperfections)

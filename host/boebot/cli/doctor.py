@@ -84,6 +84,7 @@ def doctor(
     description = load_robot(robot)
     if not description.has_board:
         raise BoebotError(f"robot {description.name!r} has no board: there is nothing to examine")
+    description.expect_kit()
     if identity or watch:
         if url is None:
             ports = _ports()

@@ -17,7 +17,7 @@ from boebot.arenas import arena_names, load_arena
 from boebot.brain.process import MotorBehavior
 from boebot.brains import bundled_files
 from boebot.cli import options, output
-from boebot.description.robots import load_robot, robot_names
+from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import did_you_mean
 from boebot.guests import LISTS, guests
 from boebot.imperfections import imperfections, switches
@@ -69,7 +69,13 @@ def _print(rows: Sequence[Row]) -> None:
 
 def _robots() -> list[Row]:
     found = (load_robot(name) for name in robot_names())
-    return [{"name": one.name, "title": one.title, "on": "a board" if one.has_board else "direct"} for one in found]
+    return [{"name": one.name, "title": one.title, "on": _runs_on(one)} for one in found]
+
+
+def _runs_on(robot: RobotDescription) -> str:
+    if not robot.takes_brain:
+        return "programs of your own"
+    return "a board" if robot.has_board else "direct"
 
 
 def _arenas() -> list[Row]:

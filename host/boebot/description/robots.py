@@ -22,7 +22,7 @@ from boebot.devices.battery import Energy
 from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_number
 from boebot.devices.encoder import WheelEncoder
 from boebot.devices.motor import Motor
-from boebot.errors import RobotError, did_you_mean
+from boebot.errors import CallError, RobotError, did_you_mean
 from boebot.imperfections import Imperfection, imperfections, switched_off, unknown
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -106,6 +106,8 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """of a robot without a board; "arsim": as the notes' simulator computes it, with R / 2 in the speeds of the motors'
     axes, each step of the odometer laid off at the heading after it, and the damping of ARSim 1.2."""
     pin_map: str = ""  # of the board's firmware
+    firmware: Literal["kit", "none"] = "kit"
+    """what its board runs; "none": programs of one's own, on whatever pins it is wired to, and nothing of the kit's"""
     supply: Supply | None = None  # of the board; a robot without a board has none
     unit: Annotated[int, msgspec.Meta(ge=0, lt=1 << 32)] | None = None
     """serial number of a simulated robot: what its parts are like is drawn by it and stays from run to run, whatever
@@ -117,6 +119,19 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     def has_board(self) -> bool:
         """Whether a board drives it; otherwise motor signals do, in the simulated world only."""
         return self.board != NO_BOARD
+
+    @property
+    def takes_brain(self) -> bool:
+        """Whether a brain can drive it: by the kit's firmware, or directly."""
+        return self.firmware == "kit"
+
+    def expect_kit(self) -> None:
+        """Raises CallError where nothing of the kit's runs on its board."""
+        if not self.takes_brain:
+            raise CallError(
+                f"robot {self.name!r} has no firmware of the kit, and so neither brain, image nor link; expected a "
+                f"program of your own: boebot run FILE --robot {self.name}"
+            )
 
     @property
     def encoder_gap_us(self) -> float:
@@ -227,7 +242,9 @@ def _faults(robot: RobotDescription, path: Path) -> Faults:
     elif not supply.full_v > supply.empty_v:
         yield "supply.full_v", f" is {supply.full_v:g}; expected more than empty_v, {supply.empty_v:g} V"
     yield from _pin_faults(robot)
-    yield from _image_faults(robot, path)
+    if robot.takes_brain:
+        yield from _kit_faults(robot)
+        yield from _image_faults(robot, path)
 
 
 def _device_faults(robot: RobotDescription) -> Faults:
@@ -252,34 +269,58 @@ def _imperfection_faults(robot: RobotDescription) -> Faults:
             yield f"imperfections.{name}", fault
 
 
+_OWN = '; or firmware = "none" for a robot that runs programs of your own'
+"""Ends a sentence about what only the kit's firmware cannot do."""
+
+
 def _pin_faults(robot: RobotDescription) -> Faults:
-    """Devices that cannot share a pin or a unit of the chip (ATmega328P data sheet); both are named."""
-    pin_owner: dict[int, str] = {}
-    unit_owner: dict[str, tuple[str, str]] = {}
+    """Pins that cannot do what is asked of them, and devices that cannot share one, both of which are named. A device
+    that is off has its pins in the kit's images, too."""
+    owners: dict[int, tuple[str, bool]] = {}
     for name, device in robot.device.items():
-        kind = device.__struct_config__.tag
         if isinstance(device, VehicleDevice):
-            yield f"device.{name}", f" is {kind}, which only a robot without a board can have"
-        if name not in device.NAMES:
-            known = " or ".join(device.NAMES)
-            yield f"device.{name}", f" is {kind}; expected the name {known}, which the firmware knows"
+            yield f"device.{name}", f" is {device.__struct_config__.tag}, which only a robot without a board can have"
         for field in device.PINS:
+            place = f"device.{name}.{field}"
             try:
                 pin = pin_number(getattr(device, field))
             except ValueError as error:
-                yield f"device.{name}.{field}", f": {error}"
+                yield place, f": {error}"
                 continue
-            allowed = device.ONLY_PINS.get(field)
-            if allowed is not None and pin not in allowed:
-                expected = ", ".join(pin_name(number) for number in allowed)
-                yield f"device.{name}.{field}", f" is pin {pin_name(pin)}, which cannot do that; expected {expected}"
-            if pin in pin_owner:
-                yield f"device.{name}.{field}", f": {pin_owner[pin]} and {name} cannot share pin {pin_name(pin)}"
-            pin_owner[pin] = name
+            yield from _wrong_pin(place, pin, device.CHIP_PINS.get(field))
+            if robot.takes_brain:
+                yield from _wrong_pin(place, pin, device.ONLY_PINS.get(field), _OWN)
+            elif not device.on:
+                continue
+            owner, owner_hears = owners.get(pin, ("", True))
+            hears = field in device.HEARS
+            if owner and (robot.takes_brain or not (hears or owner_hears)):
+                both = device.on and robot.device[owner].on and not (hears or owner_hears)
+                yield place, f": {owner} and {name} cannot share pin {pin_name(pin)}{'' if both else _OWN}"
+            if not owner or owner_hears:
+                owners[pin] = name, hears
+
+
+def _wrong_pin(place: str, pin: int, allowed: Sequence[int] | None, remedy: str = "") -> Faults:
+    if allowed is not None and pin not in allowed:
+        expected = ", ".join(pin_name(number) for number in allowed)
+        yield place, f" is pin {pin_name(pin)}, which cannot do that; expected {expected}{remedy}"
+
+
+def _kit_faults(robot: RobotDescription) -> Faults:
+    """What the kit's firmware cannot do: devices that it does not know, or two on one unit of the chip (ATmega328P data
+    sheet), which are both named."""
+    unit_owner: dict[str, tuple[str, str]] = {}
+    for name, device in robot.device.items():
+        kind = device.__struct_config__.tag
+        if name not in device.NAMES:
+            known = f"expected the name {' or '.join(device.NAMES)}, which the firmware knows"
+            unknown = "which the kit's firmware does not know; expected another type"
+            yield f"device.{name}", f" is {kind}{f'; {known}' if device.NAMES else f', {unknown}'}{_OWN}"
         for unit, group in device.NEEDS.items():
             owner, owner_group = unit_owner.setdefault(unit, (name, group))
             if owner != name and (group == "" or group != owner_group):
-                yield f"device.{name}", f": {owner} and {name} cannot share {unit}"
+                yield f"device.{name}", f": {owner} and {name} cannot share {unit}{_OWN}"
 
 
 def _vehicle_faults(robot: RobotDescription) -> Faults:
@@ -288,6 +329,8 @@ def _vehicle_faults(robot: RobotDescription) -> Faults:
         yield "supply", " is given, but a robot without a board has none; its devices say their voltages"
     if robot.pin_map:
         yield "pin_map", f" is {robot.pin_map!r}, but a robot without a board has no pins"
+    if not robot.takes_brain:
+        yield "firmware", f" is {robot.firmware!r}, but a robot without a board runs none"
     if robot.unit is not None:
         yield "unit", f" is {robot.unit}, but nothing of a robot without a board is drawn by it"
     for name, device in robot.device.items():
@@ -315,7 +358,7 @@ def _image_faults(robot: RobotDescription, path: Path) -> Faults:
     """What the firmware of the robot's pin map cannot do: other pins or devices than it was built with."""
     for name in _ALWAYS:
         if not robot.has(name):
-            yield f"device.{name}", " is missing or off; every robot needs it"
+            yield f"device.{name}", f" is missing or off; the kit's firmware needs it{_OWN}"
     owner = resources.folder("robots") / f"{robot.pin_map}.toml"
     if not owner.is_file() or owner.samefile(path):
         return  # the robot has its own pin map, and so its own image
@@ -326,8 +369,8 @@ def _image_faults(robot: RobotDescription, path: Path) -> Faults:
             there = "not there" if built is None else f"{built.__struct_config__.tag} on {built.wired_to}"
             yield (
                 f"device.{name}",
-                f" is {device.__struct_config__.tag} on {device.wired_to}, but in the firmware "
-                f"for pin map {robot.pin_map!r} it is {there}; expected the same, or a pin_map of the robot's own",
+                f" is {device.__struct_config__.tag} on {device.wired_to}, but in the firmware for pin map "
+                f"{robot.pin_map!r} it is {there}; expected the same, or a pin_map of the robot's own{_OWN}",
             )
 
 

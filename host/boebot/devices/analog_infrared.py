@@ -65,7 +65,7 @@ class SharpSensor(SlowDevice, tag="analog_infrared", frozen=True, kw_only=True):
         Wire(FIVE_VOLTS, "3 supply"),
     )
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
+    CHIP_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
     AGE: ClassVar[str] = "analog_infrared_age"
     PERIOD_TICKS: ClassVar[int] = READ_TICKS
     COLUMNS: ClassVar = (("distance", "m", 4),)

@@ -58,7 +58,7 @@ class BatteryDivider(SlowDevice, tag="battery", frozen=True, kw_only=True):
     NAMES: ClassVar[tuple[str, ...]] = ("battery",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     NEEDS: ClassVar[dict[str, str]] = {"analog converter": "analog inputs"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
+    CHIP_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": ANALOG_PINS}
     AGE: ClassVar[str] = "battery_age"
     PERIOD_TICKS: ClassVar[int] = READ_TICKS
     COLUMNS: ClassVar = (("voltage", "v", 3),)

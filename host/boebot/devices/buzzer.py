@@ -60,6 +60,7 @@ class PiezoBuzzer(SlowDevice, tag="buzzer", frozen=True, kw_only=True):
     READING: ClassVar = Buzzer
     NAMES: ClassVar[tuple[str, ...]] = ("buzzer",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    HEARS: ClassVar[frozenset[str]] = frozenset({"pin"})
     WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "+"), Wire(GROUND, "-"))
     NEEDS: ClassVar[dict[str, str]] = {"Timer0": ""}
     COLUMNS: ClassVar = (("token", "", 0),)

@@ -183,10 +183,12 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
 
     READING: ClassVar[type | None] = None  # of what a brain reads; None: a brain does not meet it
     GROUP: ClassVar[str] = ""  # name of all devices of its kind together, in a brain's NEEDS
-    NAMES: ClassVar[tuple[str, ...]] = ()  # its usual ones; on a board, whose firmware knows them, the only ones
+    NAMES: ClassVar[tuple[str, ...]] = ()  # its usual ones; the only ones that the kit's firmware knows
     PINS: ClassVar[dict[str, str]] = {}  # key of the pin -> role in the firmware's names ("" = the device itself)
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # key of the pin -> the pins that can do it
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # key of the pin -> the pins that the kit's firmware can use
+    CHIP_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # and those that any program can, such as analog inputs
+    HEARS: ClassVar[frozenset[str]] = frozenset()  # keys of pins that the board alone drives: others may hear them, too
     WIRES: ClassVar[tuple[Wire, ...]] = ()  # of a board's device: between board and device
     CONNECTOR: ClassVar[str] = BREADBOARD  # where they are plugged in
     COLUMNS: ClassVar[tuple[tuple[str, str, int | None], ...]] = ()

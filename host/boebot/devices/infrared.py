@@ -88,6 +88,7 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
     SIGN: ClassVar = _SIGN
     NAMES: ClassVar[tuple[str, ...]] = ("infrared_left", "infrared_right")
     PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
+    HEARS: ClassVar[frozenset[str]] = frozenset({"led_pin"})
     WIRES: ClassVar[tuple[Wire, ...]] = (
         Wire("led_pin", "LED +", part="2 kΩ"),  # less: it reaches farther
         Wire(GROUND, "LED -"),

@@ -51,6 +51,7 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     NAMES: ClassVar[tuple[str, ...]] = ("servo_left", "servo_right")
     SHOWN: ClassVar = ("pulse", "µs", 1.0, 0)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    HEARS: ClassVar[frozenset[str]] = frozenset({"pin"})
     WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}

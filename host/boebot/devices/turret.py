@@ -67,6 +67,7 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
     READING: ClassVar = Turret
     NAMES: ClassVar[tuple[str, ...]] = ("turret",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    HEARS: ClassVar[frozenset[str]] = frozenset({"pin"})
     WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}

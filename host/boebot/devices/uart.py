@@ -31,4 +31,4 @@ class Uart(Device, tag="uart", frozen=True, kw_only=True):
     )
     CONNECTOR: ClassVar[str] = "USB socket"
     NEEDS: ClassVar[dict[str, str]] = {"USART0": ""}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"receive_pin": (0,), "transmit_pin": (1,)}
+    CHIP_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"receive_pin": (0,), "transmit_pin": (1,)}

@@ -314,7 +314,10 @@ def prepare(
     expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
     expect("period", period, "seconds or None", Real, type(None))
     description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
-    loaded = brains.load_program(brain) or brains.load_brain(brain)
+    loaded = brains.load_program(brain)
+    if loaded is None:
+        description.expect_kit()
+        loaded = brains.load_brain(brain)
     period_s = float(period if period is not None else loaded.period or DEFAULT_PERIOD)
     if description.has_board:
         check_time_to_live(period_s)

@@ -62,7 +62,8 @@ def write(robot: RobotDescription, path: Path) -> Path:
         _write_names(axes, robot, scale)
         if wires:
             below = figure.add_axes((0.0, 0.0, 1.0, wiring / tall))
-            wiring_drawing.draw_wiring(below, wires, f"board {robot.board}, pin map {robot.pin_map}")
+            runs = f"pin map {robot.pin_map}" if robot.takes_brain else "for programs of your own"
+            wiring_drawing.draw_wiring(below, wires, f"board {robot.board}, {runs}")
         return figure_file.save(figure, path, title)
 
 

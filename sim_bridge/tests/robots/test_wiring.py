@@ -67,19 +67,32 @@ def test_each_device_sits_at_its_pins() -> None:
     ("name", "device"),
     [
         ("second_compass", MagneticCompass(sda_pin="A4", scl_pin="A5")),
-        ("horn", PiezoBuzzer(pin=4)),
         ("light_right", LightSensor(pin=8, position_m=(0.05, -0.04), heading_rad=-0.5)),
         ("second_sharp", SharpSensor(pin="A2", position_m=(0.0, 0.0), heading_rad=0.0)),
-        ("second_turret", PositionServo(pin=13, position_m=(0.0, 0.0))),
-        ("bus_on_servos", MagneticCompass(sda_pin=12, scl_pin=13)),
     ],
 )
-def test_two_devices_that_listen_at_one_place_are_refused_in_one_sentence(name: str, device: robots.AnyDevice) -> None:
+def test_two_devices_that_drive_one_pin_are_refused_in_one_sentence(name: str, device: robots.AnyDevice) -> None:
     robot = equipped()
     doubled = msgspec.structs.replace(robot, device={**robot.device, name: device})
     sim = Sim(arena_of(), noise=False)
-    with pytest.raises(BoardError, match=f"^device '{name}' cannot be joined .*: another device listens on its pins$"):
+    with pytest.raises(
+        BoardError, match=f"^device '{name}' cannot be joined .*: another device drives one of its pins, or"
+    ):
         add_scripted(sim, doubled)
+
+
+def test_devices_that_only_hear_share_a_pin_up_to_seven() -> None:
+    robot = equipped()
+    horns = {f"horn_{i}": PiezoBuzzer(pin=4) for i in range(6)}
+    both = add_scripted(Sim(arena_of(), noise=False), msgspec.structs.replace(robot, device={**robot.device, **horns}))
+    for i in range(100):
+        both.edge(i * MS, 4, 1)
+        both.edge(i * MS + 500 * US, 4, 0)
+    both.run(0.3)
+    assert both.robot.tones()["frequency"] == pytest.approx([1000.0] * 7)
+    crowded = msgspec.structs.replace(robot, device={**robot.device, **horns, "horn_6": PiezoBuzzer(pin=4)})
+    with pytest.raises(BoardError, match=r"^device 'horn_6' cannot be joined .* too many listen there$"):
+        add_scripted(Sim(arena_of(), noise=False), crowded)
 
 
 def test_values_out_of_range_are_refused_in_one_sentence() -> None:
