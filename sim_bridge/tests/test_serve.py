@@ -149,9 +149,9 @@ def test_what_cannot_be_served_is_told() -> None:
 
 
 def serve_program(folder: Path, then: str, visits: list[Visit], running: Callable[[], bool]) -> None:
-    """Serves a board whose program asks for the SPI, which is not built, and goes on with `then`."""
+    """Serves a board whose program asks for the comparator, which is not built, and goes on with `then`."""
     image = folder / "program.elf"
-    image.write_bytes(assemble(f"main: ldi r24, 0x51\n out SPCR, r24\n{then}"))
+    image.write_bytes(assemble(f"main: ldi r24, 0x43\n out ACSR, r24\n{then}"))
     asked = replace(request(), image=str(image))
     serve("avr", asked, tcp=0, announce=lambda _: None, visit=visits.append, running=running)
 
@@ -162,7 +162,7 @@ def test_what_the_board_notes_is_heard_while_it_is_served(tmp_path: Path) -> Non
     serve_program(tmp_path, "1: rjmp 1b", visits, lambda: not visits and time.monotonic() < until)
     (note,) = visits
     assert (note.what, note.client) == ("notes", "the board")
-    assert note.why.startswith("the program writes to SPCR at address 0x")
+    assert note.why.startswith("the program writes to ACSR at address 0x")
 
 
 def test_what_the_board_notes_just_before_it_crashes_is_heard(tmp_path: Path) -> None:

@@ -29,8 +29,8 @@ static int on_request(avr_io_t *io, uint32_t request, void *param) {
   return 0;
 }
 
-/* simavr calls these two by name: which modules an ATmega328P has. Of simavr's own it keeps program memory; SPI and the
- * analog comparator answer nothing. */
+/* simavr calls these two by name: which modules an ATmega328P has. Of simavr's own it keeps program memory; the analog
+ * comparator answers nothing. */
 void mx8_init(struct avr_t *avr) {
   avr_board *b = avr->custom.data;
   struct mcu_t *chip = (struct mcu_t *)avr;
@@ -45,6 +45,7 @@ void mx8_init(struct avr_t *avr) {
   timers_init(b);
   usart_init(b);
   twi_init(b);
+  spi_init(b);
   converter_init(b);
   watchdog_init(b);
   eeprom_init(b);

@@ -3,7 +3,7 @@
  * simavr (sim_core.c) executes the less common instructions and keeps the data space. Everything that has to do with
  * time or pins is here: common instructions (avr_instructions.c, avr_opcodes.c), run loop and interrupts (avr_run.c),
  * registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
- * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), ADC (avr_converter.c), watchdog (avr_watchdog.c),
+ * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), SPI (avr_spi.c), ADC (avr_converter.c), watchdog (avr_watchdog.c),
  * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
@@ -80,6 +80,7 @@ typedef enum {
   DUE_WATCHDOG,
   DUE_EEPROM,
   DUE_TWI,
+  DUE_SPI,
   DUE_COUNT
 } due_source;
 
@@ -99,6 +100,9 @@ enum {
   REG_EEARL = 0x41,
   REG_EEARH = 0x42,
   REG_GTCCR = 0x43,
+  REG_SPCR = 0x4C,
+  REG_SPSR = 0x4D,
+  REG_SPDR = 0x4E,
   REG_SMCR = 0x53,
   REG_MCUSR = 0x54,
   REG_MCUCR = 0x55,
@@ -138,6 +142,8 @@ typedef struct {
   uint8_t forced_level;
   uint8_t forced_out; /* outputs whatever DDR says */
   uint8_t forced_in;  /* inputs whatever DDR says */
+  uint8_t shifted;    /* outputs that the SPI drives: high if it or a timer says so (table 14-3) */
+  uint8_t shifted_level;
   /* what follows */
   uint8_t out; /* bits that are outputs */
   uint8_t out_level;
@@ -291,6 +297,19 @@ typedef struct {
   uint64_t fallen; /* when SCL fell before this bit */
 } twi_state;
 
+/* ---- SPI ---- */
+
+typedef struct {
+  uint8_t control; /* SPCR */
+  bool doubled;    /* SPI2X */
+  bool collided;   /* WCOL */
+  uint8_t seen;    /* flags that were 1 when SPSR was read, until SPDR is */
+  uint8_t half;    /* half periods of the transfer that are over; 16: none is under way */
+  uint8_t out, in; /* bits still to be sent, and those that came */
+  bool bit;        /* at MOSI */
+  uint8_t data;    /* received */
+} spi_state;
+
 /* ---- ADC, watchdog ---- */
 
 typedef struct {
@@ -372,6 +391,7 @@ typedef struct avr_board {
   timer_state timer[3];
   usart_state usart;
   twi_state twi;
+  spi_state spi;
   converter_state converter;
   watchdog_state watchdog;
   board_watchdog_log watchdog_log;
@@ -455,6 +475,12 @@ void twi_init(avr_board *b);
 void twi_reset(avr_board *b);
 void twi_due(avr_board *b, uint64_t cycle);
 void twi_line_moved(avr_board *b, uint64_t cycle); /* SDA or SCL */
+
+/* avr_spi.c */
+void spi_init(avr_board *b);
+void spi_reset(avr_board *b);
+void spi_due(avr_board *b, uint64_t cycle);
+void spi_pins_moved(avr_board *b, uint64_t cycle); /* after a change at port B */
 
 /* avr_converter.c */
 void converter_init(avr_board *b);

@@ -86,7 +86,8 @@ void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
   bool pull_ups = !(b->avr->data[REG_MCUCR] & PULL_UPS_DISABLED);
   port_state before = *p;
   p->out = (uint8_t)((direction | p->forced_out) & ~p->forced_in);
-  p->out_level = (uint8_t)(((value & ~p->forced) | (p->forced_level & p->forced)) & p->out);
+  uint8_t port_level = (uint8_t)(value & ~(p->forced | p->shifted));
+  p->out_level = (uint8_t)((port_level | (p->forced_level & p->forced) | p->shifted_level) & p->out);
   p->pulled = pull_ups ? (uint8_t)(value & ~p->out) : 0;
   uint8_t undriven = (uint8_t)(p->pulled | p->level);
   uint8_t outside = (uint8_t)((p->driven & p->driven_level) | (~p->driven & undriven));
@@ -106,6 +107,7 @@ void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
     b->counters.edges_out++;
     if (b->base.sink) b->base.sink(b->base.sink_context, cycle, pin, shown(p, bit));
   }
+  if (port == PORT_B) spi_pins_moved(b, cycle);
 }
 
 static uint8_t port_of(uint16_t address) { return (uint8_t)((address - REG_PINB) / 3); }
@@ -250,7 +252,7 @@ void pins_reset(avr_board *b, uint64_t cycle) {
   set_due(b, DUE_NOISE_FILTER, NEVER);
   for (uint8_t port = 0; port < PORT_COUNT; port++) {
     port_state *p = &b->port[port];
-    p->forced = p->forced_out = p->forced_in = 0;
+    p->forced = p->forced_out = p->forced_in = p->shifted = p->shifted_level = 0;
     pins_update(b, port, cycle);
   }
   b->capture_level = b->port[PORT_B].level >> CAPTURE_BIT & 1u;

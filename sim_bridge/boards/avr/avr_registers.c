@@ -11,7 +11,6 @@
 
 #include "avr_parts.h"
 
-static const char SPI[] = "SPI is not built: no transfer ends, SPIF stays 0";
 static const char DIGITAL[] = "not built: digital inputs stay on";
 static const char SLAVE[] = "slave modes of the two-wire interface are not built: no address is answered";
 
@@ -26,7 +25,6 @@ typedef struct chip_register {
 /* clang-format off */
 static const chip_register REGISTERS[] = {
   {0x43, 0x80, false, "GTCCR", "TSM is not built: the prescalers run on"},
-  {0x4C, 0xFF, false, "SPCR", SPI}, {0x4D, 0xFF, true, "SPSR", SPI}, {0x4E, 0xFF, true, "SPDR", SPI},
   {0x50, 0x7F, true, "ACSR", "the analog comparator is not built: it stays off"},
   {0x53, 0x0E, false, "SMCR", "sleep modes other than idle are not built: it sleeps in idle mode"},
   {0x55, 0x63, false, "MCUCR", "vectors in the boot section and BODS are not built"},

@@ -54,6 +54,7 @@ static void (*const HAPPENS[DUE_COUNT])(avr_board *b, uint64_t cycle) = {
     [DUE_WATCHDOG] = watchdog_due,
     [DUE_EEPROM] = eeprom_due,
     [DUE_TWI] = twi_due,
+    [DUE_SPI] = spi_due,
 };
 
 static void happen(avr_board *b, due_source source, uint64_t cycle) {
@@ -262,6 +263,7 @@ void restart(avr_board *b) {
   timers_reset(b, cycle);
   usart_reset(b);
   twi_reset(b);
+  spi_reset(b);
   converter_reset(b);
   watchdog_reset(b, cycle);
   eeprom_reset(b, causes & (1u << BOARD_RESET_POWER | 1u << BOARD_RESET_BROWN_OUT));

@@ -24,7 +24,7 @@ from sim_bridge.tests.boards.symbols import entry_of
 
 # Bits that are not built, by the names of 36; what the README of boards/avr says in words.
 NOT_BUILT = {
-    **dict.fromkeys(("SPCR", "SPSR", "SPDR", "OSCCAL", "ADCL", "ADCH", "TWAR"), 0xFF),
+    **dict.fromkeys(("OSCCAL", "ADCL", "ADCH", "TWAR"), 0xFF),
     "GTCCR": 0x80,
     "ACSR": 0x7F,
     "SMCR": 0x0E,
@@ -64,25 +64,24 @@ def stored(*writes: tuple[str, int]) -> list[str]:
     return notes(written([(registers()[name], value) for name, value in writes], reads=False))
 
 
-def test_a_started_spi_transfer_is_noted_and_where_it_is_waited_for() -> None:
+def test_a_comparator_that_is_switched_on_is_noted_and_where_it_is_waited_for() -> None:
     source = """
       main:
-        ldi r24, 0x50         ; SPE, MSTR
-        out SPCR, r24
-      sent: out SPDR, r24
-        out SPCR, r24         ; once more: it changes nothing
-      wait: in r24, SPSR
-        sbrs r24, SPIF
+        ldi r24, 0x43         ; ACBG, ACIS
+      set: out ACSR, r24
+        out ACSR, r24         ; once more: it changes nothing
+      wait: in r24, ACSR
+        sbrs r24, ACI
         rjmp wait
     """
     machine = Machine(source)
     machine.board.run(1000)
-    (_, _, first, why), (cycle, sent, second, _), (_, waits, third, _) = machine.board.notes()
-    assert [first, second, third] == ["writes to SPCR", "writes to SPDR", "reads SPSR"]
-    assert "SPI is not built" in why
-    assert (sent, waits) == tuple(entry_of(assemble(source), name) for name in ("sent", "wait"))
+    (cycle, sets, first, why), (_, waits, second, _) = machine.board.notes()
+    assert [first, second] == ["writes to ACSR", "reads ACSR"]
+    assert "comparator is not built" in why
+    assert (sets, waits) == tuple(entry_of(assemble(source), name) for name in ("set", "wait"))
     assert cycle < 100
-    assert len(machine.board.notes(since=2)) == 1
+    assert len(machine.board.notes(since=1)) == 1
 
 
 LDS_R25, STS_R24, LDI_R24, ROOM = 0x9190, 0x9380, 0xE080, 1000
@@ -141,7 +140,7 @@ def test_any_writes_at_all_end_in_a_run_or_a_fault(writes: list[tuple[int, int]]
 def test_each_register_that_is_not_built_is_noted_at_its_place() -> None:
     writes = [(registers()[name], bits ^ AFTER_RESET.get(name, 0)) for name, bits in NOT_BUILT.items()]
     told = written([*writes, (0xFF, 1)]).notes()
-    assert [does for _, _, does, _ in told if "reads" in does] == ["reads SPSR", "reads SPDR", "reads ACSR"]
+    assert [does for _, _, does, _ in told if "reads" in does] == ["reads ACSR"]
     told = [row for row in told if "writes" in row[2]]
     assert [row[2] for row in told] == [*(f"writes to {name}" for name in NOT_BUILT), "writes to a reserved address"]
     assert set(gaps(address for _, address, _, _ in told)) == {10}  # LDI, STS, LDS
@@ -314,7 +313,7 @@ def test_erased_flash_leads_into_the_boot_section(tmp_path: Path) -> None:
 
 def image_for(chip: str, folder: Path, *options: str) -> Path:
     source, image = folder / "program.S", folder / f"{chip}.elf"
-    source.write_text(PREAMBLE + "main: ldi r24, 0x51\n out SPCR, r24\n1: rjmp 1b", encoding="ascii")
+    source.write_text(PREAMBLE + "main: ldi r24, 0x43\n out ACSR, r24\n1: rjmp 1b", encoding="ascii")
     subprocess.run(["avr-gcc", f"-mmcu={chip}", *options, "-o", str(image), str(source)], check=True)
     return image
 
@@ -337,9 +336,12 @@ def test_a_session_tells_of_the_chip_that_is_assumed_and_of_what_is_not_built(tm
         told[path] = session.notes()
         assert session.notes() == told[path]
         session.close()
-    (spi,) = told[image]
-    assert re.fullmatch(r"the program writes to SPCR at address 0x[0-9A-F]{4} in cycle \d+ in main: SPI is not .*", spi)
+    (note,) = told[image]
+    assert re.fullmatch(
+        r"the program writes to ACSR at address 0x[0-9A-F]{4} in cycle \d+ in main: the analog comparator is not .*",
+        note,
+    )
     assert told[bare] == [
         f"the firmware image {bare} does not say which chip it is for: it is taken for an ATmega328P",
-        spi,
+        note,
     ]
