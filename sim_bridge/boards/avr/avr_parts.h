@@ -170,6 +170,8 @@ typedef struct {
 
 /* ---- timers ---- */
 
+#define TIMER0_CLOCK_BIT 4u /* T0 in port D; T1 is the next one */
+
 typedef enum {
   COUNT_NORMAL,
   COUNT_CLEAR_ON_MATCH,
@@ -192,7 +194,7 @@ typedef struct {
   count_mode mode;
   top_source top_from;
   uint32_t fixed_top;
-  uint32_t divider;            /* CPU cycles per count, 0: stopped */
+  uint32_t divider;            /* CPU cycles per count, 0: stopped, or clocked from outside */
   uint8_t action[2];           /* COMnx: 0 none, 1 toggle, 2 clear, 3 set */
   uint32_t compare[2];         /* in force */
   uint32_t compare_written[2]; /* comes into force at once, or in PWM modes at the end of a lap */
@@ -387,6 +389,7 @@ typedef struct avr_board {
   port_state port[PORT_COUNT];
   change_queue driven_edges;
   change_queue seen_edges;
+  uint8_t clock_pins;    /* T0 and T1 in port D, where their edges are counted */
   uint8_t capture_level; /* of the capture pin, behind the noise filter */
   timer_state timer[3];
   usart_state usart;
@@ -448,6 +451,7 @@ void pins_acknowledged(avr_board *b, uint8_t vector);
 /* avr_timers.c */
 void timers_init(avr_board *b);
 void timers_reset(avr_board *b, uint64_t cycle);
+void timer_clock_edge(avr_board *b, unsigned number, uint8_t level, uint64_t cycle); /* at T0 or T1 */
 
 /* avr_timer_count.c */
 void timer_due(timer_state *t, uint64_t cycle);

@@ -65,7 +65,7 @@ static uint64_t first_due(const change_queue *q) { return q->first < q->end ? q-
 static void see_edges(avr_board *b, uint8_t port, uint8_t moved, uint64_t cycle) {
   uint8_t watched = b->avr->data[REG_PCMSK0 + port];
   if (port == PORT_B) watched |= 1u << CAPTURE_BIT;
-  if (port == PORT_D) watched |= 1u << INT0_BIT | 1u << INT1_BIT;
+  if (port == PORT_D) watched |= 1u << INT0_BIT | 1u << INT1_BIT | b->clock_pins;
   for (uint8_t bit = 0; bit < 8; bit++) {
     if (!(moved & watched & 1u << bit)) continue;
     uint8_t level = b->port[port].level >> bit & 1u;
@@ -187,6 +187,9 @@ void pins_due_seen(avr_board *b, uint64_t cycle) {
     if (edge.port == PORT_B && edge.pin == CAPTURE_BIT) capture_edge(b, edge.level, edge.at);
     if (edge.port == PORT_D && edge.pin == INT0_BIT) external_edge(b, 0, edge.level);
     if (edge.port == PORT_D && edge.pin == INT1_BIT) external_edge(b, 1, edge.level);
+    if (edge.port == PORT_D && b->clock_pins >> edge.pin & 1) {
+      timer_clock_edge(b, edge.pin - TIMER0_CLOCK_BIT, edge.level, edge.at);
+    }
   }
   set_due(b, DUE_SEEN_EDGE, first_due(q));
 }

@@ -6,8 +6,8 @@
  * an enabled flag that is not yet set, or an output pin. Everything else is computed when a register is touched.
  *
  * A match with OCRn sets its flag, and moves its pin, one count after the count became equal (16.7.1). The compare
- * registers are double-buffered in the PWM modes. The prescalers run freely (17). External clocks are not built: such
- * a timer stands still.
+ * registers are double-buffered in the PWM modes. The prescalers run freely (17). With a clock from outside the divider
+ * is 0, and each edge is a count.
  *
  * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
@@ -173,7 +173,7 @@ static void move(timer_state *t, uint64_t counts) {
 }
 
 /* One count, at `cycle`, with all that it causes. */
-static void count_once(timer_state *t, uint64_t cycle) {
+void timer_count_once(timer_state *t, uint64_t cycle) {
   avr_board *b = t->owner;
   bool wraps = rest_of_lap(t) == 1;
   uint8_t level[2] = {t->output_level[0], t->output_level[1]};
@@ -213,7 +213,7 @@ void timer_bring_up(timer_state *t, uint64_t cycle) {
       move(t, next - 1);
       done += next;
       counts -= next;
-      count_once(t, base + done * t->divider);
+      timer_count_once(t, base + done * t->divider);
     }
   }
   t->known = cycle;

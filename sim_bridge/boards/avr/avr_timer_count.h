@@ -25,6 +25,9 @@ void timer_set_count(timer_state *t, uint32_t count);
 /* Whether a channel drives its pin in place of the port. */
 bool timer_takes_over_pin(const timer_state *t, int channel);
 
+/* One count at that cycle, with all that it causes. */
+void timer_count_once(timer_state *t, uint64_t cycle);
+
 /* Acts as a compare match on the pin, not on the flag; not in PWM modes (15.9.2). */
 void timer_force_match(timer_state *t, int channel, uint64_t cycle);
 

@@ -7,7 +7,7 @@
 #include "avr_timer_count.h"
 
 #define REG_ICR1L 0x86
-#define EXTERNAL_CLOCK 6 /* CSn2:0 from here on; of timers 0 and 1 */
+enum { CLOCK_FALLING = 6, CLOCK_RISING }; /* CSn2:0 of timers 0 and 1: edges of their pins (table 15-9, 16-5) */
 
 typedef struct {
   uint8_t mode, top_from;
@@ -75,6 +75,14 @@ static const timer_state BUILT_IN[3] = {
      .maximum = 0xFF},
 };
 
+/* ---- clocks from outside (17.3) ---- */
+
+void timer_clock_edge(avr_board *b, unsigned number, uint8_t level, uint64_t cycle) {
+  timer_state *t = &b->timer[number];
+  unsigned clock = b->avr->data[t->address_control_a + CONTROL_B] & 7u;
+  if (clock == (level ? CLOCK_RISING : CLOCK_FALLING)) timer_count_once(t, cycle);
+}
+
 /* ---- registers ---- */
 
 static timer_state *timer_at(avr_board *b, uint16_t address) {
@@ -105,9 +113,9 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
   t->top_from = (top_source)w->top_from;
   t->fixed_top = w->fixed_top;
   t->divider = t->dividers[control[CONTROL_B] & 7];
-  if (which == CONTROL_B && t->number != 2 && (control[CONTROL_B] & 7) >= EXTERNAL_CLOCK) {
-    note(t->owner, b->avr->pc, "writes to", t->number ? "TCCR1B" : "TCCR0B",
-         "external clocks are not built: it stands still");
+  if (which == CONTROL_B && t->number < 2) {
+    uint8_t pin = (uint8_t)(1u << (TIMER0_CLOCK_BIT + t->number));
+    b->clock_pins = (uint8_t)((control[CONTROL_B] & 7) >= CLOCK_FALLING ? b->clock_pins | pin : b->clock_pins & ~pin);
   }
   t->action[0] = control[CONTROL_A] >> 6;
   t->action[1] = control[CONTROL_A] >> 4 & 3;
@@ -214,6 +222,7 @@ static void write_prescaler_reset(avr_board *b, uint16_t address, uint8_t value,
 /* ---- construction ---- */
 
 void timers_reset(avr_board *b, uint64_t cycle) {
+  b->clock_pins = 0;
   for (int i = 0; i < 3; i++) {
     b->timer[i] = BUILT_IN[i];
     b->timer[i].owner = b;

@@ -565,3 +565,77 @@ def test_a_phase_correct_timer_overflows_where_it_leaves_bottom(mode: int, top: 
     timer = int(mode != PHASE)
     flags = turning(timer, mode, top, [*top, *COUNT_0], {2: [(f"TIFR{timer}", 1)]}, flags=True)
     assert [flag & 1 for flag in flags[:10]] == [0, 1, 1, 0, 0, 0, 0, 1, 1, 1]
+
+
+# ---- clocks from outside (17.3) ----
+
+CLOCKED = [(0, 4, 6), (0, 4, 7), (1, 5, 6), (1, 5, 7)]  # timer, its clock pin, CSn2:0
+
+
+@pytest.mark.parametrize(("timer", "pin", "clock"), CLOCKED)
+def test_edges_of_the_clock_pin_are_counted(timer: int, pin: int, clock: int) -> None:
+    """Of one direction; of the last one, those that come INPUT_LATENCY before the access."""
+    rests = Level.LOW if clock == 7 else Level.HIGH
+    active = Level.HIGH if clock == 7 else Level.LOW
+    from_io = " + 0x20" if timer == 0 else ""  # its registers have I/O addresses
+    for late, expected in ((0, 6), (1, 5)):
+        machine = Machine(
+            f"""
+            main:
+              ldi r24, {clock}
+              sts TCCR{timer}B{from_io}, r24
+              sbi DDRB, 5
+              .rept 100
+              nop
+              .endr
+              lds r24, TCNT{timer}{"L" * timer}{from_io}
+              sts 0x200, r24
+            1: rjmp 1b
+            """
+        )
+        board = machine.board
+        board.drive(pin, rests)
+        while not (log := board.log()):
+            board.run(1)
+        access = log[0].cycle + 100 + 1
+        board.wave(pin, half=5, first=log[0].cycle + 10, count=10, level=active)
+        board.drive(pin, active, at=access - INPUT_LATENCY + late)
+        board.run(300)
+        assert board.read_memory(0x200, 1)[0] == expected
+
+
+def test_a_timer_that_is_clocked_by_edges_overflows_and_matches() -> None:
+    """T0, in clear-on-match mode: OC0A (pin 6) toggles with the edge behind the match. T1 is clocked by the program
+    itself through an output (17.3); its overflow is a flag."""
+    machine = Machine(
+        """
+        main:
+          sbi DDRD, 6
+          sbi DDRD, 5
+          ldi r24, 4
+          out OCR0A, r24
+          ldi r24, 1 << COM0A0 | 1 << WGM01
+          out TCCR0A, r24
+          ldi r24, 7
+          out TCCR0B, r24
+          ldi r24, 0xFF
+          sts TCNT1H, r24
+          sts TCNT1L, r24
+          ldi r24, 6
+          sts TCCR1B, r24
+          sbi PORTD, 5
+          cbi PORTD, 5
+          nop
+          nop
+          nop
+          in r24, TIFR1
+          sts 0x200, r24
+        1: rjmp 1b
+        """
+    )
+    machine.board.drive(4, Level.LOW)
+    machine.board.wave(4, half=50, first=1000, count=60, level=Level.HIGH)  # 30 rising edges
+    machine.board.run(6000)
+    toggles = [cycle for cycle in edges_of(machine.board.log(), 6) if cycle >= 1000]
+    assert toggles == [1000 + 100 * (5 * lap + 4) + INPUT_LATENCY for lap in range(6)]
+    assert machine.board.read_memory(0x200, 1)[0] == 1  # TOV1
