@@ -12,17 +12,21 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import boebot
 from boebot.boards import BoardRequest, open_board
+from boebot.cli.app import app
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, CallError
 from boebot.record.interventions import Deed, Typed
 from boebot.record.run_folder import locked
 from boebot.result import RunResult, read_run
+from boebot.running.again import again, recorded
 from boebot.running.hands import Onlooker
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
+from boebot.view.replay import content
 
 pytestmark = pytest.mark.emulated
 
@@ -36,7 +40,15 @@ int main(void) {
   UBRR0 = 16000000 / 16 / BAUD - 1;
   UCSR0B = 1 << RXEN0 | 1 << TXEN0;
   DDRB = 1 << 5;
+#ifdef RATES
+  for (const char *c = "slow "; *c; c++) put(*c);
+  UCSR0A |= 1 << TXC0;
+  while (!(UCSR0A & 1 << TXC0)) {}
+  UBRR0 = 0;
+  for (const char *c = "fast "; *c; c++) put(*c);
+#else
   for (const char *c = "ready\\r\\n"; *c; c++) put(*c);
+#endif
   for (;;) {
     while (!(UCSR0A & 1 << RXC0)) {}
     char byte = UDR0;
@@ -54,13 +66,22 @@ int main(void) {
 
 
 @pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Path]:
+def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Builds the program at a bit rate: an ELF file, and beside it a HEX file."""
 
-    def built(baud: int) -> Path:
+    def built(baud: int, *more: str) -> Path:
         folder = tmp_path_factory.mktemp("program")
         (folder / "talk.c").write_text(SOURCE)
-        flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", f"-DBAUD={baud}L", "-Os", "-g", "-Wall", "-Wno-array-bounds"]
+        flags = [
+            "-mmcu=atmega328p",
+            "-DF_CPU=16000000UL",
+            f"-DBAUD={baud}L",
+            "-Os",
+            "-g",
+            "-Wall",
+            "-Wno-array-bounds",
+            *more,
+        ]
         subprocess.run(["avr-gcc", *flags, "-o", folder / "talk.elf", folder / "talk.c"], check=True)
         subprocess.run(["avr-objcopy", "-O", "ihex", folder / "talk.elf", folder / "talk.hex"], check=True)
         return folder / "talk.elf"
@@ -69,7 +90,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Path]:
 
 
 @pytest.fixture(scope="module")
-def program(build: Callable[[int], Path]) -> Path:
+def program(build: Callable[..., Path]) -> Path:
     return build(9600)
 
 
@@ -80,7 +101,7 @@ def command(*arguments: object, typed: str = "") -> subprocess.CompletedProcess[
 
 
 @pytest.mark.parametrize("baud", [2400, 38400])
-def test_the_monitor_has_the_rate_of_the_program(build: Callable[[int], Path], baud: int, tmp_path: Path) -> None:
+def test_the_monitor_has_the_rate_of_the_program(build: Callable[..., Path], baud: int, tmp_path: Path) -> None:
     run = boebot.run(build(baud), seconds=0.1, out=tmp_path)
     rows = run.record.rows("to_host")
     assert b"".join(data for _, data in rows) == b"ready\r\n"
@@ -114,6 +135,10 @@ def test_exit_codes_say_what_was_printed(program: Path, options: tuple[str, ...]
     assert code == 2 or re.search(r"0\.00\d\d  ready\n", done.stdout)
 
 
+def printed(result: RunResult) -> bytes:
+    return b"".join(data for _, data in result.record.rows("to_host"))
+
+
 class Typing(Onlooker):
     """Types those texts, each once the run is that old (s)."""
 
@@ -134,14 +159,56 @@ def run(program: Path, folder: Path, seconds: float, typed: Typing) -> RunResult
 
 def test_what_is_typed_reaches_the_program_and_its_run_is_repeated_bit_by_bit(program: Path, tmp_path: Path) -> None:
     copy = Path(shutil.copy(program, tmp_path))
-    result = run(copy, tmp_path / "run", 0.3, Typing(at_0="lost", at_0_1="hello"))
-    assert b"".join(data for _, data in result.record.rows("to_host")) == b"ready\r\nHELLO"
+    result = run(copy, tmp_path / "run", 0.3, Typing(at_0="w", at_0_1="hello"))  # "w" waits until the program listens
+    assert printed(result) == b"ready\r\nWHELLO"
     assert result.error is None and result.touched == 2
     copy.unlink()  # the record has it
     again = command("replay", tmp_path / "run", "--again")
     assert again.returncode == 0 and "bit-equal" in again.stdout, again.stderr
     read = read_run(tmp_path / "run").robots[0]
     assert (read.program, read.hash) == (result.program, result.hash)
+
+
+def test_a_script_types_and_is_no_person(program: Path, tmp_path: Path) -> None:
+    typed = ("--type", r"h\x69@0.2", "--type", "ok@100ms", "--expect-text", "OKHI")
+    done = command("run", program, "--out", tmp_path, "--json", *typed, "--seconds", "1")
+    assert json.loads(done.stdout)["touched"] == 0 and json.loads(done.stdout)["steps"] is None
+    assert re.search(r"0\.00\d\d  ready\n", done.stderr)  # standard output is left to the answer
+    assert again(recorded(tmp_path)).is_equal
+    assert CliRunner().invoke(app, ["run", str(program), "-q", "--seconds", "0.1"]).stdout == ""
+
+
+def test_standard_input_and_a_script_type_beside_each_other(program: Path) -> None:
+    done = command("run", program, "--seconds", "0.3", "--type", "on@0.2", typed="go")  # more is lost while it prints
+    assert re.search("ready\n.*GOON\n", done.stdout), done.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ("--period 0.1", "--period is of a brain; talk.elf is a program, which has none"),
+        ("--set a.b=1", "--set is of a brain"),
+        ("--step-timeout 1", "--step-timeout is of a brain"),
+        ("--force-timing", "--force-timing is of a brain"),
+        ("--robots 2 --expect-text x", "--expect-text goes to the one program of a run; there are 2 in this one"),
+        ("--type x", "--type 'x' cannot be typed: there is no @; expected TEXT@TIME"),
+        (r"--type \x@1", "cannot be typed: 'unicodeescape'"),
+        ("--type x@-1", "cannot be typed at -1 s; expected at most 1000 letters, and a time from 0 s on"),
+    ],
+)
+def test_what_a_program_cannot_have_is_refused(program: Path, options: str, sentence: str) -> None:
+    refused = CliRunner().invoke(app, ["run", str(program), *options.split()])
+    assert isinstance(refused.exception, CallError) and sentence in str(refused.exception)
+
+
+def test_a_program_has_no_commands_to_replay(program: Path, tmp_path: Path) -> None:
+    run(program, tmp_path, 0.1, Typing())
+    done = command("replay", tmp_path, "--brain", "wander")
+    assert (done.returncode, "a program that sensed for itself; expected --again" in done.stderr) == (2, True)
+
+
+def test_an_outside_that_follows_reads_each_frame_at_its_own_rate(build: Callable[..., Path]) -> None:
+    assert printed(boebot.run(build(1200, "-DRATES"), seconds=0.2, typed=[("go", 0.1)])) == b"slow fast GO"
 
 
 def test_its_pulses_turn_the_wheel_on_that_pin(program: Path, tmp_path: Path) -> None:
@@ -177,12 +244,17 @@ def test_brain_and_program_share_a_world(program: Path) -> None:
 
 
 def test_csv_has_no_columns_of_what_the_host_does_not_know(program: Path, tmp_path: Path) -> None:
-    boebot.run(program, seconds=0.1, out=tmp_path)
+    result = boebot.run(program, seconds=0.1, out=tmp_path)
+    (shown,) = content([result])["runs"]
+    assert shown["program"] and [line for _, line in shown["rows"]["printed"]] == ["ready"]
+    assert shown["rows"]["printed"][0][0] == pytest.approx(0.001, abs=1e-3)
     assert command("report", tmp_path, "--as", "csv").returncode == 0
     heading = (tmp_path / "run.csv").read_text().splitlines()[0].split(",")
     assert heading == ["time_s", "tick", "true_x_m", "true_y_m", "true_heading_rad", "true_contact"]
     assert (tmp_path / "to_host.bin").read_bytes() == b"ready\r\n"
     summary = json.loads((tmp_path / "summary.json").read_text())
+    unknown = "steps", "period_s", "ticks", "late_steps", "resets", "lost_frames", "whisker_touches", "odometry_source"
+    assert {summary[name] for name in unknown} == {None}
     assert summary["program_hash"] == hashlib.sha256(program.read_bytes()).hexdigest()
 
 

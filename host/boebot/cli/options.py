@@ -188,19 +188,19 @@ def runner(
     Raises:
         BoebotError: the port is taken, or options of a live view are given without one.
     """
+    typist: dict[str, Any] = {}
+    if types:
+        from boebot.cli.typist import Typist
+
+        typist["onlooker"] = Typist()
     if not view:
         if speed is not None or port is not None:
             raise BoebotError("--speed and --view-port are of a live view; expected --view with them")
         from boebot.running.loop import execute
 
-        if types:
-            from boebot.cli.typist import Typist
-
-            yield functools.partial(execute, onlooker=Typist())
-        else:
-            yield execute
+        yield functools.partial(execute, **typist)
         return
     from boebot.live.session import opened, run_viewed
 
     with opened(port=port or 0, speed=None if speed == math.inf else speed or 1.0) as page:
-        yield functools.partial(run_viewed, page, waits=waits)
+        yield functools.partial(run_viewed, page, waits=waits, **typist)

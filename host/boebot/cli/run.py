@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,6 +35,9 @@ Several robots in one simulated world:
 A program for the Arduino Uno drives in place of a brain; what it prints is shown with its time:
 
   boebot run blink.elf --expect-text ready --timeout 2000
+
+What is typed at the terminal goes to it; a script types by --type 'go\\n@0.5'. With --json its text is on standard
+error, with --quiet it is left out.
 
 An option that is given once goes for all of them; given several times, it goes to robot 1, 2 and so on.
 
@@ -121,6 +125,14 @@ def run(
     fail_text: Annotated[
         str, typer.Option(metavar="TEXT", help="Of a program: that this was printed is an error, and ends the run.")
     ] = "",
+    typed: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--type",
+            metavar="TEXT@TIME",
+            help=r"What a program's serial line gets at that time, as in 'go\n@0.5'; again for each further one.",
+        ),
+    ] = None,
     timeout: Annotated[
         int | None, typer.Option(metavar="MS", min=1, help="Length of the run in simulated ms, in place of --seconds.")
     ] = None,
@@ -169,17 +181,21 @@ def run(
         pins=pins,
         expect_text=expect_text,
         fail_text=fail_text,
+        typed=[_typed(text) for text in typed or []],
     )
-    types = count == 1 and Path(brain[0]).suffix in PROGRAMS
+    programs = [member for member in request.members if Path(str(member.brain)).suffix in PROGRAMS]
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
             title = name if on is None else f"{name} on {on}"
-            progress = shown.enter_context(output.progress_bar(title, seconds, quiet or view))
+            progress = shown.enter_context(output.progress_bar(title, seconds, quiet or view or bool(programs)))
             run_it = shown.enter_context(
-                options.runner(view=view, speed=speed, port=view_port, waits=True, types=types)
+                options.runner(view=view, speed=speed, port=view_port, waits=True, types=len(programs) == 1)
             )
             shown.enter_context(streams.kept(for_the_answer=json))
+            if quiet and programs:
+                nowhere = shown.enter_context(Path(os.devnull).open("w", encoding="utf-8"))
+                shown.enter_context(contextlib.redirect_stdout(nowhere))
             result = run_it(request, progress, folder)
         try:
             end(result, out, wanted)
@@ -229,6 +245,21 @@ def _count(robots: int | None, brains: int, kinds: int, poses: int) -> int:
     if poses > count:
         raise BoebotError(f"there are {poses} times --pose for {count} robots; expected at most {count}")
     return count
+
+
+def _typed(text: str) -> tuple[str, float]:
+    r"""Of "TEXT@TIME"; in the text \n, \t, \x1b and the like are what they are in Python.
+
+    Raises:
+        CallError: it is no such thing.
+    """
+    what, sign, time = text.rpartition("@")
+    try:
+        if not sign:
+            raise BoebotError("there is no @")
+        return what.encode("latin-1", "backslashreplace").decode("unicode_escape"), quantity.parse(time, "s")
+    except (BoebotError, UnicodeDecodeError) as error:
+        raise CallError(f"--type {text!r} cannot be typed: {error}; expected TEXT@TIME, as in 'go\\n@0.5'") from None
 
 
 def _pose(text: str) -> tuple[float, float, float]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from queue import SimpleQueue
 
 from boebot.record.interventions import Deed, Typed
-from boebot.running.hands import Onlooker
+from boebot.record.run import Run
+from boebot.running.hands import Hands, Onlooker
 
 ROOM = 1000  # bytes that are read at once
 
@@ -19,11 +20,16 @@ class Typist(Onlooker):
 
     def __init__(self) -> None:
         self._typed: SimpleQueue[str] = SimpleQueue()
+        self._robot = 0
         threading.Thread(target=self._read, daemon=True).start()
 
+    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
+        """See `Onlooker`: it types to the one robot that a program drives."""
+        self._robot = next(number for number, robot in enumerate(robots) if robot.driver.is_program)
+
     def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
-        """To the first robot, which has no other one beside it."""
-        while number == 0 and not self._typed.empty():
+        """See `Onlooker`."""
+        while number == self._robot and not self._typed.empty():
             yield Typed(self._typed.get())
 
     def _read(self) -> None:

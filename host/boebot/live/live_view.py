@@ -245,7 +245,7 @@ class Heard:
 
 def _possible(robots: Sequence[Hands]) -> frozenset[str]:
     """What people may do to that run."""
-    can = {"type" if all(robot.driver.is_program for robot in robots) else "hand"}
+    can = {"type" if robot.driver.is_program else "hand" for robot in robots}
     if any(sliders(robot.task.brain) for robot in robots):
         can.add("parameters")
     first = robots[0]
@@ -271,7 +271,9 @@ def _pose_now(robot: Hands) -> tuple[float, float, float] | None:
 
 
 def _quality(robot: Hands) -> Message:
-    """Of its link, and how much of its time an emulated board works: in words."""
+    """Of its link, and how much of its time an emulated board works, in words; nothing where a program drives it."""
+    if robot.driver.is_program:
+        return {}
     link, status = robot.driver.link, robot.driver.status()
     found: dict[str, Any] = {}
     if link is not None:

@@ -15,6 +15,7 @@ from boebot.live import messages
 from boebot.live.live_view import Heard, LiveView, RestartedError
 from boebot.record.run_folder import RunFolder
 from boebot.result import Result
+from boebot.running.hands import Onlooker, Together
 from boebot.running.loop import Progress, execute
 from boebot.running.tasks import Request
 from boebot.view.display import browse, published
@@ -44,19 +45,27 @@ def show(url: str) -> None:
 
 
 def run_viewed(
-    view: LiveView, request: Request, progress: Progress | None, folder: RunFolder | None, *, waits: bool
+    view: LiveView,
+    request: Request,
+    progress: Progress | None,
+    folder: RunFolder | None,
+    *,
+    waits: bool,
+    onlooker: Onlooker | None = None,
 ) -> Any:
     """Runs what is requested, and again as often as a page asks for it; returns what came of the last run.
 
     Args:
         progress, folder: as of `boebot.running.loop.execute`.
+        onlooker: who watches it besides, and may interfere.
         waits: at a run's end as long as a page is open, which may ask for another one.
     """
     result: Result | None = None
+    everybody = view if onlooker is None else Together(onlooker, view)
     while True:
         try:
             with contextlib.redirect_stdout(Heard(view)):
-                result = execute(request, progress, folder, view)
+                result = execute(request, progress, folder, everybody)
         except BoebotError as error:
             if result is None:
                 raise

@@ -12,6 +12,7 @@ from boebot.record.record import Record
 
 STREAM = "intervention"  # of the record
 Signal = Annotated[float, msgspec.Meta(ge=-1, le=1)]
+TEXT_MAXIMUM = 1000  # letters that are typed at once
 SLIDE_S = 1.0  # of the run; a slider that is dragged gives new values all the time
 
 
@@ -62,10 +63,12 @@ class Parameter(Intervention, frozen=True):
     value: float
 
 
-class Typed(Intervention, frozen=True):
-    """Text goes to the program that drives the robot, by its board's serial line."""
+class Typed(Intervention, frozen=True, omit_defaults=True):
+    """Text goes to the program that drives the robot, by its board's serial line. `scripted`: the run was asked for
+    with it, and no person has interfered."""
 
-    text: Annotated[str, msgspec.Meta(max_length=1000)]
+    text: Annotated[str, msgspec.Meta(max_length=TEXT_MAXIMUM)]
+    scripted: bool = False
 
 
 Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter | Typed
@@ -123,6 +126,8 @@ class Tally:
         """It has been carried out before the step at that time of the run."""
         name, last_s = self._slid
         self._slid = (one.name, time_s) if isinstance(one, Parameter) else ("", 0.0)
+        if isinstance(one, Typed) and one.scripted:
+            return
         if isinstance(one, Hand):
             self.count += not self._by_hand
             self._by_hand = True

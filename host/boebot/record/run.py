@@ -308,13 +308,13 @@ class Run:
             "odometry_source": self.odometry_source,
             "odometry_error_m": _rounded(self.odometry_error, 3),
             "battery_charge": _rounded(self.battery_charge, 3),
-            "period_s": round(self.period, 6),
-            "steps": self.steps,
+            "period_s": None if self.program else round(self.period, 6),
+            "steps": None if self.program else self.steps,
             "late_steps": self.late_steps,
             "unrealisable": self.unrealisable,
             "behavior_switches": None if brain is None else brain.behavior_switches,
             **{f"{name}_share": _rounded(share, 4) for name, share in shares.items()},
-            "ticks": self.ticks,
+            "ticks": None if self.program else self.ticks,
             "slow_readings": None if few.slow_reading_age is None else sum(map(self.record.count, MESSAGES)),
             "slow_reading_age_s": _rounded(few.slow_reading_age, 6),
             "lost_frames": self.lost_frames,
@@ -339,8 +339,8 @@ class Run:
         return {
             "wall_time_s": _rounded(self.wall_time, 3),
             "real_time_factor": _rounded(self.real_time_factor, 2),
-            "long_steps": self.long_steps,
-            "longest_step_s": _rounded(self.longest_step, 6),
+            "long_steps": None if self.program else self.long_steps,
+            "longest_step_s": None if self.program else _rounded(self.longest_step, 6),
         }
 
     @property

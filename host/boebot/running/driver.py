@@ -31,10 +31,10 @@ class Status(NamedTuple):
 
     run_time: float
     clock_offset: float
-    late_steps: int
-    resets: int = 0
-    lost_frames: int = 0
-    bad_frames: int = 0
+    late_steps: int | None
+    resets: int | None = 0
+    lost_frames: int | None = 0
+    bad_frames: int | None = 0
     sessions_lost: int | None = None
     link: Mapping[str, Mapping[str, int]] = {}
     notices: Sequence[str] = ()

@@ -8,6 +8,7 @@ bit for bit: `boebot replay --again` takes them from the record.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from operator import itemgetter
 
 import msgspec
 
@@ -58,6 +59,51 @@ class Onlooker:
 
     def look(self, time_s: float, *, is_over: bool = False) -> None:
         """Steps are done; nothing happens meanwhile. `is_over`: nothing happens any more, and all is in the record."""
+
+
+class Together(Onlooker):
+    """Several of them."""
+
+    def __init__(self, *onlookers: Onlooker) -> None:
+        self._onlookers = onlookers
+
+    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
+        """See `Onlooker`."""
+        for one in self._onlookers:
+            one.begin(robots, results)
+
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+        """See `Onlooker`."""
+        for one in self._onlookers:
+            yield from one.before_step(number, time_s)
+
+    def refuse(self, number: int, error: BoebotError) -> None:
+        """See `Onlooker`."""
+        for one in self._onlookers:
+            one.refuse(number, error)
+
+    def look(self, time_s: float, *, is_over: bool = False) -> None:
+        """See `Onlooker`."""
+        for one in self._onlookers:
+            one.look(time_s, is_over=is_over)
+
+
+class Script(Onlooker):
+    """Types to the one robot that a program drives, at given times."""
+
+    def __init__(self, texts: Iterable[tuple[str, float]]) -> None:
+        """`texts`: each with its time (s) of the run."""
+        self._due = sorted(texts, key=itemgetter(1))
+        self._robot = 0
+
+    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
+        """See `Onlooker`."""
+        self._robot = next(number for number, robot in enumerate(robots) if robot.driver.is_program)
+
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+        """See `Onlooker`."""
+        while number == self._robot and self._due and self._due[0][1] <= time_s:
+            yield Typed(self._due.pop(0)[0], scripted=True)
 
 
 class Hands:

@@ -7,15 +7,16 @@ The host only lets time pass, keeps what comes with the time of each byte, and s
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from boebot.boards import BoardSession
 from boebot.devices.readings import Readings
 from boebot.errors import BoardError, MissingTextError, printable
 from boebot.link.messages import Status as StatusBits
 from boebot.link.transport import Following
+from boebot.record.monitor import Monitor
 from boebot.robot import Robot
 from boebot.running.driver import TICK_S, Driver, Status, step_limit
-from boebot.running.monitor import Monitor
 from boebot.running.tasks import Task
 
 
@@ -83,7 +84,8 @@ class ProgramDriver(Driver):
 
     def status(self) -> Status:
         """See `boebot.running.driver.Driver`."""
-        return Status(run_time=self._line.now(), clock_offset=0.0, late_steps=0, notices=list(self.session.notes()))
+        unknown: dict[str, Any] = dict.fromkeys(("late_steps", "resets", "lost_frames", "bad_frames"))
+        return Status(run_time=self._line.now(), clock_offset=0.0, **unknown, notices=list(self.session.notes()))
 
     def _show(self, time_s: float, line: str) -> None:
         who = f"robot {self.task.number}: " if len(self.task.request.members) > 1 else ""

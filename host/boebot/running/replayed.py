@@ -31,6 +31,8 @@ def replayed(result: Run, brain: object) -> list[Command]:
         BoebotError: the run has no commands.
         BrainError: the brain cannot be loaded, or fails.
     """
+    if result.program:
+        raise BoebotError(f"{result.brain} drove the robot, a program that sensed for itself; expected --again")
     if not result.record.count("command"):
         raise BoebotError(f"there is nothing to compare: the run has no commands; {EXPECTED}")
     loaded = brains.load_brain(brain)

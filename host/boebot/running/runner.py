@@ -39,6 +39,7 @@ def run(
     parameters: Mapping[str, Any] | None = None,
     expect_text: str = "",
     fail_text: str = "",
+    typed: Sequence[tuple[str, float]] = (),
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
@@ -71,6 +72,7 @@ def run(
             (docs/how-to/several-behaviors.md).
         expect_text: of a program: the run is over once this was printed; not printed in time is an error.
         fail_text: of a program: that this was printed is an error.
+        typed: to a program, by its board's serial line: texts, each with its time (s), as in [("go\\n", 0.5)].
         progress: called with the run's time so far (s), about ten times a second.
 
     Raises:

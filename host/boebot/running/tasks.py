@@ -20,6 +20,7 @@ from boebot.errors import BoebotError, BrainError, CallError, NotRealisableError
 from boebot.guests import CHECKS, guests
 from boebot.imperfections import checked
 from boebot.record.brain_record import MadeOf
+from boebot.record.interventions import TEXT_MAXIMUM
 from boebot.record.record import Record
 from boebot.running.driver import check_time_to_live
 
@@ -88,7 +89,7 @@ class Request(_NamesFiles):
 
     Attributes:
         members: the robots; several share one simulated world.
-        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text: as of
+        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text, typed: as of
             `boebot.run`.
         record: what happens is recorded.
     """
@@ -105,6 +106,7 @@ class Request(_NamesFiles):
     pins: bool = False
     expect_text: str = ""
     fail_text: str = ""
+    typed: Sequence[tuple[str, float]] = ()
 
     @classmethod
     def single(
@@ -134,6 +136,14 @@ class Request(_NamesFiles):
                 raise BoebotError(f"{name} is {switch!r}; expected True or False")
         expect("expect_text", self.expect_text, "a text", str)
         expect("fail_text", self.fail_text, "a text", str)
+        for each in self.typed:
+            if not isinstance(each, tuple | list) or [type(one) for one in each] not in ([str, float], [str, int]):
+                raise BoebotError(f"typed has {each!r}; expected texts, each with its time in s")
+            if len(each[0]) > TEXT_MAXIMUM or not each[1] >= 0:
+                raise CallError(
+                    f"{each[0][:20]!r}, {len(each[0])} letters, cannot be typed at {each[1]:g} s; expected at most "
+                    f"{TEXT_MAXIMUM} letters, and a time from 0 s on"
+                )
         expect("members", self.members, "a list of boebot.Member", list, tuple)
         if not self.members:
             raise BoebotError("there is no robot to run; expected at least one Member")
@@ -180,7 +190,9 @@ class Request(_NamesFiles):
             except BoebotError as error:
                 raise of_robot(error, number, len(self.members)) from None
         kind = default_board([task.board.robot for task in tasks]) if self.on is None else self.on
-        if any(task.brain.is_program for task in tasks):
+        programs = [task for task in tasks if task.brain.is_program]
+        _check_options(self, len(programs))
+        if programs:
             kind = _board_of_programs(self, tasks)
         if self.pins and (is_live(kind) or not any(task.board.robot.has_board for task in tasks)):
             raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
@@ -232,6 +244,21 @@ def of_robot(error: BaseException, number: int, count: int) -> BaseException:
     return named
 
 
+def _check_options(request: Request, programs: int) -> None:
+    """Raises CallError where an option is of a program's monitor or of a brain, and the run has none, or several."""
+    for name in ("expect_text", "fail_text", "typed"):
+        if getattr(request, name) and programs != 1:
+            option = "--type" if name == "typed" else _option(name)
+            raise CallError(f"{option} goes to the one program of a run; there are {programs} in this one")
+    for name in ("step_timeout", "force_timing"):
+        if getattr(request, name) and programs == len(request.members):
+            raise CallError(f"{_option(name)} is of a brain; expected none where a program drives")
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
 def _board_of_programs(request: Request, tasks: Sequence[Task]) -> str:
     """What programs run on.
 
@@ -253,6 +280,9 @@ def _task(member: Member, request: Request, number: int) -> Task:
     expect("parameters", member.parameters, 'values by name, as in {"avoid.turn": 0.4}', Mapping, type(None))
     given = member.parameters or {}
     loaded, description, period_s = prepare(member.brain, member.robot, member.period)
+    for option, value in (("--period", member.period), ("--set", member.parameters)):
+        if value and loaded.is_program:
+            raise CallError(f"{option} is of a brain; {loaded.name} is a program, which has none")
     finding = None if loaded.is_program else check_timing(description, period_s)
     if finding is not None and not request.force_timing:
         raise NotRealisableError(f"{finding.why} ({finding.see}; --force-timing runs it all the same)")

@@ -12,7 +12,8 @@ live     null; or what can be done while the run goes on (boebot.live)
 Of rows: `state` as of `states`; `contact`: 1 where the body has touched something; `signs`: which devices are on;
 `shown` and `layers`: what the brain showed and sketched; `mind`: what a brain of processes did, or null; `events`:
 time, kind ("contact", "touch", "fault", "lost", "reset" or "intervention") and a text, to which the page adds the
-switches of `mind`; `pins`: output edges of a board's pins, where they were recorded (`time`: float64); `swept`: of each
+switches of `mind`; `printed`: what a program printed, line by line with its time, but in a live view, which shows what
+comes; `pins`: output edges of a board's pins, where they were recorded (`time`: float64); `swept`: of each
 sensor with a fan of rays, of each sweep its time, the sensor's pose and the rays' distances, sweep after sweep (uint16:
 65535 is `reach`, in m), of at most `RAYS_AT_MOST` rays.
 
@@ -24,6 +25,7 @@ from __future__ import annotations
 
 import base64
 import math
+from collections import deque
 from collections.abc import Mapping, Sequence
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -36,6 +38,7 @@ from boebot.devices.device import pin_name
 from boebot.devices.drawing import Item
 from boebot.link.messages import Status
 from boebot.record.interventions import STREAM, in_words
+from boebot.record.monitor import Monitor
 from boebot.record.truth import touch_indices
 from boebot.view import scene, style
 
@@ -55,6 +58,7 @@ RAYS_AT_MOST = 128  # of a sweep: 2 degrees apart in a fan of 240
 WHOLE = 65535  # such a number for the whole reach
 COGNITIVE_AT_MOST = 4  # more cognitive processes are not shown
 EVENTS_AT_MOST = 2_000  # of a stretch
+LINES_AT_MOST = 10_000  # that a program printed: its last ones
 EDGES_AT_MOST = 50_000  # of a pin in a stretch: its first ones
 
 FAULTS = {
@@ -103,6 +107,7 @@ def robot_data(
     return {
         "title": result.title,
         "brain": result.brain,
+        "program": result.program is not None,
         "begin": result.clock_offset,
         "known": view.known,
         "table": table,
@@ -181,8 +186,20 @@ def rows_data(
         "swept": [_swept(one, sweeps_room) for one in view.swept],
         "mind": None if view.brain is None else _mind(view.brain),
         "events": [[round(time, 4), kind, text] for time, kind, text in happened[:EVENTS_AT_MOST]],
+        "printed": _printed(record) if result.program else [],
         "pins": [_pin(name, time, level) for name, (time, level) in edges.items()],
     }
+
+
+def _printed(record: Record) -> list[list[Any]]:
+    """Time (s) and text of the last lines that a program printed."""
+    lines: deque[list[Any]] = deque(maxlen=LINES_AT_MOST)
+    monitor = Monitor(lambda time_s, line: lines.append([round(time_s, 4), line]))
+    for time_s, data in record.each_row("to_host"):
+        monitor.wait(time_s)
+        monitor.hear(time_s, data)
+    monitor.close()
+    return list(lines)
 
 
 def states(series: Columns) -> NDArray[np.intp]:

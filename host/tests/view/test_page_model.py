@@ -48,7 +48,7 @@ def rows(time: list[float], x: list[float] | None = None, **more: Any) -> dict[s
         "path": [packed(time if x is None else x), none, none],
         **dict.fromkeys(("state", "contact"), packed([0] * len(time), "u1")),
         "shown": {"time": packed([]), "numbers": [], "texts": []},
-        **{name: [] for name in ("readings", "signs", "layers", "swept", "events", "pins")},
+        **{name: [] for name in ("readings", "signs", "layers", "swept", "events", "pins", "printed")},
         **dict.fromkeys(("estimate", "mind")),
     }
     return made | more

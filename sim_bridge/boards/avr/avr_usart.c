@@ -1,7 +1,8 @@
 /* avr_usart.c: USART0 in asynchronous mode (20), and the line between it and the outside.
  *
  * The line is a waveform in each direction: the outside's bytes back to back, 8N1, at the outside's bit rate, and the
- * board's frames at its own. A receiver looks for a falling edge and samples the middle of each bit by its own clock, so
+ * board's frames at its own. An outside that follows the board reads each frame at that frame's bit rate, and sends at the
+ * one that the board has when the byte's turn comes; bytes wait while the board's receiver is off. A receiver looks for a falling edge and samples the middle of each bit by its own clock, so
  * that a wrong bit rate gives what it gives on the bench: garbage and framing errors. The board's receiver holds two bytes in its buffer and one in the shift register; when a start
  * bit comes while all three are full, the third is lost and the next byte read bears DOR0 (20.8.1). RXC is set when the
  * stop bit has been sampled, a little before its end.
@@ -24,7 +25,8 @@ enum { RX_MASK = 1, TX_MASK = 2 };                                              
 #define LINE_BITS 10u /* of the outside's frames */
 #define FRACTION 16   /* binary places of the times on the line */
 #define SLOWEST_BAUD 300u
-#define FOLLOWS 0u /* a rate: the board's own */
+#define FOLLOWS 0u               /* a rate: the board's own */
+#define HELD (UINT64_C(1) << 62) /* a time that does not come: of frames that wait */
 
 /* ---- the line ---- */
 
@@ -171,17 +173,26 @@ static uint8_t read_data(avr_board *b, uint16_t address, uint64_t cycle) {
 
 /* ---- transmitter ---- */
 
+/* By which the outside reads the byte at `outside_start`. */
+static uint64_t outside_bit_time(const usart_state *u) {
+  const line_queue *q = &u->from_board;
+  for (size_t i = q->first; u->line_follows && i < q->end; i++) {
+    if (u->outside_start < end_of(&q->frames[i])) return q->frames[i].bit_time;
+  }
+  return u->line_bit_time;
+}
+
 /* The outside's receiver: when it will have read the next byte. */
 static void plan_outside(avr_board *b) {
   usart_state *u = &b->usart;
   u->outside_start = falling_edge(&u->from_board, u->outside_from);
   bool idle = u->outside_start == NEVER;
-  set_due(b, DUE_OUTSIDE, idle ? NEVER : (u->outside_start + (uint64_t)LINE_BITS * u->line_bit_time) >> FRACTION);
+  set_due(b, DUE_OUTSIDE, idle ? NEVER : (u->outside_start + LINE_BITS * outside_bit_time(u)) >> FRACTION);
 }
 
 void usart_due_outside(avr_board *b, uint64_t cycle) {
   usart_state *u = &b->usart;
-  uint64_t bit_time = u->line_bit_time;
+  uint64_t bit_time = outside_bit_time(u);
   uint8_t byte = 0;
   for (unsigned bit = 0; bit < 8; bit++) {
     if (line_level(&u->from_board, u->outside_start + bit_time * (2 * bit + 3) / 2)) byte |= (uint8_t)(1u << bit);
@@ -331,6 +342,21 @@ static void write_setting(avr_board *b, uint16_t address, uint8_t value, uint64_
 
 /* ---- the outside ---- */
 
+/* Of an outside that follows the board: frames to it that have not begun wait while it does not listen, and go at its
+ * present rate. */
+static void time_frames(avr_board *b) {
+  usart_state *u = &b->usart;
+  bool waits = u->receiver == RECEIVER_OFF;
+  uint64_t now = b->clock << FRACTION, start = waits ? HELD : now + u->line_bit_time;
+  u->line_free = waits ? HELD : now;
+  for (size_t i = u->to_board.first; i < u->to_board.end; i++) {
+    line_frame *f = &u->to_board.frames[i];
+    bool has_changed = f->bit_time != u->line_bit_time || (f->start >= HELD) != waits;
+    if (f->start > now && has_changed) *f = (line_frame){start, u->line_bit_time, LINE_BITS, f->byte};
+    u->line_free = start = end_of(f);
+  }
+}
+
 void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count) {
   usart_state *u = &b->usart;
   if (at < b->clock) at = b->clock;
@@ -361,6 +387,7 @@ void usart_line_rate(avr_board *b, uint32_t baud) {
   if (baud != FOLLOWS && baud < SLOWEST_BAUD) baud = SLOWEST_BAUD;
   const uint32_t own = b->usart.bit_time < 1u << FRACTION ? b->usart.bit_time << FRACTION : UINT32_MAX;
   b->usart.line_bit_time = baud == FOLLOWS ? own : (uint32_t)(((uint64_t)BOARD_CLOCK_HZ << FRACTION) / baud);
+  if (baud == FOLLOWS) time_frames(b);
   if (b->usart.outside_start != NEVER) plan_outside(b);
 }
 

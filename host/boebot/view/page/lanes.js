@@ -232,20 +232,7 @@ function makeLanes() {
   const legend = Object.values(EVENTS).map(([mark, , words]) => mark + " " + words);
   lanes = [{ name: "events", legend: legend.join("\n"), height: 20, draw: drawEvents, at: eventAt }];
   if (run.mind) lanes.push(mindLane());
-  lanes.push({
-    name: "motors",
-    height: 42,
-    range: () => [-1.1, 1.1],
-    curves: [
-      { times: ticks, value: i => run.left.values[i], colour: colours.end },
-      { times: ticks, value: i => run.right.values[i], colour: colours.estimate },
-    ],
-    scale: () => [
-      [0.5, "L", colours.end],
-      [-0.5, "R", colours.estimate],
-    ],
-    at: t => "left " + signed(run.left.values[tickAt(t)]) + ", right " + signed(run.right.values[tickAt(t)]),
-  });
+  if (!run.program) lanes.push(motorsLane());
   const ping = run.reading("ping");
   if (ping)
     lanes.push(
@@ -284,6 +271,22 @@ function makeLanes() {
       height: 19,
     });
   $("signals").style.setProperty("--height", AXIS + lanes.reduce((sum, lane) => sum + lane.height, 0) + "px");
+}
+function motorsLane() {
+  return {
+    name: "motors",
+    height: 42,
+    range: () => [-1.1, 1.1],
+    curves: [
+      { times: ticks, value: i => run.left.values[i], colour: colours.end },
+      { times: ticks, value: i => run.right.values[i], colour: colours.estimate },
+    ],
+    scale: () => [
+      [0.5, "L", colours.end],
+      [-0.5, "R", colours.estimate],
+    ],
+    at: t => "left " + signed(run.left.values[tickAt(t)]) + ", right " + signed(run.right.values[tickAt(t)]),
+  };
 }
 // Of a number that stands until the next one.
 function numberLane(name, times, value, { colour, range, scale, at }) {

@@ -101,6 +101,7 @@ class Run {
     };
     this.events = [];
     this.pins = [];
+    this.printed = [];
     this.placed = null; // where it has been put while time stands still
     this.names = 0; // how many numbers, texts, layers and pins have come: a new one asks for new panels
     if (rows) this.append(rows);
@@ -136,6 +137,7 @@ class Run {
     if (this.mind && rows.mind) this.appendMind(rows.mind);
     this.appendEvents(rows.events);
     rows.pins.forEach(pin => this.appendPin(pin));
+    this.printed.push(...rows.printed);
   }
   appendShown(shown) {
     const before = this.shownTime.length,

@@ -19,6 +19,8 @@ function makePanels() {
   $("lamps").replaceChildren(...cells.lamps);
   hide("sensors", !run.signs.length);
   hide("mind", !run.mind);
+  hide("motors", run.program); // it does not say what they get
+  if (!pageIsLive) hide("printed", !run.printed.length);
   makeUtilities();
   makeFigures();
   makeReadings();
@@ -133,12 +135,23 @@ function tellMoment() {
   [...run.numbers, ...run.texts].forEach((one, k) => {
     if (cells.shown[k]) cells.shown[k].textContent = shownText(one, now);
   });
+  if (!pageIsLive && run.program) tellPrintedBy(now);
   say("pose", asPose(place));
   if (run.estimate) {
     const ghost = poseAt(run.time.values, run.estimate, now);
     say("estimate", asPose(ghost));
     say("error", Math.hypot(ghost[0] - place[0], ghost[1] - place[1]).toFixed(2) + " m");
   }
+}
+const LINES = 200; // before the moment that is shown
+function tellPrintedBy(time) {
+  let end = run.printed.length;
+  while (end > 0 && run.printed[end - 1][0] > time) end--;
+  const lines = run.printed.slice(Math.max(0, end - LINES), end),
+    text = lines.map(([at, line]) => at.toFixed(4).padStart(9) + "  " + line).join("\n");
+  if ($("print").textContent === text) return;
+  $("print").textContent = text;
+  $("print").scrollTop = $("print").scrollHeight;
 }
 function readingText({ values, digits, unit }, i) {
   const value = values.values[i];

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boebot.running.monitor import LINE_MAXIMUM, PATIENCE_S, Monitor
+from boebot.record.monitor import LINE_MAXIMUM, PATIENCE_S, Monitor
 
 
 def heard(
