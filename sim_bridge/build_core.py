@@ -21,6 +21,7 @@ typedef struct { ...; } sensor_kind;
 """
 AFTER = """
 static const double WHISKER_HEIGHT_M, SUPPLY_NOMINAL_V;
+static const int PART_READINGS;
 typedef struct { body_state state; uint32_t id; ...; } body;
 void body_init(body *self, const body_parameters *parameters, double reach);
 void body_place(body *self, double x, double y, double heading);
@@ -52,6 +53,7 @@ struct robot {
   brown_out brown_out;
   battery *battery;
   double held_supply;
+  int part_count;
   buffer received, received_at, truth, looks, tones;
   bool is_stamped;
   edge_log edges;

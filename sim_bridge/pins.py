@@ -97,11 +97,9 @@ class BoardPins(BoardMemory):
         self._plug(device, unplugged=False)
 
     def _plug(self, device: str, *, unplugged: bool) -> None:
-        found = self._robot.description.device.get(device)
-        for pin in set(found.pins().values()) if found else ():
-            self._check(lib.robot_unplug(self._robot.handle, pin, unplugged), f"device {device!r}")
-        if not found:
+        if device not in (parts := self._robot.parts):
             raise BoardError(f"device {device!r}: the robot has no such thing")
+        lib.robot_unplug(self._robot.handle, parts[device], unplugged)
 
     def supply(self, volts: float | None) -> None:
         """Holds the 5 V rail of board and servos at that voltage; None: what the regulator gives."""

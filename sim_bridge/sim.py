@@ -6,7 +6,7 @@ import math
 import struct
 import weakref
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -65,13 +65,28 @@ class Member:
     board: EmulatedBoard | None
     description: robots.RobotDescription
     """with the imperfections that it was added with"""
-    model: Any
+    model: Any = None
     """the VehicleModel of a robot without a board"""
+    layout: Mapping[str, slice] = field(default_factory=dict)
+    """where the readings of each device stand, by its name"""
+    parts: Mapping[str, int] = field(default_factory=dict)
+    """numbers of the devices' parts at its board, by their names"""
 
 
 _kept: dict[int, tuple[object, ...]] = {}
 """What a simulation in C points to, by its address. Were it kept by the Sim, the collector of cycles, which takes
 things apart in any order, could free a board before the simulation that runs it."""
+
+
+def _layout(robot: Any, parts: Mapping[str, int]) -> dict[str, slice]:
+    """Where the readings of each device of a robot (C `robot *`) with a board stand; `parts`: in order."""
+    room = ffi.new("double[]", lib.PART_READINGS * max(len(parts), 1))
+    counts = [lib.robot_read_parts(robot, number, room) for number in parts.values()]
+    found = {
+        name: slice(counts[0] - here, counts[0] - after)
+        for name, here, after in zip(parts, counts, [*counts[1:], 0], strict=True)
+    }
+    return {name: where for name, where in found.items() if where.start < where.stop}
 
 
 def rows_of(buffer: Any, width: int) -> Floats:
@@ -216,10 +231,12 @@ class Sim:
         status = lib.sim_add_robot(self.handle, number, board.address, body, *pose)
         self._check_place(status, pose)
         done(status, f"the {board.description}")
-        self.members[number] = Member(board, description, None)
+        self.members[number] = member = Member(board, description)
         me = weakref.ref(self)
         board.is_in_use = lambda: (sim := me()) is not None and sim._handle is not None
-        join(lib.sim_robot(self.handle, number), description, draw)
+        robot = lib.sim_robot(self.handle, number)
+        parts = join(robot, description, draw)
+        self.members[number] = replace(member, parts=parts, layout=_layout(robot, parts))
 
     def _add_vehicle(self, number: int, description: robots.RobotDescription, pose: Pose) -> None:
         from sim_bridge.vehicles.model_file import vehicle_model
@@ -229,7 +246,7 @@ class Sim:
         self._check_place(status, pose)
         done(status, f"robot {description.name!r}")
         model.in_use = True
-        self.members[number] = Member(None, description, model)
+        self.members[number] = Member(None, description, model, dict(model.names))
 
     def _check_place(self, status: int, pose: Pose) -> None:
         if status == lib.SIM_NOT_FREE:
@@ -440,19 +457,24 @@ class SimRobot:
         self._need_board("bytes")
         lib.robot_send(self.handle, data, len(data))
 
-    # ---- without a board ---------------------------------------------------------------------------------------------
+    # ---- what its devices are and do ---------------------------------------------------------------------------------
 
     @property
     def layout(self) -> Mapping[str, slice]:
-        """Where the readings of each device stand; of a robot without a board."""
-        model = self.sim.members[self.number].model
-        return {} if model is None else dict(model.names)
+        """Where the readings of each device stand: of a robot with a board what its parts show of themselves."""
+        return self.sim.members[self.number].layout
+
+    @property
+    def parts(self) -> Mapping[str, int]:
+        """Numbers of the parts at its board, by the names of their devices."""
+        return self.sim.members[self.number].parts
 
     def readings(self) -> tuple[float, ...]:
-        """All readings now, in SI units; of a robot without a board."""
+        """All readings, in SI units: now, and of some parts at a board of the time since they were last asked for."""
         vehicle = self.handle.vehicle
         if not vehicle:
-            return ()
+            room = ffi.new("double[]", lib.PART_READINGS * max(len(self.parts), 1))
+            return tuple(ffi.unpack(room, lib.robot_read_parts(self.handle, 0, room)))
         lib.vehicles_sense(vehicle, 0)
         count = vehicle.model.readings
         return tuple(ffi.unpack(vehicle.readings, count)) if count else ()
@@ -478,6 +500,16 @@ class SimRobot:
         """Why a robot without a board can go no further, or ""."""
         vehicle = self.handle.vehicle
         return ENDS[vehicle.worlds[0].state.flag] if vehicle else ""
+
+    def set_part(self, device: str, value: float) -> None:
+        """Works a device at its board, such as a button (0, 1) or a knob (0 to 1).
+
+        Raises:
+            BoardError: it has none that can be set so.
+        """
+        parts = self.parts
+        if device not in parts or lib.robot_set_part(self.handle, parts[device], value) != lib.SIM_OK:
+            raise BoardError(f"device {device!r} of robot {self.description.name!r} cannot be set to {value:g}")
 
     # ---- its line ----------------------------------------------------------------------------------------------------
 

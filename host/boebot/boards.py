@@ -132,6 +132,21 @@ class Session(Protocol):
             BoebotError: a robot stands there, or there is no such shape, or the robot is real.
         """
 
+    @property
+    def layout(self) -> Mapping[str, slice]:
+        """Where the readings of each device stand, by its name in the robot's description."""
+
+    def readings(self) -> tuple[float, ...]:
+        """All readings now, in SI units."""
+
+    def set_part(self, device: str, value: float) -> None:
+        """Works a device of a simulated robot, from now on: 1 presses a button or closes a switch, 0 lets go of it; a
+        knob is turned to a value from 0 to 1.
+
+        Raises:
+            BoebotError: the robot has no such device, or it cannot be set so.
+        """
+
     def counters(self) -> Mapping[str, float]:
         """What board and world counted, by name; may be empty."""
 
@@ -140,7 +155,8 @@ class Session(Protocol):
 
 
 class BoardSession(Session, Protocol):
-    """A board."""
+    """A board. `layout` and `readings` are of what is wired to it, as it shows itself to people; no program reads
+    them."""
 
     @property
     def transport(self) -> Transport:
@@ -160,13 +176,6 @@ class VehicleSession(Session, Protocol):
     @property
     def tick_s(self) -> float:
         """Seconds that one step lasts."""
-
-    @property
-    def layout(self) -> Mapping[str, slice]:
-        """Where the readings of each device stand, by its name in the robot's description."""
-
-    def readings(self) -> tuple[float, ...]:
-        """All readings now, in SI units."""
 
     def step(self, left: float, right: float) -> None:
         """One step under these motor signals, -1 to 1."""
@@ -267,6 +276,16 @@ class LiveSession:
     def place_shape(self, index: int, x: float, y: float, heading: float) -> None:
         """By hand only."""
         raise BoardError(f"what stands around the {self.description} is moved by hand: only a simulator can do it")
+
+    layout: Mapping[str, slice] = {}
+
+    def readings(self) -> tuple[float, ...]:
+        """Nobody sees what is wired to a real board."""
+        return ()
+
+    def set_part(self, device: str, value: float) -> None:
+        """By hand only."""
+        raise BoardError(f"what is wired to the {self.description} is worked by hand: expected a simulated robot")
 
     def counters(self) -> Mapping[str, float]:
         """A port counts nothing."""

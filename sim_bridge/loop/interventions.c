@@ -78,15 +78,4 @@ int robot_answer_ping(robot *self, int64_t echo_cycles) {
   return status;
 }
 
-int robot_unplug(robot *self, uint8_t pin, int unplugged) {
-  int status = SIM_BAD_ARGUMENT;
-  for (int i = 0; i < self->part_count; i++) {
-    part *p = self->parts[i];
-    for (int k = 0; k < PART_PINS; k++) {
-      if (p->pins[k].pin != pin || p->pins[k].pin == PART_NO_PIN) continue;
-      part_unplug(p, unplugged != 0);
-      status = SIM_OK;
-    }
-  }
-  return status;
-}
+void robot_unplug(robot *self, int number, int unplugged) { part_unplug(self->parts[number], unplugged); }

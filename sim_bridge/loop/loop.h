@@ -68,6 +68,13 @@ robot *sim_robot(const sim *self, int number);
  * what has a side 0 left, 1 right), and `parameters` as its kind says. Returns SIM_OK or an error. */
 int robot_add_part(robot *self, const part_kind *kind, int index, const uint8_t *pins, const void *parameters);
 
+/* What the parts from number `first` on (in the order in which they were joined, from 0) show of themselves, one after
+ * another; returns how many numbers. */
+int robot_read_parts(robot *self, int first, double *values);
+
+/* A person works the part of that number. Returns SIM_OK or an error: it cannot be set so. */
+int robot_set_part(robot *self, int number, double value);
+
 /* Puts a sensor on the turret at that pin: the part that drives `pin` of the board, or is measured there. The sensor's
  * place and heading are those with the turret straight ahead. */
 int robot_mount(robot *self, uint8_t turret_pin, uint8_t pin);
@@ -105,12 +112,12 @@ int robot_place(robot *self, double x, double y, double heading);
 int sim_place_shape(sim *self, int shape, double x, double y, double heading);
 
 /* For tests: a pin taken from its part and driven at a cycle, or by a square wave of that half period for that long;
- * length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part at a pin pulled
- * out (1) or put in again (0). Pins, levels and periods have been checked (pins.py). Return SIM_OK or an error. */
+ * length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part of a number
+ * pulled out (1) or put in again (0). Pins, levels and periods have been checked (pins.py). Return SIM_OK or an error. */
 void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level);
 int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int robot_answer_ping(robot *self, int64_t echo_cycles);
-int robot_unplug(robot *self, uint8_t pin, int unplugged);
+void robot_unplug(robot *self, int number, int unplugged);
 
 /* The voltage of the rail as it is now goes to all that runs on it: after a change of `held_supply`, too. */
 void robot_update_supply(robot *self);

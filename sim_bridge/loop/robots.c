@@ -17,6 +17,20 @@ turret *robot_turret(const robot *self, uint8_t pin) {
   return NULL;
 }
 
+int robot_read_parts(robot *self, int first, double *values) {
+  int count = 0;
+  for (int i = first; i < self->part_count; i++) {
+    part *p = self->parts[i];
+    if (p->op->read != NULL) count += p->op->read(p, values + count);
+  }
+  return count;
+}
+
+int robot_set_part(robot *self, int number, double value) {
+  part *p = self->parts[number];
+  return p->op->set != NULL && p->op->set(p, value) == 0 ? SIM_OK : SIM_BAD_ARGUMENT;
+}
+
 void robot_update_supply(robot *self) {
   chassis *c = &self->chassis;
   const int held = self->held_supply > 0.0;

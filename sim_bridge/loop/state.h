@@ -35,7 +35,7 @@ struct robot {
   battery *battery;   /* NULL: a supply that never sags */
   double held_supply; /* share of the nominal voltage that a test holds, or 0 */
   buffer received;
-  buffer received_at;   /* cycle of the end of each of them, while `is_stamped` */
+  buffer received_at; /* cycle of the end of each of them, while `is_stamped` */
   bool is_stamped;
   uint64_t last_byte;   /* cycle of the end of the last byte received */
   uint64_t listen_from; /* bytes end a run from this cycle on */

@@ -21,7 +21,8 @@
 
 #define PART_GUARD BOARD_GUARD_CYCLES
 #define PART_NO_PIN 255u
-#define PART_PINS 8 /* at most, of one part */
+#define PART_PINS 8     /* at most, of one part */
+#define PART_READINGS 4 /* at most, of one part */
 
 /* What a part does with its pin. */
 enum {
@@ -88,6 +89,12 @@ typedef struct {
 
   /* The voltage at the part's analog pin. */
   double (*analog)(part *self, uint64_t cycle);
+
+  /* What pages show of it, now or since they last asked: fills in up to PART_READINGS numbers, and returns how many. */
+  int (*read)(part *self, double *values);
+
+  /* A person works it: a button, a knob. Returns 0, or -1: it cannot be set so. */
+  int (*set)(part *self, double value);
 } part_operations;
 
 struct part {

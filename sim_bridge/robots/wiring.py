@@ -20,8 +20,9 @@ NO_PIN = 255
 FIRST_ANALOG_PIN = 14
 
 
-def join(robot: Any, description: robots.RobotDescription, draw: imperfections.Draw) -> None:
-    """Joins battery and every device that is on to a robot of a simulation (C `robot *`).
+def join(robot: Any, description: robots.RobotDescription, draw: imperfections.Draw) -> dict[str, int]:
+    """Joins battery and every device that is on to a robot of a simulation (C `robot *`). Returns the numbers of the
+    parts that devices have there.
 
     Devices without a part in the world are left alone. A Ping sits on the turret where there are both.
 
@@ -31,6 +32,7 @@ def join(robot: Any, description: robots.RobotDescription, draw: imperfections.D
     """
     _join_supply(robot, description, draw)
     counts: Counter[type] = Counter()
+    numbers = {}
     for name, device in description.device.items():
         if not device.on:
             continue
@@ -38,14 +40,15 @@ def join(robot: Any, description: robots.RobotDescription, draw: imperfections.D
         part = part_of(device, At(side, counts[type(device)], description.body, draw))
         counts[type(device)] += 1
         if part is not None:
+            numbers[name] = int(robot.part_count)
             done(add_part(robot, part), f"device {name!r}")
     for device in description.device.values():
         if isinstance(device, PositionServo) and device.on:
             _mount(robot, device, description)
-    for name, device in description.device.items():
-        if device.on and not device.plugged:
-            for pin in device.pins().values():
-                done(lib.robot_unplug(robot, pin, 1), f"device {name!r}")
+    for name, number in numbers.items():
+        if not description.device[name].plugged:
+            lib.robot_unplug(robot, number, 1)
+    return numbers
 
 
 def add_part(robot: Any, part: Part) -> int:

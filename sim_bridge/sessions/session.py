@@ -38,6 +38,19 @@ class InWorld:
         """Where the robot and the arena's moving shapes are."""
         return self.robot.truth_now()
 
+    @property
+    def layout(self) -> Mapping[str, slice]:
+        """Where the readings of each device stand."""
+        return self.robot.layout
+
+    def readings(self) -> tuple[float, ...]:
+        """All readings: see `SimRobot.readings`."""
+        return self.robot.readings()
+
+    def set_part(self, device: str, value: float) -> None:
+        """Works a device: see `SimRobot.set_part`."""
+        self.robot.set_part(device, value)
+
     def place(self, x: float, y: float, heading: float) -> None:
         """Lifts the robot and puts it there, at rest."""
         self.robot.place(x, y, heading)
@@ -169,14 +182,9 @@ class DirectSession(InWorld):
 
     def __init__(self, robot: SimRobot, wait: Wait, *, shared: bool = False) -> None:
         super().__init__(robot, shared=shared)
-        self.layout: Mapping[str, slice] = robot.layout
         self.description = f"robot without a board in arena {robot.sim.arena.name}"
         self._wait = wait
         self._cycles = round(STEP_S * CLOCK_HZ)
-
-    def readings(self) -> tuple[float, ...]:
-        """All readings now."""
-        return self.robot.readings()
 
     def step(self, left: float, right: float) -> None:
         """One step under these motor signals."""

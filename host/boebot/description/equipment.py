@@ -92,10 +92,10 @@ class Equipment:
 def places(
     robot: RobotDescription, tick_s: float, layout: Layout | None = None, message_ticks: int = MESSAGE_TICKS
 ) -> dict[str, Place]:
-    """Where each device is that a brain can read; arguments as of `Equipment`."""
+    """Where each device is that a brain can read, or that is in the layout; arguments as of `Equipment`."""
     found = {}
     for name, device in robot.device.items():
-        if device.READING is None or not device.on or (layout is not None and name not in layout):
+        if not device.on or (device.READING is None if layout is None else name not in layout):
             continue
         where = slice(0, 1) if layout is None else layout[name]
         found[name] = Place(name, robot.device, robot.body.wheel_radius_m, tick_s, message_ticks, where)

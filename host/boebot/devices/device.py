@@ -243,8 +243,10 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
         return False
 
     def columns(self, place: Place, run: Run) -> list[Column]:
-        """Its columns of run.csv."""
-        raise NotImplementedError
+        """Its columns of run.csv: one per entry of COLUMNS, each of which is one reading of the device, unless its kind
+        says more."""
+        values = run.values(place.name)
+        return [Column(field, unit, values[:, i], digits) for i, (field, unit, digits) in enumerate(self.COLUMNS)]
 
     def readout(self, place: Place, run: Run, columns: Mapping[str, Column]) -> Readout | None:
         """What pages show of it as a number."""
@@ -253,6 +255,10 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
         name, unit, factor, digits = self.SHOWN
         ages = columns["age"].values if "age" in columns else run.ages(place.name)
         return Readout(place.name, unit, digits, columns[name].values * factor, ages)
+
+    def sign(self) -> tuple[str, str] | None:
+        """`SIGN`, of this one."""
+        return self.SIGN
 
     def drawing(self, name: str) -> list[Item]:
         """What it looks like from above, in the robot's frame: where it sits, and which way it looks, unless its kind
@@ -323,11 +329,6 @@ class VehicleDevice(Device, frozen=True, kw_only=True):
     def reading(self, values: Sequence[float], age: float) -> Any:
         """Its reading by its values among the robot's readings, so old (s)."""
         raise NotImplementedError
-
-    def columns(self, place: Place, run: Run) -> list[Column]:
-        """One per entry of COLUMNS, each of which is one number of the device."""
-        values = run.values(place.name)
-        return [Column(field, unit, values[:, i], digits) for i, (field, unit, digits) in enumerate(self.COLUMNS)]
 
 
 class Sensor(VehicleDevice, frozen=True, kw_only=True):

@@ -203,7 +203,7 @@ class Columns(ABC):
 
     def signs(self) -> list[tuple[str, str, Bools]]:
         """Devices that are on or off, as pages show them: name, colour, and whether on at each tick."""
-        signs = [(device, self.robot.device[device].SIGN) for device in self._places]
+        signs = [(device, self.robot.device[device].sign()) for device in self._places]
         return [(device, sign[1], self.flag(device, sign[0])) for device, sign in signs if sign is not None]
 
     def sweeps(self) -> list[Sweeps]:

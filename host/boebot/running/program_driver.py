@@ -21,7 +21,7 @@ from boebot.running.tasks import Task
 
 
 class ProgramDriver(Driver):
-    """See `boebot.running.driver.Driver`. Its `layout` is empty: the host reads no device."""
+    """See `boebot.running.driver.Driver`. Its readings are those of parts at the board."""
 
     def __init__(self, session: BoardSession, task: Task) -> None:
         """Raises BoardError where the board's line cannot be listened to at its own bit rate."""
@@ -35,7 +35,7 @@ class ProgramDriver(Driver):
         self.step_limit = step_limit(task.request.step_timeout)
         self.period_s = self.tick_s = TICK_S
         self.link = self.identity = None
-        self.layout = {}
+        self.layout = session.layout
         self._monitor = Monitor(self._show, task.request.expect_text, task.request.fail_text)
 
     is_program = True
@@ -70,7 +70,9 @@ class ProgramDriver(Driver):
         self._monitor.wait(self._line.now())
 
     def _put_aside(self, time_s: float, tick: int) -> None:
-        self.task.record.append_readings(time_s, Readings(tick, int(StatusBits.MOTORS_ENABLED), (), ()), 0.0, 0.0)
+        values = self.session.readings()
+        readings = Readings(tick, int(StatusBits.MOTORS_ENABLED), (0.0,) * len(values), values)
+        self.task.record.append_readings(time_s, readings, 0.0, 0.0)
 
     def type(self, text: str) -> None:
         """See `boebot.running.driver.Driver`."""
