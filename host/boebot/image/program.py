@@ -10,9 +10,9 @@ Every emulated board reads one, so an ELF file needs no library here.
 
 from __future__ import annotations
 
+import binascii
 import struct
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 
 from boebot.errors import AnalysisError
@@ -29,6 +29,8 @@ BOOT_BEGIN = 0x7000  # of the largest boot section
 DATA_SPACE, EEPROM_SPACE = 0x800000, 0x810000  # where ELF files have these memories
 OTHER_SPACES = 0x820000  # from here on fuses, lock bits, signature
 SIZE_MAXIMUM = 64 << 20  # bytes of a file
+HEX_MAXIMUM = 1 << 20  # of a HEX file: one with a record for each byte of flash and EEPROM has 0.5 MB
+OTHER_BYTES = 5  # of a record besides its data
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,25 +90,63 @@ def elf_program(path: Path, data: bytes) -> Program:
             variables_end = max(variables_end, first + in_memory)
         if offset + length > len(data):
             raise AnalysisError(f"{what} cannot be loaded: it is cut short")
-        memory.put(address, data[offset : offset + length])
+        if wrong := memory.unfit(address, data[offset : offset + length]):
+            raise AnalysisError(f"{what} cannot be loaded: {wrong}")
     return memory.program(begin if BOOT_BEGIN <= begin < code_end else 0, code_end, variables_end, path, assumed)
 
 
 def hex_program(path: Path, data: bytes) -> Program:
-    """The program in the bytes of a HEX file at that path. Raises as `read_program`."""
-    from intelhex import IntelHex, IntelHexError
+    """The program in the bytes of a HEX file at that path. Raises as `read_program`, naming the line.
 
-    what = f"the firmware image {path}"
-    found = IntelHex()
-    try:
-        found.loadhex(StringIO(data.decode("ascii")))
-    except (IntelHexError, UnicodeDecodeError) as error:
-        raise AnalysisError(f"{what} is no HEX file, or is damaged: {' '.join(str(error).split())}") from None
+    A record (Intel, "Hexadecimal Object File Format", revision A): a colon, and in hexadecimal digits the number of
+    data bytes, their address (two bytes), the record's type, the data, and what makes the sum of all bytes 0.
+    """
+    what, base, is_over = f"the firmware image {path}", 0, False
     memory = _Memory(what)
-    for begin, end in found.segments():
-        memory.put(begin, found.tobinstr(begin, end - 1))
+    if len(data) > HEX_MAXIMUM:
+        raise AnalysisError(
+            f"{what} is no HEX file for an {CHIP}: it has {len(data)} B; expected {HEX_MAXIMUM} at most"
+        )
+    for number, line in enumerate(data.splitlines(), 1):
+        record = line.strip()
+        if not record:
+            continue
+        row, wrong = _bytes_of(record), ""
+        if len(row) < OTHER_BYTES or len(row) != row[0] + OTHER_BYTES:
+            wrong = "expected a colon, and two digits for each byte of a record as long as it says"
+        elif sum(row) & 0xFF:
+            wrong = f"its checksum is 0x{row[-1]:02X}; expected 0x{-sum(row[:-1]) & 0xFF:02X}"
+        elif is_over:
+            wrong = "it follows the record that ends the file"
+        else:
+            address, body = int.from_bytes(row[1:3], "big"), row[4:-1]
+            match row[3], len(body):
+                case 0, _:
+                    wrong = memory.unfit(base + address, body)
+                case 1, 0:
+                    is_over = True
+                case 2, 2:  # a segment's begin, in paragraphs of 16 bytes
+                    base = int.from_bytes(body, "big") << 4
+                case 4, 2:  # the upper half of an address
+                    base = int.from_bytes(body, "big") << 16
+                case 3 | 5, 4:  # where a PC's program begins; an AVR's begins at its reset
+                    pass
+                case kind, length:
+                    wrong = f"there is no record of type {kind} with {length} bytes of data"
+        if wrong:
+            raise AnalysisError(f"{what} is no HEX file, or is damaged: line {number}: {wrong}")
+    if not is_over and memory.flash_end:
+        raise AnalysisError(f"{what} is cut short: its last line is not the record that ends it, :00000001FF")
     assumed = f"{what} does not say which chip it is for: it is taken for an {CHIP}"
     return memory.program(0, memory.flash_end, RAM_BEGIN, None, assumed)
+
+
+def _bytes_of(record: bytes) -> bytes:
+    """Of a line of a HEX file; none where it is no record."""
+    try:
+        return binascii.unhexlify(record[1:]) if record.startswith(b":") else b""
+    except binascii.Error:
+        return b""
 
 
 class _Memory:
@@ -115,19 +155,26 @@ class _Memory:
     def __init__(self, what: str) -> None:
         self._what = what
         self._flash, self._eeprom = bytearray(b"\xff" * FLASH_SIZE), bytearray(b"\xff" * EEPROM_SIZE)
+        self._given = bytearray(FLASH_SIZE + EEPROM_SIZE)  # of each byte of flash, then of EEPROM: 1, if it is given
         self.flash_end = 0
 
-    def put(self, address: int, data: bytes) -> None:
-        """Bytes at an address as files have it."""
-        into, at = (self._flash, address) if address < DATA_SPACE else (self._eeprom, address - EEPROM_SPACE)
+    def unfit(self, address: int, data: bytes) -> str:
+        """Puts bytes at an address as files have it; or says why they do not fit."""
+        is_flash = address < DATA_SPACE
+        into, at = (self._flash, address) if is_flash else (self._eeprom, address - EEPROM_SPACE)
         if not data or address >= OTHER_SPACES:
-            return
+            return ""
+        what = f"its {len(data)} bytes at address 0x{address:X}"
         if at < 0 or at + len(data) > len(into):
-            what = f"its {len(data)} bytes at address 0x{address:X}"
-            raise AnalysisError(f"{self._what} cannot be loaded: {what} do not fit into an {CHIP}")
+            return f"{what} do not fit into an {CHIP}"
+        given = slice(first := at + (0 if is_flash else FLASH_SIZE), first + len(data))
+        if any(self._given[given]):
+            return f"some of {what} are there twice"
+        self._given[given] = b"\1" * len(data)
         into[at : at + len(data)] = data
-        if into is self._flash:
+        if is_flash:
             self.flash_end = max(self.flash_end, at + len(data))
+        return ""
 
     def program(self, begin: int, code_end: int, variables_end: int, elf: Path | None, assumed: str) -> Program:
         """All of it."""
