@@ -18,6 +18,8 @@ GENERATED_FROM := $(wildcard protocol/*.py host/*/generator/*.py protocol/*.toml
 FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name 'build_*.py')
 ARENA_SCHEMA := host/boebot/arenas/bundled/schema.json
+# A library that sketches in tests use.
+SERVO := build/cache/libraries/Servo/Servo.h
 IMAGES := $(patsubst %,build/images/%.elf,$(shell sed -n 's/^default_envs = //p' platformio.ini | tr -d ,))
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -177,7 +179,7 @@ check-generated:
 
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
-ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done
+ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done $(SERVO)
 ready-bench: ready-test build/mcap-core/.done
 ready-soak: ready-bench build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
@@ -242,11 +244,14 @@ build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) bu
 	@$(PYTHON_VENV) setup.py --quiet build_ext --inplace >build/core.log 2>&1 || { cat build/core.log; exit 1; }
 	@touch $@
 
+$(SERVO): | $(VENV)/.done-boebot
+	@BOEBOT_CACHE=build/cache $(PYTHON_VENV) -c 'from boebot.sketch import servo; servo.libraries()'
+
 $(ARENA_SCHEMA): host/boebot/arenas/description.py tools/arena_pages.py | $(VENV)/.done-boebot
 	@$(PYTHON_VENV) -m tools.arena_pages --schema
 
 build/platformio-core/appstate.json: tools/prepare_platformio.py $(VENV)/.done-firmware \
-		$(shell find tools/platformio -name '*.py' -o -name '*.json')
+		host/boebot/sketch/core_directory.py $(shell find tools/platformio host/boebot/sketch/platforms -name '*.py' -o -name '*.json')
 	@$(PYTHON_VENV) tools/prepare_platformio.py
 
 build/.done-generated: $(GENERATED_FROM) build/.done-system-run

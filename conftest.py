@@ -27,6 +27,9 @@ settings.register_profile("same every time", max_examples=8 if SANITIZED else 30
 settings.register_profile("fuzz", max_examples=int(EXAMPLES or 100), deadline=None, print_blob=True)
 settings.load_profile("fuzz" if EXAMPLES else "same every time")
 
+# What sketches are built to: not the user's own.
+os.environ.setdefault("BOEBOT_CACHE", str(Path(__file__).resolve().parent / "build" / "cache"))
+
 # A shell without job control lets its background processes ignore Ctrl-C, and their children: tests need to be heard.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -200,6 +200,7 @@ setup(
         "boebot": ["slips.toml"],
         "boebot.brains": ["*.toml"],
         "boebot.cli": ["*.txt"],
+        "boebot.sketch": ["platforms/*/*.json", "platforms/*/boards/*.json"],
         "boebot.imperfections": ["*.toml"],
         "boebot.arenas.bundled": ["*.toml", "*.json"],
     },

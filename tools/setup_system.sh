@@ -39,6 +39,7 @@ for purpose in "$@"; do
       need gcc-avr has avr-gcc
       need binutils-avr has avr-objcopy
       need avr-libc sh -c 'echo "#include <avr/io.h>" | avr-gcc -mmcu=atmega328p -E -'
+      need arduino-core-avr test -e /usr/share/arduino/hardware/arduino/avr/platform.txt
       need cargo-web has_cargo
       need ca-certificates test -e /etc/ssl/certs/ca-certificates.crt
       ;;

@@ -89,6 +89,10 @@ class NotRealisableError(BoebotError):
     """A robot, a brain's period and a line that cannot go together in time."""
 
 
+class SketchError(BoebotError):
+    """A sketch does not compile, or does not fit into the chip."""
+
+
 class MissingTextError(BoebotError):
     """A program did not print the text that was waited for."""
 

@@ -25,8 +25,8 @@ import os
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from sysconfig import get_path
 from types import ModuleType
@@ -46,6 +46,7 @@ _OTHERS = (FOLDER.parent, *map(get_path, ("stdlib", "purelib", "platlib")))  # t
 _NOBODYS = ("<frozen ", *(f"{folder}{os.sep}" for folder in _OTHERS))  # what files begin with that are not the user's
 PYTHON, TOML = ".py", ".toml"  # what brains are written in
 PROGRAMS = (".elf", ".hex")  # for the board: they drive a robot in place of a brain
+SKETCHES = (".ino", ".pde", ".ini")  # of which one is built
 _executing: set[tuple[Path, int]] = set()  # files that are being loaded, each with its thread
 
 
@@ -64,6 +65,8 @@ class LoadedBrain:
     """The brain of processes behind `step`, if it is one: its `steps` and `switches` record the run."""
     main: MainBrain | None = None
     """What runs `main(robot)` behind `step`, if that is the brain."""
+    sources: Mapping[str, bytes] = field(default_factory=dict)
+    """Of a program that was built of a sketch: its files by name."""
 
     @property
     def is_program(self) -> bool:
@@ -107,15 +110,32 @@ def bundled_files() -> dict[str, Path]:
     return {path.stem: path for path in FOLDER.iterdir() if path.suffix in (PYTHON, TOML) and path.stem[0] != "_"}
 
 
-def load_program(source: object) -> LoadedBrain | None:
-    """The program for the board in a file; None: that names no such file.
+def names_program(source: object) -> bool:
+    """That is meant to be a program for the board: an ELF or HEX file, or a sketch or a folder, of which one is built.
+    The name of a bundled brain means that brain."""
+    if not isinstance(source, str | Path) or str(source) in bundled_files():
+        return False
+    return Path(source).suffix in (*PROGRAMS, *SKETCHES) or os.path.isdir(source)  # noqa: PTH112 (no error where it is too long)
+
+
+def load_program(source: object, progress: Callable[[float], object] | None = None) -> LoadedBrain | None:
+    """The program for the board in a file, or built of a sketch or project; None: that names no such thing.
+    `progress`: is called with the seconds that a build has taken.
 
     Raises:
         CallError: it is not there.
+        BoebotError: it cannot be built, as `boebot.sketch.build.built` says.
     """
-    if not isinstance(source, str | Path) or Path(source).suffix not in PROGRAMS:
+    if isinstance(source, LoadedBrain) and source.is_program:
+        return source
+    if not isinstance(source, str | Path) or not names_program(source):
         return None
     path = Path(source)
+    if path.suffix not in PROGRAMS:
+        from boebot.sketch.build import built
+
+        made = built(path, progress)
+        return LoadedBrain(made.name, lambda robot: None, path=made.elf, sources=made.sources)
     if not path.is_file():
         raise CallError(f"there is no program {path}; expected an ELF or HEX file")
     return LoadedBrain(as_utf8(path.name), lambda robot: None, path=path.resolve())
@@ -222,7 +242,7 @@ def _first_line(error: BaseException) -> str:
 
 def _find(source: str | Path) -> Path:
     path = Path(source)
-    if path.suffix in PROGRAMS:
+    if names_program(source):
         raise BrainError(f"{path} is a program for a board; expected a brain, a Python or TOML file")
     if path.suffix in (PYTHON, TOML) or len(path.parts) > 1:
         if path.is_file():

@@ -46,7 +46,7 @@ def one_of(names: Callable[[], Iterable[str]], *suffixes: str) -> Complete:
 # Their modules are imported when TAB is pressed.
 complete_robots = one_of(lambda: import_module("boebot.description.robots").robot_names(), ".toml")
 complete_arenas = one_of(lambda: import_module("boebot.arenas").arena_names(), ".toml")
-complete_brains = one_of(lambda: import_module("boebot.brains").bundled(), ".py", ".toml", ".elf", ".hex")
+complete_brains = one_of(lambda: import_module("boebot.brains").bundled(), ".py", ".toml", ".ino", ".elf", ".hex")
 
 
 # ---- options ---------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from boebot.brains import PROGRAMS, bundled
+from boebot.brains import LoadedBrain, bundled, load_program, names_program
 from boebot.cli import options, output, quantity, streams
 from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError, CallError, MissingTextError
@@ -34,7 +34,9 @@ Several robots in one simulated world:
 
 A program for the Arduino Uno drives in place of a brain; what it prints is shown with its time:
 
-  boebot run blink.elf --expect-text ready --timeout 2000
+  boebot run blink.ino --expect-text ready --timeout 2000
+
+It is a sketch, which PlatformIO builds, the folder of one, a folder with a platformio.ini, or an ELF or HEX file.
 
 What is typed at the terminal goes to it; a script types by --type 'go\\n@0.5'. With --json its text is on standard
 error, with --quiet it is left out.
@@ -54,8 +56,8 @@ def run(
             metavar="BRAIN",
             autocompletion=options.complete_brains,
             help="What drives it: a bundled brain by its name, a Python file with step(robot), main(robot), a class "
-            "Brain or brain = Brain([...]), a TOML file of processes, or a program for the Uno, ELF or HEX; several: a "
-            "robot for each.",
+            "Brain or brain = Brain([...]), a TOML file of processes, or a program for the Uno: .ino, folder, .elf, "
+            ".hex; several: a robot for each.",
         ),
     ],
     on: options.RunOn = None,
@@ -158,10 +160,11 @@ def run(
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     assigned = _assigned(parameters or [], count)
+    drivers = {one: _built(one, quiet) for one in dict.fromkeys(brain)}
     request = Request(
         members=[
             Member(
-                brain=brain[index % len(brain)],
+                brain=drivers[brain[index % len(brain)]],
                 robot=kinds[index % len(kinds)],
                 pose=poses[index] if index < len(poses) else None,
                 period=period,
@@ -183,7 +186,7 @@ def run(
         fail_text=fail_text,
         typed=[_typed(text) for text in typed or []],
     )
-    programs = [member for member in request.members if Path(str(member.brain)).suffix in PROGRAMS]
+    programs = [member for member in request.members if isinstance(member.brain, LoadedBrain)]
     name = brain[0] if len(brain) == 1 else f"{count} robots"
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
@@ -205,6 +208,14 @@ def run(
 
 
 run.__doc__ = _HELP
+
+
+def _built(name: str, quiet: bool) -> object:
+    """The program that is built of a sketch; what else drives a robot is left to be found."""
+    if not names_program(name):
+        return name
+    with output.progress_bar(f"building {name}", math.inf, quiet) as progress:
+        return load_program(name, progress)
 
 
 def _assigned(texts: list[str], count: int) -> list[dict[str, Any]]:

@@ -1,6 +1,7 @@
 """The files that a run came from, as they are attached to its record, and taken from there to repeat it.
 
 brain/NAME.py   the brain's file; beside it those that it had imported from its own folder when the run began
+sketch/NAME.ino   where a program was built of a sketch: its files; the program itself is brain/NAME.elf
 robot/NAME.toml, arena/NAME.toml   where they were given as files
 
 Of several robots, names of brain and robot begin with robot-1/, robot-2/ and so on.
@@ -27,6 +28,7 @@ def sources(request: Request, tasks: Sequence[Task]) -> dict[str, bytes]:
         prefix = _prefix(number, len(tasks))
         if task.brain.path is not None and task.brain.path.is_file():
             found |= {f"{prefix}brain/{name}": data for name, data in _brain(task.brain.path).items()}
+        found |= {f"{prefix}sketch/{as_utf8(name)}": data for name, data in task.brain.sources.items()}
         if isinstance(member.robot, str | Path):
             found |= _description(f"{prefix}robot/", member.robot)
     return found

@@ -48,9 +48,9 @@ class _NamesFiles:
     def __post_init__(self) -> None:
         for name in vars(self).keys() & {"arena", "brain", "robot"}:
             value = getattr(self, name)
-            suffixes = (brains.PYTHON, brains.TOML, *brains.PROGRAMS)
-            is_name = not isinstance(value, str | Path) or Path(value).suffix not in suffixes
-            if not is_name and os.path.isfile(value):  # noqa: PTH113 (no error where it is too long)
+            is_name = not isinstance(value, str | Path) or Path(value).suffix not in (brains.PYTHON, brains.TOML)
+            is_program = name == "brain" and brains.names_program(value)
+            if is_program or (not is_name and os.path.isfile(value)):  # noqa: PTH113 (no error where it is too long)
                 object.__setattr__(self, name, Path(value).absolute())
 
 

@@ -1,0 +1,336 @@
+"""Builds a sketch or a project, by PlatformIO: the ELF file, kept in the user's cache.
+
+PlatformIO turns .ino files into C++ in the folder of the sources, so a sketch is built as a copy; what the compiler
+says, and the debugging information, name the user's own files. The ELF file of a sketch is kept under a hash of all
+that it is made of: its files and the tools. With the same ones it is there at once, and PlatformIO is not even loaded.
+A project may be made of anything; PlatformIO looks each time at what has changed, in the project's own folder.
+
+    cache/core-HASH/            a core directory for PlatformIO, without its registry
+    cache/libraries/            libraries that were downloaded
+    cache/objects/              compiled files, for all builds
+    cache/work/HASH/            of a user's folder: the copy, and PlatformIO's files; build.log: all that it said
+    cache/programs/HASH/        finished ELF files
+
+One build at a time. What is finished gets its name in one go, so that it is whole or not there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import importlib.util
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from boebot.errors import BoebotError, CallError, SketchError
+from boebot.sketch import cache, core_directory, servo
+from boebot.sketch.find import LIBRARIES, PROJECT, Project, Sketch, below, find
+
+Progress = Callable[[float], object]  # is called with the seconds that a build has taken
+
+HERE = Path(__file__).resolve().parent
+BOARDS = sorted(path.stem for path in HERE.glob("platforms/atmelavr/boards/*.json"))  # with the chip that is emulated
+CLOCK = "16000000L"  # Hz, of that chip
+SILENCE_S = 30.0  # of PlatformIO, after which it waits for what cannot be reached
+FURTHER_ERRORS = 3  # that are shown after the first one
+SKETCH_INI = """\
+[platformio]
+src_dir = sketch
+
+[env:uno]
+platform = atmelavr
+board = uno
+framework = arduino
+build_src_filter = +<*> -<libraries/>
+lib_extra_dirs = sketch/libraries
+"""
+_ERROR = re.compile(r"^(?P<file>[^\s:][^:\n]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<what>.+)$", re.MULTILINE)
+_MISSING = re.compile(r"(\S+): No such file or directory$")
+_TOO_LARGE = {
+    re.compile(r"region `text'|The program size"): "the 32,256 bytes of flash that are for programs",
+    re.compile(r"region `data'|The data size"): "the 2,048 bytes of RAM, with its variables alone",
+}
+_NO_PLACE = re.compile(r"undefined reference to .+|multiple definition of [^:\n]+|^\w*Error: .+", re.MULTILINE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Built:
+    """What came of a build.
+
+    Attributes:
+        name: of the sketch or project, as people know it.
+        elf: the file.
+        sources: the sketch's own files by their names in its folder.
+    """
+
+    name: str
+    elf: Path
+    sources: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def built(path: Path, progress: Progress | None = None) -> Built:
+    """The program of a sketch or project.
+
+    Raises:
+        CallError: the path is none, it means several, or it is for another board.
+        SketchError: it does not compile, or is too large.
+        BoebotError: a tool is missing, or a file cannot be read or written.
+    """
+    found = find(path)
+    try:
+        return _sketch(found, progress) if isinstance(found, Sketch) else _project(found, progress)
+    except OSError as error:
+        what = f"{error.filename or cache()}: {error.strerror or error}"
+        raise BoebotError(f"{found.name} cannot be built: {what}") from None
+
+
+def _sketch(sketch: Sketch, progress: Progress | None) -> Built:
+    tools = _Tools.found()
+    key = _hash(tools.versions, sketch.folder, sketch.name, sorted(sketch.files.items()))
+    elf = cache() / "programs" / key / f"{Path(sketch.name).stem}.elf"
+    if not elf.is_file():
+        with _alone():
+            if not elf.is_file():
+                _keep(_build_sketch(tools, sketch, progress), elf)
+    own = {name: data for name, data in sketch.files.items() if not name.startswith(f"{LIBRARIES}/")}
+    return Built(name=sketch.name, elf=elf, sources=own)
+
+
+def _build_sketch(tools: _Tools, sketch: Sketch, progress: Progress | None) -> Path:
+    work = _work(sketch.folder, sketch.name)
+    copy = work / "sketch"
+    shutil.rmtree(copy, ignore_errors=True)
+    for name, data in sketch.files.items():
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).write_bytes(data)
+    (work / PROJECT).write_text(SKETCH_INI, encoding="utf-8")
+    needs_servo = servo.is_needed(sketch.files)
+    process = _PlatformIO(tools, work, progress, needs_servo)
+    return process.build(sketch, "uno", work, copy)
+
+
+def _project(project: Project, progress: Progress | None) -> Built:
+    tools = _Tools.found()
+    with _alone():
+        process = _PlatformIO(tools, _work(project.folder), progress)
+        code, said = process.run("project", "config", "--json-output", "-d", str(project.folder))
+        if code:
+            raise CallError(f"{project.shown / PROJECT} is no project of PlatformIO's: {' '.join(said.split())}")
+        sections = {name: dict(options) for name, options in json.loads(said[said.index("[[") :])}
+        src = project.folder / sections.get("platformio", {}).get("src_dir", "src")
+        process.needs_servo = "servo" not in str(sections).lower() and servo.is_needed(
+            {one.name: one.read_bytes() for folder in (src, project.folder / "lib") for one in below(folder)}
+        )
+        made = process.build(project, _environment(project, sections), project.folder, project.folder)
+        elf = cache() / "programs" / _hash(made.read_bytes()) / f"{project.name}.elf"
+        _keep(made, elf)
+    return Built(name=project.name, elf=elf)
+
+
+def _environment(project: Project, sections: Mapping[str, Mapping[str, Any]]) -> str:
+    """The one environment of a project that is for a board with the chip that is emulated."""
+    environments = {name.removeprefix("env:"): of for name, of in sections.items() if name.startswith("env:")}
+    default = sections.get("platformio", {}).get("default_envs") or environments
+    boards = {name: of.get("board") for name, of in environments.items() if name in default}
+    clocks = {name: environments[name].get("board_build.f_cpu", CLOCK) for name in boards}
+    fitting = [name for name, board in boards.items() if board in BOARDS and clocks[name] == CLOCK]
+    ini = project.shown / PROJECT
+    if not fitting:
+        there = ", ".join(f"{name} for {board} at {clocks[name]} Hz" for name, board in boards.items()) or "none"
+        raise CallError(f"{ini} has environments {there}; expected one for {' or '.join(BOARDS)} at {CLOCK} Hz")
+    if len(fitting) > 1:
+        names = ", ".join(fitting)
+        raise CallError(f"{ini} has several environments, {names}; expected default_envs = {fitting[0]}, say, in it")
+    return fitting[0]
+
+
+# ---- PlatformIO ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Tools:
+    """How PlatformIO is called, on what its builds depend, and whether the distribution's packages do it."""
+
+    command: tuple[str, ...]
+    versions: str
+    is_prepared: bool
+
+    @classmethod
+    def found(cls) -> _Tools:
+        """With the distribution's packages where all of them are there, else the user's own PlatformIO.
+
+        Raises:
+            BoebotError: there is no PlatformIO.
+        """
+        kits = [one.read_bytes() for one in sorted(HERE.rglob("*.*")) if one.suffix in (".py", ".json")]
+        compiler, here = shutil.which("avr-gcc"), (sys.executable, "-m", "platformio")
+        is_here = importlib.util.find_spec("platformio") is not None
+        if is_here and importlib.util.find_spec("SCons") and compiler and core_directory.ARDUINO.is_dir():
+            files = [path.stat() for path in (Path(compiler).resolve(), core_directory.ARDUINO / "platform.txt")]
+            told = [version("platformio"), version("scons"), *((one.st_size, one.st_mtime_ns) for one in files)]
+            return cls(here, _hash(kits, told), True)
+        pio = shutil.which("pio") or shutil.which("pio", path=Path("~/.platformio/penv/bin").expanduser())
+        if not is_here and pio is None:
+            raise BoebotError("sketches are built by PlatformIO; expected it here: pip install 'boebot[firmware]'")
+        return cls(here if is_here or pio is None else (pio,), _hash(kits), False)
+
+
+@dataclass
+class _PlatformIO:
+    """PlatformIO for one folder of the user's; `work`: the folder for its files."""
+
+    tools: _Tools
+    work: Path
+    progress: Progress | None
+    needs_servo: bool = False
+
+    def build(self, found: Sketch | Project, environment: str, folder: Path, base: Path) -> Path:
+        """Builds an environment of the project in `folder`: the ELF file. `base`: what is the user's folder there.
+
+        Raises:
+            SketchError: it does not compile, or is too large.
+        """
+        folders = {base: found.folder, base.relative_to(folder): found.folder}
+        code, said = self.run("run", "-d", str(folder), "-e", environment, folders=folders)
+        made = sorted((self.work / "build" / environment).glob("*.elf"), key=lambda one: one.stat().st_mtime)
+        if code or not made or "The data size " in said:
+            raise self._fault(found, said, folder, base)
+        return made[-1]
+
+    def run(self, *arguments: str, folders: Mapping[Path, Path] | None = None) -> tuple[int, str]:
+        """Calls it: its exit code, and all that it said, which is in build.log, too. `folders`: the user's, which
+        debugging information names, for those where files are compiled.
+
+        Raises:
+            BoebotError: it says nothing more, as where it waits for a network.
+        """
+        settings = {
+            "WORKSPACE_DIR": self.work / "workspace",
+            "BUILD_DIR": self.work / "build",
+            "BUILD_CACHE_DIR": cache() / "objects",
+            "BUILD_FLAGS": "-gdwarf-4",
+            "EXTRA_SCRIPTS": f"post:{HERE / 'link_flags.py'}",
+            "SETTING_ENABLE_TELEMETRY": "no",
+            "DISABLE_UPGRADE_CHECK": "true",
+            "NO_ANSI": "true",
+        }
+        if self.tools.is_prepared:
+            settings["CORE_DIR"] = _core(self.tools)
+        if self.needs_servo:
+            settings["GLOBALLIB_DIR"] = servo.libraries()
+        mapped = [f"{one}={users}" for one, users in (folders or {}).items() if one not in (Path(), users)]
+        own = {"LC_ALL": "C", "BOEBOT_FOLDERS": json.dumps(mapped)}
+        environment = {f"PLATFORMIO_{name}": str(value) for name, value in settings.items()} | own
+        log, begin_s = self.work / "build.log", time.monotonic()
+        heard_s, size = begin_s, 0
+        with (
+            log.open("wb") as words,
+            _ended(
+                subprocess.Popen(
+                    [*self.tools.command, *arguments],
+                    cwd=self.work,
+                    env=os.environ | environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=words,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,  # Ctrl-C comes to it from here
+                )
+            ) as process,
+        ):
+            while process.poll() is None:
+                time.sleep(0.02)
+                now_s = time.monotonic()
+                if size != (size := log.stat().st_size):
+                    heard_s = now_s
+                if now_s - heard_s > SILENCE_S:
+                    last = log.read_text("utf-8", "replace").strip().rpartition("\n")[2]
+                    silent = f"PlatformIO says nothing more for {SILENCE_S:g} s"
+                    raise BoebotError(f"{silent} after {last!r}; expected its registry within reach; see {log}")
+                if self.progress is not None:
+                    self.progress(now_s - begin_s)
+        return process.returncode, log.read_text("utf-8", "replace")
+
+    def _fault(self, found: Sketch | Project, said: str, folder: Path, base: Path) -> SketchError:
+        """What the compiler says, with the user's own paths."""
+        too_large = [what for sign, what in _TOO_LARGE.items() if sign.search(said)]
+        errors = []
+        for one in _ERROR.finditer(said):
+            path, what = Path(folder, one["file"]), one["what"]
+            place = found.shown / path.relative_to(base) if path.is_relative_to(base) else path
+            if header := _MISSING.search(what):
+                what = f"there is no {header[1]}; expected its library in {found.shown / LIBRARIES}, or, of a project, "
+                what += f"in lib_deps of its {PROJECT}"
+            errors.append(f"{place}:{one['line']}: {what}")
+        errors = list(dict.fromkeys(errors or _NO_PLACE.findall(said))) or ["PlatformIO has failed"]
+        sentence = f"does not fit into {too_large[0]}" if too_large else f"does not compile: {errors[0]}"
+        error = SketchError(f"{found.name} {sentence}")
+        for note in (*errors[1 : 1 + FURTHER_ERRORS], f"all that was said is in {self.work / 'build.log'}"):
+            error.add_note(note)
+        return error
+
+
+@contextlib.contextmanager
+def _ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+    """Ends it afterwards, with all that it has begun, if it has not: by Ctrl-C first, for then it tidies up."""
+    try:
+        yield process
+    finally:
+        for number in (signal.SIGINT, signal.SIGKILL):
+            if process.poll() is None:
+                with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
+                    os.killpg(process.pid, number)
+                    process.wait(timeout=5)
+
+
+# ---- the cache -------------------------------------------------------------------------------------------------------
+
+
+def _core(tools: _Tools) -> Path:
+    """The prepared core directory; made the first time."""
+    core = cache() / f"core-{tools.versions}"
+    if not core.is_dir():
+        part = core.with_name(".part-core")
+        shutil.rmtree(part, ignore_errors=True)
+        core_directory.prepare(part)
+        part.replace(core)
+    return core
+
+
+def _work(*of: object) -> Path:
+    """A folder for what belongs to that."""
+    work = cache() / "work" / _hash(of)
+    work.mkdir(parents=True, exist_ok=True)
+    return work
+
+
+def _keep(made: Path, elf: Path) -> None:
+    """The finished file, whole or not at all."""
+    elf.parent.mkdir(parents=True, exist_ok=True)
+    part = elf.with_name(f".part-{elf.name}")
+    shutil.copyfile(made, part)
+    part.replace(elf)
+
+
+@contextlib.contextmanager
+def _alone() -> Iterator[None]:
+    """No other process builds meanwhile."""
+    cache().mkdir(parents=True, exist_ok=True)
+    with (cache() / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _hash(*of: object) -> str:
+    return hashlib.sha256(repr(of).encode("utf-8", "surrogateescape")).hexdigest()[:32]
