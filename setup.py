@@ -197,10 +197,9 @@ setup(
     ],
     package_data={
         "": ["py.typed", "*.pyi", "*.html", "*.css", "*.js"],
-        "boebot": ["slips.toml"],
+        "boebot": ["slips.toml", "sketch/platforms/**/*.json"],
         "boebot.brains": ["*.toml"],
         "boebot.cli": ["*.txt"],
-        "boebot.sketch": ["platforms/*/*.json", "platforms/*/boards/*.json"],
         "boebot.imperfections": ["*.toml"],
         "boebot.arenas.bundled": ["*.toml", "*.json"],
     },
