@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import boebot
+import copied_process
 from boebot.result import RunResult, read_run
+from boebot.running.again import again as repeated
+from boebot.running.again import recorded
 
 pytestmark = pytest.mark.emulated
 
@@ -17,7 +20,18 @@ WIRING = """
 extends = "shieldbot"
 name = "mine"
 firmware = "none"
-remove = ["uart", "whisker_left", "ping"]
+remove = ["uart", "whisker_left", "ping", "battery", "infrared_right"]
+
+[device.start]
+type = "button"
+pin = 2
+position_m = [-0.02, 0.03]
+
+[device.dial]
+type = "potentiometer"
+pin = "A0"
+position = 0.25
+position_m = [-0.02, -0.03]
 
 [device.lamp]
 type = "led"
@@ -31,22 +45,25 @@ colour = "yellow"
 position_m = [-0.03, 0.0]
 """
 
-# Dims the lamp to 64 of 256 by Timer0 for half a second, and lights pin 13 after it: a servo's pin, as well.
+# Dims the lamp by the dial, and lights pin 13, a servo's as well, while the button is pressed.
 SOURCE = """
 #include <avr/io.h>
-#include <util/delay.h>
 int main(void) {
   DDRD = 1 << PD6;
+  PORTD = 1 << PD2;
   DDRB = 1 << PB5;
-  OCR0A = 63;
   TCCR0A = 1 << COM0A1 | 1 << WGM01 | 1 << WGM00;
-  TCCR0B = 1 << CS01 | 1 << CS00;
-  _delay_ms(500);
-  TCCR0A = 0;
-  PORTB = 1 << PB5;
-  for (;;) {}
+  TCCR0B = 1 << CS01;
+  ADMUX = 1 << REFS0;
+  ADCSRA = 1 << ADEN | 1 << ADSC | 1 << ADATE | 7;
+  for (;;) {
+    OCR0A = ADC >> 2;
+    PORTB = PIND & 1 << PD2 ? 0 : 1 << PB5;
+  }
 }
 """
+IDEAL = ["led_spread", "bounce", "potentiometer_noise"]
+INPUTS = [("start", 1, 0.3), ("dial", 0.75, 0.5), ("start", 0, 0.6)]
 
 
 @pytest.fixture(scope="module")
@@ -62,32 +79,49 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def result(folder: Path) -> RunResult:
-    return boebot.run(
-        folder / "wired.elf",
-        robot=folder / "mine.toml",
-        arena="empty",
-        seconds=1,
-        without=["led_spread"],
-        out=folder / "run",
-    )
+    program, robot, out = folder / "wired.elf", folder / "mine.toml", folder / "run"
+    return boebot.run(program, robot=robot, arena="empty", seconds=1, without=IDEAL, inputs=INPUTS, out=out)
 
 
-def test_leds_are_seen_as_bright_as_the_program_makes_them(result: RunResult) -> None:
-    """Fast PWM at 16 MHz / 64, high for 64 of 256 counts: in a tick are nine to ten such pulses of 0.256 ms."""
+def test_the_program_reads_button_and_dial_and_leds_are_as_bright_as_it_makes_them(result: RunResult) -> None:
+    """Fast PWM at 16 MHz / 8, high for n + 1 of 256 counts, n = 256 times the dial's position: 78 periods in a tick."""
     series = result.series
-    lamp, led = series.number("lamp", "brightness"), series.number("board_led", "brightness")
-    half = np.searchsorted(series.time, 0.5)
-    assert lamp[2:half].min() > 9 * 0.0256 and lamp[2:half].max() < 10 * 0.0256 + 1e-6
-    assert lamp[2:half].mean() == pytest.approx(0.25, abs=0.002)
-    assert lamp[half + 1 :].max() == 0.0
-    assert not series.flag("board_led", "lit")[: half - 1].any()
-    assert led[half + 2 :] == pytest.approx(1.0)
-    assert {name for name, *_ in series.signs()} == {"lamp", "board_led"}
+    lamp, led, time = series.number("lamp", "brightness"), series.number("board_led", "brightness"), series.time
+    for low, high, position in ((0.02, 0.5, 0.25), (0.52, 1.0, 0.75)):
+        seen = lamp[(time > low) & (time <= high)]
+        assert seen == pytest.approx(position + 1 / 256, abs=1 / 78)
+        assert seen.mean() == pytest.approx(position + 1 / 256, abs=1e-3)
+    assert led[(time <= 0.3) | (time > 0.615)].max() == 0.0
+    assert led[(time > 0.315) & (time <= 0.6)] == pytest.approx(1.0)
+    assert {name for name, *_ in series.signs()} == {"lamp", "board_led", "start"}
+    assert np.array_equal(series.flag("start", "pressed"), (time > 0.3 + 1e-9) & (time < 0.6 + 1e-9))
+    assert series.number("dial", "position")[-1] == 0.75
 
 
-def test_a_record_and_its_page_have_them(result: RunResult, folder: Path) -> None:
+def test_a_record_its_page_and_a_repetition_have_them(result: RunResult, folder: Path) -> None:
     again = read_run(folder / "run")
-    assert isinstance(again, RunResult)
+    assert isinstance(again, RunResult) and again.touched == 0, "nobody has touched it: a script has"
     assert np.array_equal(again.series.number("lamp", "brightness"), result.series.number("lamp", "brightness"))
-    assert {"lamp_brightness", "lamp_lit"} <= again.series.columns().keys()
+    assert {"lamp_brightness", "lamp_lit", "start_pressed", "dial_position"} <= again.series.columns().keys()
     assert '"lamp"' in (folder / "run" / "replay.html").read_text()
+    assert repeated(recorded(folder / "run")).is_equal
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (
+            ["--input", "button=1@0.5"],
+            "button of robot 'mine' is no button, switch or knob; expected one of start, dial",
+        ),
+        (["--input", "start=0.5@1"], "start cannot be set to 0.5; expected 0 or 1"),
+        (["--input", "dial=2@1"], "dial cannot be set to 2; expected 0 to 1"),
+        (["--input", "start@1"], "--input 'start@1': there is no name, = or @; expected NAME=VALUE@TIME"),
+        (["--input", "start=1@late"], "--input 'start=1@late': 'late' is no time"),
+        (["--input", "start=1@-1"], "start cannot be set at -1 s; expected a time from 0 s on"),
+    ],
+)
+def test_inputs_that_are_none_get_one_sentence(folder: Path, words: list[str], sentence: str) -> None:
+    done = copied_process.command(["run", "wired.elf", "--robot", "mine.toml", *words], folder)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"boebot: {sentence}"), done.stderr

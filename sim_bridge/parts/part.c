@@ -3,6 +3,8 @@
 
 #include "geometry/numbers.h"
 
+#define BOUNCES_MAXIMUM 4
+
 void part_join(part *self, const part_operations *op, const part_place *place, const part_pin *pins, int count) {
   self->op = op;
   self->chassis = place->chassis;
@@ -27,6 +29,22 @@ void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
     if (self->pins[i].pin == pin) self->level[i] = level;
   }
   if (!self->overridden && !self->unplugged) drive(self, at, pin, level);
+}
+
+void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double mean_s) {
+  noise_source *noise = &self->noise;
+  const uint8_t pin = self->pins[0].pin;
+  part_drive(self, at, pin, level);
+  if (mean_s <= 0.0 || !noise->on) return;
+  double length = -mean_s * number_log(1.0 - noise_next_uniform(noise));
+  if (length > 5.0 * mean_s) length = 5.0 * mean_s;
+  const int flicks = (int)(noise_next_uniform(noise) * (BOUNCES_MAXIMUM + 1));
+  const double share = length * BOARD_CLOCK_HZ / (2.0 * BOUNCES_MAXIMUM);
+  double next = (double)at;
+  for (int i = 0; i < 2 * flicks; i++) {
+    next += 16.0 + share * 2.0 * noise_next_uniform(noise);
+    part_drive(self, (uint64_t)next, pin, (i & 1) ? level : before);
+  }
 }
 
 void part_unplug(part *self, int unplugged) {

@@ -1,27 +1,6 @@
 /* whisker.c: see whisker.h. */
 #include "whisker.h"
 
-#include "geometry/numbers.h"
-
-#define BOUNCES_MAXIMUM 4
-
-/* Drives the change and its bounce: an exponential length, cut at five times the mean, a few flicks within it. */
-static void change(whisker *self, uint64_t cycle, uint8_t level) {
-  noise_source *noise = &self->part.noise;
-  const uint8_t pin = self->part.pins[0].pin;
-  part_drive(&self->part, cycle, pin, level);
-  if (self->parameters.bounce_s <= 0.0 || !noise->on) return;
-  double length = -self->parameters.bounce_s * number_log(1.0 - noise_next_uniform(noise));
-  if (length > 5.0 * self->parameters.bounce_s) length = 5.0 * self->parameters.bounce_s;
-  const int flicks = (int)(noise_next_uniform(noise) * (BOUNCES_MAXIMUM + 1));
-  const double share = length * BOARD_CLOCK_HZ / (2.0 * BOUNCES_MAXIMUM);
-  double at = (double)cycle;
-  for (int i = 0; i < 2 * flicks; i++) {
-    at += 16.0 + share * 2.0 * noise_next_uniform(noise);
-    part_drive(&self->part, (uint64_t)at, pin, (i & 1) ? level : (uint8_t)!level);
-  }
-}
-
 static void step(part *base) {
   whisker *self = (whisker *)base;
   const whisker_parameters *p = &self->parameters;
@@ -30,7 +9,8 @@ static void step(part *base) {
       (uint8_t)body_segment_touches(c->body, c->around, p->root_x, p->root_y, p->tip_x, p->tip_y, p->height);
   if (pressed == self->pressed) return;
   self->pressed = pressed;
-  change(self, part_step_end(base) + PART_GUARD, pressed ? BOARD_LOW : BOARD_HIGH);
+  const uint8_t level = pressed ? BOARD_LOW : BOARD_HIGH;
+  part_bounce(base, part_step_end(base) + PART_GUARD, level, (uint8_t)!level, p->bounce_s);
 }
 
 static const part_operations OPERATIONS = {.step = step};

@@ -135,6 +135,15 @@ def run(
             help=r"What a program's serial line gets at that time, as in 'go\n@0.5'; again for each further one.",
         ),
     ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            metavar="NAME=VALUE@TIME",
+            help="Work a device of a program's robot at that time: a button or a switch, as in start=1@0.5, a knob, as "
+            "in dial=30%@2; again for each further one.",
+        ),
+    ] = None,
     timeout: Annotated[
         int | None, typer.Option(metavar="MS", min=1, help="Length of the run in simulated ms, in place of --seconds.")
     ] = None,
@@ -185,6 +194,7 @@ def run(
         expect_text=expect_text,
         fail_text=fail_text,
         typed=[_typed(text) for text in typed or []],
+        inputs=[_input(text) for text in inputs or []],
     )
     programs = [member for member in request.members if isinstance(member.brain, LoadedBrain)]
     name = brain[0] if len(brain) == 1 else f"{count} robots"
@@ -271,6 +281,22 @@ def _typed(text: str) -> tuple[str, float]:
         return what.encode("latin-1", "backslashreplace").decode("unicode_escape"), quantity.parse(time, "s")
     except (BoebotError, UnicodeDecodeError) as error:
         raise CallError(f"--type {text!r} cannot be typed: {error}; expected TEXT@TIME, as in 'go\\n@0.5'") from None
+
+
+def _input(text: str) -> tuple[str, float, float]:
+    """Of "NAME=VALUE@TIME".
+
+    Raises:
+        CallError: it is no such thing.
+    """
+    what, _, time = text.rpartition("@")
+    name, _, value = what.partition("=")
+    try:
+        if not name or not value:
+            raise BoebotError("there is no name, = or @")
+        return name, quantity.parse(value, ""), quantity.parse(time, "s")
+    except BoebotError as error:
+        raise CallError(f"--input {text!r}: {error}; expected NAME=VALUE@TIME, as in start=1@0.5") from None
 
 
 def _pose(text: str) -> tuple[float, float, float]:

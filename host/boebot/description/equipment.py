@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from boebot.devices.device import Place, Reader, kinds
 from boebot.devices.latest import MESSAGE_TICKS
 from boebot.devices.readings import Layout
-from boebot.errors import BrainError, did_you_mean
+from boebot.errors import BoebotError, BrainError, did_you_mean
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
@@ -100,6 +100,17 @@ def places(
         where = slice(0, 1) if layout is None else layout[name]
         found[name] = Place(name, robot.device, robot.body.wheel_radius_m, tick_s, message_ticks, where)
     return found
+
+
+def check_setting(robot: RobotDescription, name: str, value: float) -> None:
+    """Raises BoebotError where no person can work that device of the robot so: see `Device.CONTROL`."""
+    there = [other for other, device in robot.device.items() if device.on and device.CONTROL]
+    if name not in there:
+        expected = f"expected one of {', '.join(there)}{did_you_mean(name, there)}" if there else "it has none"
+        raise BoebotError(f"{name} of robot {robot.name!r} is no button, switch or knob; {expected}")
+    is_slider = robot.device[name].CONTROL == "slider"
+    if not (0 <= value <= 1 if is_slider else value in (0, 1)):
+        raise BoebotError(f"{name} cannot be set to {value:g}; expected {'0 to 1' if is_slider else '0 or 1'}")
 
 
 def needs_messages(robot: RobotDescription) -> bool:

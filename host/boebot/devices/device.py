@@ -13,7 +13,7 @@ import math
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, NamedTuple, Protocol
 
 import msgspec
 import numpy as np
@@ -197,6 +197,9 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     """What pages show of it as a number: name of the column, unit, factor, digits."""
     SIGN: ClassVar[tuple[str, str] | None] = None
     """What pages show of it as a lamp and a lane: name of the column that is true or false, and its colour."""
+
+    CONTROL: ClassVar[Literal["", "button", "switch", "slider"]] = ""
+    """How a person works it, and a page offers that; a slider from 0 to 1, the others 0 or 1."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

@@ -69,6 +69,12 @@ def circle(centre: Sequence[float], radius: float) -> list[Point]:
     return [(centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle)) for angle in angles.tolist()]
 
 
+def square(centre: Sequence[float], side: float) -> list[Point]:
+    """Its corners."""
+    (x, y), half = centre, side / 2
+    return [(x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half)]
+
+
 def arc(position: Point, heading: float, opening: float, reach: float) -> list[Point]:
     """Points so far from there, about a heading."""
     count = 2 * math.ceil(CORNERS * opening / (4 * math.pi)) + 1

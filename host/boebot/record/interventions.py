@@ -1,5 +1,5 @@
 """What a person does to a run between two steps of its brain, as its record has it: drives by hand, lifts the robot,
-changes a parameter (boebot.running.hands carries it out)."""
+changes a parameter, types, presses a button (boebot.running.hands carries it out)."""
 
 from __future__ import annotations
 
@@ -71,7 +71,16 @@ class Typed(Intervention, frozen=True, omit_defaults=True):
     scripted: bool = False
 
 
-Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter | Typed
+class Set(Intervention, frozen=True, omit_defaults=True):
+    """A device at the robot's board is worked: a button pressed (1) or let go (0), a switch closed or opened, a knob
+    turned (0 to 1). `scripted`: as of `Typed`."""
+
+    part: Annotated[str, msgspec.Meta(max_length=TEXT_MAXIMUM)]
+    value: Annotated[float, msgspec.Meta(ge=0, le=1)]
+    scripted: bool = False
+
+
+Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter | Typed | Set
 _DECODER: msgspec.json.Decoder[Deed] = msgspec.json.Decoder(Deed)
 
 
@@ -99,6 +108,8 @@ def in_words(data: bytes) -> str:
             return f"{name} = {value:g}"
         case Typed(text):
             return f"typed {text!r}"
+        case Set(part, value):
+            return f"{part} set to {value:g}"
 
 
 def touched(record: Record) -> int:
@@ -110,8 +121,8 @@ def touched(record: Record) -> int:
 
 
 class Tally:
-    """Counts interventions: driving by hand once, until the brain drives again; a parameter that is moved on within
-    `SLIDE_S` of the run, and nothing else in between, once.
+    """Counts interventions: driving by hand once, until the brain drives again; a parameter or a device that is set
+    again within `SLIDE_S` of the run, and nothing else in between, once.
 
     Attributes:
         count: so far.
@@ -120,18 +131,19 @@ class Tally:
     def __init__(self) -> None:
         self.count = 0
         self._by_hand = False
-        self._slid: tuple[str, float] = "", 0.0  # the parameter that was moved last, and when
+        self._slid: tuple[str, float] = "", 0.0  # what was set last, and when
 
     def add(self, time_s: float, one: Deed) -> None:
         """It has been carried out before the step at that time of the run."""
-        name, last_s = self._slid
-        self._slid = (one.name, time_s) if isinstance(one, Parameter) else ("", 0.0)
-        if isinstance(one, Typed) and one.scripted:
+        if isinstance(one, Typed | Set) and one.scripted:
             return
+        name, last_s = self._slid
+        slides = one.name if isinstance(one, Parameter) else one.part if isinstance(one, Set) else ""
+        self._slid = slides, time_s
         if isinstance(one, Hand):
             self.count += not self._by_hand
             self._by_hand = True
         elif isinstance(one, Release):
             self._by_hand = False
         else:
-            self.count += not (isinstance(one, Parameter) and one.name == name and time_s - last_s < SLIDE_S)
+            self.count += not (slides and slides == name and time_s - last_s < SLIDE_S)

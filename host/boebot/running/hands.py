@@ -13,6 +13,7 @@ from operator import itemgetter
 import msgspec
 
 from boebot.brains import LoadedBrain
+from boebot.description.equipment import check_setting
 from boebot.errors import BoebotError
 from boebot.record.interventions import (
     STREAM,
@@ -22,6 +23,7 @@ from boebot.record.interventions import (
     Parameter,
     Place,
     Release,
+    Set,
     Shape,
     Stop,
     Tally,
@@ -89,11 +91,13 @@ class Together(Onlooker):
 
 
 class Script(Onlooker):
-    """Types to the one robot that a program drives, at given times."""
+    """Does things to the one robot that a program drives, at given times."""
 
-    def __init__(self, texts: Iterable[tuple[str, float]]) -> None:
-        """`texts`: each with its time (s) of the run."""
-        self._due = sorted(texts, key=itemgetter(1))
+    def __init__(self, typed: Iterable[tuple[str, float]], inputs: Iterable[tuple[str, float, float]]) -> None:
+        """As of `boebot.run`."""
+        deeds: list[tuple[Deed, float]] = [(Typed(text, scripted=True), time_s) for text, time_s in typed]
+        deeds += [(Set(part, float(value), scripted=True), time_s) for part, value, time_s in inputs]
+        self._due = sorted(deeds, key=itemgetter(1))
         self._robot = 0
 
     def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
@@ -103,7 +107,7 @@ class Script(Onlooker):
     def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
         """See `Onlooker`."""
         while number == self._robot and self._due and self._due[0][1] <= time_s:
-            yield Typed(self._due.pop(0)[0], scripted=True)
+            yield self._due.pop(0)[0]
 
 
 class Hands:
@@ -152,8 +156,11 @@ class Hands:
                 self.driver.session.place_shape(index, x, y, heading)
             case Typed(text):
                 self.driver.type(text)
+            case Set(part, value):
+                check_setting(self.driver.description, part, value)
+                self.driver.session.set_part(part, value)
             case _ if self.driver.is_program:
-                raise BoebotError("a program drives this robot, no brain: it takes what is typed")
+                raise BoebotError("a program drives this robot, no brain: it takes what is typed, and buttons")
             case _:
                 self.held = carry_out(one, self.driver.robot, self.task.brain, self.held)
 

@@ -73,10 +73,10 @@ def execute(
             task.record = record
         on = next((task.on for task in tasks if task.board.robot.has_board), request.on or DIRECT)
         world = open_world(on, [task.board for task in tasks])
-        if request.typed:
+        if request.typed or request.inputs:
             from boebot.running.hands import Onlooker, Script, Together
 
-            onlooker = Together(Script(request.typed), onlooker or Onlooker())
+            onlooker = Together(Script(request.typed, request.inputs), onlooker or Onlooker())
         try:
             return _Loop(world, request, tasks, progress, recording, folder, onlooker).run()
         finally:

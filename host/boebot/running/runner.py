@@ -40,6 +40,7 @@ def run(
     expect_text: str = "",
     fail_text: str = "",
     typed: Sequence[tuple[str, float]] = (),
+    inputs: Sequence[tuple[str, float, float]] = (),
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
@@ -73,6 +74,8 @@ def run(
         expect_text: of a program: the run is over once this was printed; not printed in time is an error.
         fail_text: of a program: that this was printed is an error.
         typed: to a program, by its board's serial line: texts, each with its time (s), as in [("go\\n", 0.5)].
+        inputs: of the robot of a program: its buttons, switches and knobs, each with a value and its time (s), as in
+            [("start", 1, 0.5), ("start", 0, 0.7), ("dial", 0.3, 2.0)].
         progress: called with the run's time so far (s), about ten times a second.
 
     Raises:

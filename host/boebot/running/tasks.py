@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from boebot import brains
 from boebot.boards import DIRECT, BoardRequest, default_board, is_live
 from boebot.brains import LoadedBrain
-from boebot.description.equipment import Equipment
+from boebot.description.equipment import Equipment, check_setting
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError, CallError, NotRealisableError
 from boebot.guests import CHECKS, guests
@@ -89,8 +89,8 @@ class Request(_NamesFiles):
 
     Attributes:
         members: the robots; several share one simulated world.
-        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text, typed: as of
-            `boebot.run`.
+        arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text, typed,
+            inputs: as of `boebot.run`.
         record: what happens is recorded.
     """
 
@@ -107,6 +107,7 @@ class Request(_NamesFiles):
     expect_text: str = ""
     fail_text: str = ""
     typed: Sequence[tuple[str, float]] = ()
+    inputs: Sequence[tuple[str, float, float]] = ()
 
     @classmethod
     def single(
@@ -144,6 +145,12 @@ class Request(_NamesFiles):
                     f"{each[0][:20]!r}, {len(each[0])} letters, cannot be typed at {each[1]:g} s; expected at most "
                     f"{TEXT_MAXIMUM} letters, and a time from 0 s on"
                 )
+        for one in self.inputs:
+            kinds = tuple(type(value) for value in one) if isinstance(one, tuple | list) else ()
+            if len(kinds) != 3 or kinds[0] is not str or not {float, int}.issuperset(kinds[1:]):
+                raise BoebotError(f"inputs has {one!r}; expected devices, each with a number and its time in s")
+            if not 0 <= one[2] < math.inf:
+                raise CallError(f"{one[0]} cannot be set at {one[2]:g} s; expected a time from 0 s on")
         expect("members", self.members, "a list of boebot.Member", list, tuple)
         if not self.members:
             raise BoebotError("there is no robot to run; expected at least one Member")
@@ -194,6 +201,11 @@ class Request(_NamesFiles):
         _check_options(self, len(programs))
         if programs:
             kind = _board_of_programs(self, tasks)
+        for part, value, _ in self.inputs:
+            try:
+                check_setting(programs[0].board.robot, part, value)
+            except BoebotError as error:
+                raise CallError(str(error)) from None
         if self.pins and (is_live(kind) or not any(task.board.robot.has_board for task in tasks)):
             raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
         for task in tasks:
@@ -246,9 +258,9 @@ def of_robot(error: BaseException, number: int, count: int) -> BaseException:
 
 def _check_options(request: Request, programs: int) -> None:
     """Raises CallError where an option is of a program's monitor or of a brain, and the run has none, or several."""
-    for name in ("expect_text", "fail_text", "typed"):
+    for name in ("expect_text", "fail_text", "typed", "inputs"):
         if getattr(request, name) and programs != 1:
-            option = "--type" if name == "typed" else _option(name)
+            option = {"typed": "--type", "inputs": "--input"}.get(name, _option(name))
             raise CallError(f"{option} goes to the one program of a run; there are {programs} in this one")
     for name in ("step_timeout", "force_timing"):
         if getattr(request, name) and programs == len(request.members):

@@ -18,6 +18,7 @@ from boebot.cli.ending import Detail, print_run
 from boebot.cli.options import magnitudes
 from boebot.description.robots import RobotDescription, load_robot, magnitude, owners, robot_names
 from boebot.devices.accelerometer import Accelerometer
+from boebot.devices.input import Button, Potentiometer
 from boebot.devices.led import Led
 from boebot.devices.light import Phototransistor
 from boebot.devices.line import ReflectanceSensor
@@ -35,7 +36,7 @@ pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests
 
 LEFT, RIGHT = 13, 12
 TABLE = imperfections()
-WIRED = {"led": Led(pin=6)}  # parts that no bundled robot has
+WIRED = {"led": Led(pin=6), "start": Button(pin=2), "dial": Potentiometer(pin="A0")}  # that no bundled robot has
 ROBOTS = [
     *(load_robot(name) for name in robot_names()),
     msgspec.structs.replace(load_robot("shieldbot"), firmware="none", device=WIRED),
