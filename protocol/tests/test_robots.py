@@ -210,7 +210,7 @@ def test_device_may_be_switched_off(tmp_path: Path) -> None:
 
 
 def test_unknown_robot_names_the_known_ones() -> None:
-    known = r"arsim, arsim-1\.2, boebot, roller, roller-charging, shieldbot, "
+    known = r"arsim, arsim-1\.2, boebot, roller, roller-charging, rover, "
     with pytest.raises(RobotError, match=rf"there is no robot 'dalek'; expected one of {known}"):
         load_robot("dalek")
 

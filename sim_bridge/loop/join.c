@@ -99,6 +99,7 @@ void sim_insert(sim *self, robot *r, double x, double y, double heading) {
       .heading = heading,
       .supply = 1.0,
       .servo_supply = 1.0,
+      .pack_v = BOARD_NOMINAL_VOLTS,
       .recording = self->record_cycles > 0,
       .looks = &r->looks,
       .tones = &r->tones,

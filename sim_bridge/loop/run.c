@@ -57,6 +57,7 @@ static void begin_step(void *owner, double torques[2]) {
   c->y = s->y;
   c->heading = s->heading;
   c->at_charger = arena_is_at_charger(r->sim->world.arena, s->x, s->y);
+  c->bridges_a = 0.0;
   c->wheel[SIM_LEFT] = (chassis_wheel){.speed = s->rim_left};
   c->wheel[SIM_RIGHT] = (chassis_wheel){.speed = s->rim_right};
   for (int i = 0; i < r->part_count; i++) {

@@ -6,14 +6,16 @@
 static void step(part *base) {
   battery *self = (battery *)base;
   chassis *c = base->chassis;
-  double servos_a = 0.0;
+  double motors_a = c->bridges_a;
   for (int side = 0; side < 2; side++) {
     const chassis_wheel *wheel = &c->wheel[side];
-    servos_a += supply_servo_current(&self->parameters.supply, wheel->powered, wheel->speed, wheel->torque);
+    if (wheel->is_bridged) continue;
+    motors_a += supply_servo_current(&self->parameters.supply, wheel->powered, wheel->speed, wheel->torque);
   }
-  c->servos_a = servos_a;
-  supply_step(&self->parameters.supply, &self->supply, servos_a, c->at_charger,
+  c->motors_a = motors_a;
+  supply_step(&self->parameters.supply, &self->supply, motors_a, c->at_charger,
               (double)c->step_cycles / BOARD_CLOCK_HZ);
+  c->pack_v = self->supply.pack_v;
 }
 
 static double analog(part *base, uint64_t cycle) {
@@ -31,4 +33,5 @@ void battery_init(battery *self, const part_place *place, uint8_t channel, const
   part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_ANALOG}, 1);
   self->parameters = *parameters;
   supply_init(&parameters->supply, &self->supply, parameters->charge);
+  place->chassis->pack_v = self->supply.pack_v;
 }

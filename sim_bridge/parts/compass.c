@@ -39,7 +39,7 @@ static void measure(compass *self) {
   const hmc5883l_parameters *p = &self->parameters;
   const viewpoint from = part_view(&self->bus.part, self->done);
   double x, y, sine, cosine;
-  compass_field(&p->field, &from, self->bus.part.chassis->servos_a, &x, &y);
+  compass_field(&p->field, &from, self->bus.part.chassis->motors_a, &x, &y);
   number_sincos(p->field.bias, &sine, &cosine); /* a turned mounting turns the field */
   const double samples = 1 << (self->registers[CONFIGURATION_A] >> 5 & 3);
   const double sigma = p->field.sigma / sqrt(samples);

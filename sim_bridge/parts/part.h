@@ -39,9 +39,10 @@ typedef struct {
 
 /* One wheel's motor in the step under way. */
 typedef struct {
-  double speed;  /* of the rim along the ground, m/s, when the step begins */
-  double torque; /* N m */
-  int powered;   /* 1: the motor gets a signal */
+  double speed;   /* of the rim along the ground, m/s, when the step begins */
+  double torque;  /* N m */
+  int powered;    /* 1: the servo gets a signal */
+  int is_bridged; /* 1: an H-bridge drives it, no servo */
 } chassis_wheel;
 
 /* What the parts of one robot share: the board and the body that carry them, and what is around. */
@@ -55,8 +56,10 @@ typedef struct {
   double x, y, heading;            /* pose at `since`; the body's state is that at the step's end */
   chassis_wheel wheel[2];          /* left, right */
   double supply;                   /* share of the nominal voltage, of the rail that the board runs on */
-  double servos_a;                 /* that all servos drew in the step before, A */
   double servo_supply;             /* and of that of the servos */
+  double pack_v;                   /* at the pack's terminals, V */
+  double bridges_a;                /* that the H-bridges draw from it in this step, A */
+  double motors_a;                 /* that all motors drew in the step before, A */
   int at_charger;                  /* 1: the body stands at a charging station */
   uint8_t driven[BOARD_PIN_COUNT]; /* what was driven last, by pin */
   int recording;                   /* 1: looks are logged */

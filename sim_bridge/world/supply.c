@@ -25,8 +25,8 @@ void supply_init(const supply_parameters *p, supply *self, double charge) {
   load(p, self, p->board_a);
 }
 
-void supply_step(const supply_parameters *p, supply *self, double servos_a, int at_charger, double dt) {
-  const double current = p->board_a + servos_a - (at_charger ? p->charger_a : 0.0);
+void supply_step(const supply_parameters *p, supply *self, double motors_a, int at_charger, double dt) {
+  const double current = p->board_a + motors_a - (at_charger ? p->charger_a : 0.0);
   if (p->capacity_as > 0.0) self->charge = within_one(self->charge - current * dt / p->capacity_as);
   load(p, self, current);
 }

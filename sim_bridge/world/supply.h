@@ -35,8 +35,8 @@ double supply_servo_current(const supply_parameters *p, int pulsed, double speed
 /* A pack with that much charge, loaded by the board alone. */
 void supply_init(const supply_parameters *p, supply *self, double charge);
 
-/* `dt` seconds under the load of all servos, A; `at_charger`: the robot stands at a charging station. */
-void supply_step(const supply_parameters *p, supply *self, double servos_a, int at_charger, double dt);
+/* `dt` seconds under the load of all motors, A; `at_charger`: the robot stands at a charging station. */
+void supply_step(const supply_parameters *p, supply *self, double motors_a, int at_charger, double dt);
 
 /* An energy E in [0, 1], the kit's own: it falls by p_0 and by p_m per motor signal, and rises by p_c at a charger, all
  * 1/s. Returns E after `dt`. */

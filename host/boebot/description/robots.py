@@ -281,6 +281,8 @@ def _pin_faults(robot: RobotDescription) -> Faults:
         if isinstance(device, VehicleDevice):
             yield f"device.{name}", f" is {device.__struct_config__.tag}, which only a robot without a board can have"
         for field in device.PINS:
+            if getattr(device, field) is None:
+                continue
             place = f"device.{name}.{field}"
             try:
                 pin = pin_number(getattr(device, field))

@@ -211,8 +211,9 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
         return None
 
     def pins(self) -> dict[str, int]:
-        """Role of each pin ("" for a device with one pin) and its Arduino number."""
-        return {role: pin_number(getattr(self, key)) for key, role in self.PINS.items()}
+        """Role of each pin ("" for a device with one pin) and its Arduino number; without those that it leaves out."""
+        there = {role: getattr(self, key) for key, role in self.PINS.items()}
+        return {role: pin_number(pin) for role, pin in there.items() if pin is not None}
 
     def wires(self) -> tuple[Wire, ...]:
         """Its wires; none without a board."""

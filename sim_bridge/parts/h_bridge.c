@@ -1,0 +1,81 @@
+/* h_bridge.c: see h_bridge.h. */
+#include "h_bridge.h"
+
+enum { ENABLE = 2, INPUTS };
+
+typedef struct {
+  part part;
+  h_bridge_part_parameters parameters;
+  int side;                /* 0 left, 1 right */
+  uint8_t is_high[INPUTS]; /* by the place among its pins */
+  h_bridge_flow flow;      /* since the world's step began */
+  uint64_t until;          /* up to there */
+  double speed;            /* of the shaft when it began, rad/s */
+  double shown;            /* A s since it was last asked */
+  uint64_t shown_since;
+} h_bridge;
+
+static int switches(const h_bridge *self) {
+  if (!self->is_high[ENABLE] || self->part.unplugged) return H_BRIDGE_COAST;
+  if (self->is_high[0] == self->is_high[1]) return H_BRIDGE_BRAKE;
+  return self->is_high[self->parameters.forward] ? H_BRIDGE_FORWARD : H_BRIDGE_BACKWARD;
+}
+
+/* The current flows on up to that cycle. */
+static void pass(h_bridge *self, uint64_t cycle) {
+  if (cycle <= self->until) return;
+  const h_bridge_part_parameters *p = &self->parameters;
+  const double before = self->flow.charge;
+  h_bridge_run(&p->bridge, &p->motor, &self->flow, switches(self), self->part.chassis->pack_v, self->speed,
+               (double)(cycle - self->until) / BOARD_CLOCK_HZ);
+  self->shown += self->flow.charge - before;
+  self->until = cycle;
+}
+
+static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
+  h_bridge *self = (h_bridge *)base;
+  pass(self, cycle);
+  for (int i = 0; i < INPUTS; i++) {
+    if (base->pins[i].pin == pin) self->is_high[i] = level == BOARD_HIGH || level == BOARD_PULLED_UP;
+  }
+}
+
+/* The torque of the coming step, by what flowed since the last one. */
+static void before_step(part *base) {
+  h_bridge *self = (h_bridge *)base;
+  const h_bridge_part_parameters *p = &self->parameters;
+  chassis *c = base->chassis;
+  const double dt = (double)c->step_cycles / BOARD_CLOCK_HZ;
+  pass(self, c->since);
+  chassis_wheel *wheel = &c->wheel[self->side];
+  self->speed = wheel->speed / p->wheel_radius;
+  wheel->torque = motor_dc_shaft_torque(&p->motor, self->flow.charge / dt, self->speed, body_wheel_hold(c->body, dt));
+  wheel->is_bridged = 1;
+  c->bridges_a += p->idle_a + self->flow.drawn / dt;
+  self->flow.charge = self->flow.drawn = 0.0;
+}
+
+static int read(part *base, double *values) {
+  h_bridge *self = (h_bridge *)base;
+  pass(self, base->chassis->board->op->now(base->chassis->board));
+  const double seconds = (double)(self->until - self->shown_since) / BOARD_CLOCK_HZ;
+  *values = seconds > 0.0 ? self->shown / seconds : self->flow.current;
+  self->shown = 0.0;
+  self->shown_since = self->until;
+  return 1;
+}
+
+static const part_operations OPERATIONS = {.edge = edge, .before_step = before_step, .read = read};
+
+static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
+  h_bridge *self = (h_bridge *)base;
+  const part_pin joined[INPUTS] = {{pins[0], PART_HEARS}, {pins[1], PART_HEARS}, {pins[ENABLE], PART_HEARS}};
+  part_join(base, &OPERATIONS, place, joined, INPUTS);
+  self->parameters = *(const h_bridge_part_parameters *)parameters;
+  self->side = place->index;
+  self->is_high[ENABLE] = pins[ENABLE] == PART_NO_PIN;
+  self->until = self->shown_since = place->chassis->board->op->now(place->chassis->board);
+  return self->parameters.motor.resistance_ohm > 0.0 ? 0 : -1;
+}
+
+const part_kind h_bridge_kind = {.size = sizeof(h_bridge), .noise = 150, .pins = INPUTS, .init = init};
