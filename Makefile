@@ -179,7 +179,7 @@ check-generated:
 
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
-ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done $(SERVO)
+ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done build/.done-sketches
 ready-bench: ready-test build/mcap-core/.done
 ready-soak: ready-bench build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
@@ -246,6 +246,13 @@ build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) bu
 
 $(SERVO): | $(VENV)/.done-boebot
 	@BOEBOT_CACHE=build/cache $(PYTHON_VENV) -c 'from boebot.sketch import servo; servo.libraries()'
+
+# Those that tests drive, built once.
+build/.done-sketches: $(SERVO) $(wildcard host/boebot/sketches/*/*.ino)
+	@echo "Building the bundled sketches"
+	@BOEBOT_CACHE=build/cache $(PYTHON_VENV) -c 'from boebot import sketches; from boebot.sketch.build import built; \
+		[built(sketches.FOLDER / name) for name in sketches.NAMES]'
+	@touch $@
 
 $(ARENA_SCHEMA): host/boebot/arenas/description.py tools/arena_pages.py | $(VENV)/.done-boebot
 	@$(PYTHON_VENV) -m tools.arena_pages --schema

@@ -197,7 +197,7 @@ setup(
     ],
     package_data={
         "": ["py.typed", "*.pyi", "*.html", "*.css", "*.js"],
-        "boebot": ["slips.toml", "sketch/platforms/**/*.json"],
+        "boebot": ["slips.toml", "sketch/platforms/**/*.json", "sketches/*/*.ino"],
         "boebot.brains": ["*.toml"],
         "boebot.cli": ["*.txt"],
         "boebot.imperfections": ["*.toml"],

@@ -29,7 +29,7 @@ HEAD = """\
 # After a room has shrunk: python -m tools.house --shrink. Raising one takes its reason:
 #     "host/boebot/link" = { lines = 1234, why = "frames of a second line" }
 """
-CODE = re.compile(r"\.(py|c|h|S|def|js|html|css|sh|cdef)$")
+CODE = re.compile(r"\.(py|c|h|S|def|ino|js|html|css|sh|cdef)$")
 NOT_COUNTED = re.compile(r"(^|/)tests?/|test_|conftest|/fuzz/|generated")
 NO_CODE = {
     *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER),

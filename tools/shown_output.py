@@ -3,9 +3,10 @@
 python -m tools.shown_output docs/how-to/timing.md
 
 A block of the language `console` has a command behind `$ ` and some lines of what it prints, "…" where others are left
-out. Each line is known by its first words, up to two spaces or a digit; it is replaced by the line of today's output
-that begins so. Files that the page's other blocks name in their first line (`# four.toml: ...`) are there for the
-commands.
+out. Each line is known by its first words, up to two spaces or a digit, and one that begins with a number by all that
+is no digit; it is replaced by the line of today's output that is like it. A block of the language `diff` changes the
+file that its first line names (`--- blink/blink.ino`). Files that the page's other blocks name in their first line
+(`# four.toml: ...`) are there for the commands.
 """
 
 from __future__ import annotations
@@ -14,28 +15,41 @@ import argparse
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-BLOCK = re.compile(r"^```console\n\$ boebot ([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(?:console\n\$ boebot|diff\n---) ([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"^```\w+\n(# (\w+\.toml): .*?)^```$", re.MULTILINE | re.DOTALL)
 LEFT_OUT = "…"
+FOLDER = Path(__file__).resolve().parents[1] / "build" / "shown"  # of one place: what was built there is found again
 
 
-def renewed(text: str) -> str:
-    """A page with the output of today.
+def renewed(text: str, folder: Path) -> str:
+    """A page with the output of today, of commands in that folder, which is emptied before.
 
     Raises:
-        ValueError: a line begins like none of the output.
+        ValueError: a line begins like none of the output; a file does not have what is to be changed.
     """
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for match in FILE.finditer(text):
-            (folder / match[2]).write_text(match[1], encoding="utf-8")
-        return BLOCK.sub(lambda match: _block(match[1], match[2], folder), text)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for match in FILE.finditer(text):
+        (folder / match[2]).write_text(match[1], encoding="utf-8")
+    return BLOCK.sub(lambda match: _changed(match, folder) or _block(match[1], match[2], folder), text)
+
+
+def _changed(match: re.Match[str], folder: Path) -> str:
+    """The block, where it changes a file; else ""."""
+    if match[0].startswith("```console"):
+        return ""
+    old, new = ("".join(f"{line[1:]}\n" for line in match[2].splitlines() if line[0] in kept) for kept in ("- ", "+ "))
+    before = (folder / match[1]).read_text(encoding="utf-8")
+    if before.count(old) != 1:
+        raise ValueError(f"{match[1]} does not have once what is to be changed:\n{old}")
+    (folder / match[1]).write_text(before.replace(old, new), encoding="utf-8")
+    return match[0]
 
 
 def _block(command: str, shown: str, folder: Path) -> str:
@@ -53,7 +67,7 @@ def _line(shown: str, output: Iterator[str], command: str) -> str:
 
 
 def _beginning(line: str) -> str:
-    return re.split(r"  |\d", line)[0].strip()
+    return re.split(r"  |\d", line.strip())[0].strip() or re.sub(r"\d+", "0", line.strip())
 
 
 def printed(command: str, folder: Path) -> str:
@@ -69,7 +83,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tools.shown_output", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("page", type=Path, nargs="+")
     for page in parser.parse_args().page:
-        page.write_text(renewed(page.read_text(encoding="utf-8")), encoding="utf-8")
+        page.write_text(renewed(page.read_text(encoding="utf-8"), FOLDER / page.stem), encoding="utf-8")
 
 
 if __name__ == "__main__":

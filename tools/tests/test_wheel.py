@@ -72,3 +72,9 @@ def test_an_installed_wheel_speaks_of_no_makefile(installed: Path, tmp_path: Pat
         assert done.returncode in (1, 2)
         assert "this installation of boebot does not have it" in done.stderr and "make" not in done.stderr
         assert len(done.stderr.splitlines()) == 1
+
+
+def test_an_installed_wheel_has_the_sketches(installed: Path, tmp_path: Path) -> None:
+    for command in (["list", "sketches"], ["new", "whiskers", "--sketch"]):
+        subprocess.run([str(installed / "bin" / "boebot"), *command], cwd=tmp_path, check=True, capture_output=True)
+    assert "Servo.h" in (tmp_path / "whiskers" / "whiskers.ino").read_text(encoding="utf-8")

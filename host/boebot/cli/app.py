@@ -25,7 +25,7 @@ COMMANDS = {
         "Run a brain on what was sensed in a run, and name the first command that differs; or repeat the run.",
         "boebot.cli.replay:replay",
     ),
-    "new": Command("Write a brain, NAME.py, to start from.", "boebot.cli.new:new"),
+    "new": Command("Write a brain, NAME.py, or a sketch for the Uno, to start from.", "boebot.cli.new:new"),
     "list": Command(
         "List what is bundled, by the names that other commands and Python understand.", "boebot.cli.names:list_names"
     ),

@@ -1,4 +1,4 @@
-"""`boebot list WHAT`: what there is, with a line for each: robots, arenas, brains, behaviors,
+"""`boebot list WHAT`: what there is, with a line for each: robots, arenas, brains, sketches, behaviors,
 imperfections, switches that take them away, and what guests add (boebot.guests).
 """
 
@@ -21,9 +21,10 @@ from boebot.description.robots import RobotDescription, load_robot, robot_names
 from boebot.errors import did_you_mean
 from boebot.guests import LISTS, guests
 from boebot.imperfections import imperfections, switches
+from boebot.sketches import NAMES, sketch
 
 Row = dict[str, Any]
-KINDS = ("robots", "arenas", "brains", "behaviors", "imperfections", "switches", *guests(LISTS))
+KINDS = ("robots", "arenas", "brains", "sketches", "behaviors", "imperfections", "switches", *guests(LISTS))
 
 
 def list_names(
@@ -94,6 +95,11 @@ def _first_line(path: Path) -> str:
     return said.partition("\n")[0]
 
 
+def _sketches() -> list[Row]:
+    found = (sketch(name) for name in NAMES)
+    return [{"name": one.name, "title": one.title, "on": f"{one.robot} in {one.arena}"} for one in found]
+
+
 def _behaviors() -> list[Row]:
     kinds = (getattr(behaviors, name) for name in behaviors.__all__)
     found = [kind for kind in kinds if issubclass(kind, MotorBehavior)]
@@ -125,6 +131,7 @@ _ROWS: dict[str, Callable[[], list[Row]]] = {
     "robots": _robots,
     "arenas": _arenas,
     "brains": _brains,
+    "sketches": _sketches,
     "behaviors": _behaviors,
     "imperfections": _imperfections,
     "switches": _switches,

@@ -29,6 +29,7 @@ from boebot.robot import Robot
 from boebot.running import loop
 from boebot.running.runner import run
 from boebot.running.tasks import Request
+from boebot.sketches import sketch
 from command import boebot, heed_signals
 from peer import InProcess, Peer, Pty, pty
 
@@ -171,6 +172,8 @@ def test_period_is_in_seconds_or_has_a_unit(peer: Peer, capsys: pytest.CaptureFi
         (("new", "../brain"), 1, "'../brain' cannot be a brain's name; expected letters, digits and underscores"),
         (("new", "mine", "--main", "--brain"), 1, "--brain and --main are two kinds of brain; expected one of them"),
         (("new", "wander"), 1, "'wander' is the name of a bundled brain"),
+        (("new", "danse", "--sketch"), 2, "there is no sketch 'danse'; expected centring, dance, "),
+        (("new", "dance", "--sketch", "--main"), 2, "--sketch copies a sketch, --brain and --main write a brain"),
     ],
 )
 def test_mistakes_end_in_one_sentence(
@@ -266,6 +269,22 @@ def test_new_brain_runs_and_is_never_overwritten(
     code, _, err = boebot(capsys, "new", "first")
     assert code == 1 and "first.py exists already" in err
     assert (tmp_path / "first.py").read_text() == "# precious\n"
+
+
+def test_bundled_sketch_is_copied_and_never_over_another_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = boebot(capsys, "new", "dance", "--sketch")
+    assert code == 0 and "boebot run dance/dance.ino --robot shieldbot-basic --arena empty --view" in " ".join(
+        out.split()
+    )
+    assert (tmp_path / "dance" / "dance.ino").read_text() == sketch("dance").text
+    code, _, err = boebot(capsys, "new", "--sketch", "dance")
+    assert code == 1 and "dance/dance.ino exists already; it was left as it is" in err
+    (tmp_path / "line").touch()
+    code, _, err = boebot(capsys, "new", "--sketch", "line")
+    assert code == 1 and "line exists already; it was left as it is" in err
 
 
 def test_version_and_help(capsys: pytest.CaptureFixture[str]) -> None:

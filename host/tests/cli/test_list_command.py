@@ -13,6 +13,7 @@ from boebot.description.robots import robot_names
 from boebot.errors import did_you_mean
 from boebot.guests import LISTS, guests
 from boebot.imperfections import imperfections, switches
+from boebot.sketches import NAMES
 from command import boebot
 
 
@@ -20,9 +21,19 @@ def test_every_list_has_all_names_and_a_line_of_each(capsys: pytest.CaptureFixtu
     code, out, err = boebot(capsys, "list", "--json")
     assert (code, err) == (0, "")
     listed = json.loads(out)
-    assert list(listed) == ["robots", "arenas", "brains", "behaviors", "imperfections", "switches", *guests(LISTS)]
+    assert list(listed) == [
+        "robots",
+        "arenas",
+        "brains",
+        "sketches",
+        "behaviors",
+        "imperfections",
+        "switches",
+        *guests(LISTS),
+    ]
     names = {kind: [row["name"] for row in rows] for kind, rows in listed.items()}
     assert (names["robots"], names["arenas"], names["brains"]) == (robot_names(), arena_names(), bundled())
+    assert names["sketches"] == list(NAMES)
     assert names["imperfections"] == list(imperfections()) and names["switches"] == list(switches())
     assert set(names["behaviors"]) < set(behaviors.__all__) and "Avoid" in names["behaviors"]
     assert all(row["title"] for rows in listed.values() for row in rows)
