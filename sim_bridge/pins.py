@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from boebot.arguments import number, shown, whole
 from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
+from boebot.record.record import LINE_FRAME
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, BoardMemory, EmulatedBoard, Level, ResetCause, checked_pin
+from sim_bridge.boards.board import CLOCK_HZ, EDGE, FRACTION, BoardMemory, EmulatedBoard, Level, ResetCause, checked_pin
 from sim_bridge.sim import CYCLES_MAXIMUM, SimRobot
 
 ECHO_MAXIMUM_US = 1e6
@@ -151,12 +152,14 @@ class BoardPins(BoardMemory):
 
 
 class PinRecorder:
-    """The stream "pins" of a record: the output edges of a board."""
+    """The streams "pins" of a record, the output edges of a board, and of what the outside does "inputs", "line_in" and
+    "line_out"."""
 
     def __init__(self, pins: BoardPins) -> None:
         self._pins = pins
         self._seen = pins.edge_count
         self._kept: list[NDArray[Any]] = []
+        pins.log_outside()
 
     def collect(self) -> None:
         """Called now and then, before the simulator forgets edges, of which it keeps `EDGES_KEPT`."""
@@ -164,16 +167,30 @@ class PinRecorder:
             self._take()
 
     def drain(self) -> Group:
-        """The stream since it was last drained: rows of the pin's Arduino number and its level (u8 each)."""
+        """The streams since they were last drained: rows as of boebot.record.record."""
         self._take()
         edges = np.concatenate(self._kept)
         self._kept.clear()
-        if not len(edges):
-            return {}
-        rows = np.column_stack((edges["pin"], edges["level"]))
-        return {"pins": Block(edges["cycle"] / CLOCK_HZ, rows.tobytes(), np.array([2], dtype=np.uint32))}
+        log = self._pins.outside_log()
+        streams = {"pins": _edges(edges)}
+        if log:
+            lines = {"line_in": log["to_board"], "line_out": log["from_board"]}
+            streams |= {"inputs": _edges(log["driven"]), **{name: _frames(frames) for name, frames in lines.items()}}
+        return {name: block for name, block in streams.items() if len(block)}
 
     def _take(self) -> None:
         new = self._pins.edge_count - self._seen
         self._seen += new
         self._kept.append(self._pins.pin_log(new))
+
+
+def _edges(edges: NDArray[Any]) -> Block:
+    rows = np.column_stack((edges["pin"], edges["level"]))
+    return Block(edges["cycle"] / CLOCK_HZ, rows.tobytes(), np.array([rows.shape[1]], dtype=np.uint32))
+
+
+def _frames(frames: NDArray[Any]) -> Block:
+    rows = frames[["bit_time", "bits", "byte"]].astype(LINE_FRAME)
+    return Block(
+        frames["start"] / FRACTION / CLOCK_HZ, rows.tobytes(), np.array([LINE_FRAME.itemsize], dtype=np.uint32)
+    )

@@ -77,6 +77,8 @@ typedef struct {
 
 #define BOARD_NOTES "notes" /* a board_notes */
 
+#define BOARD_OUTSIDE_LOG "outside log" /* a board_outside_log */
+
 /* python: begin */
 enum { BOARD_NOTES_MAXIMUM = 64 };
 
@@ -119,6 +121,29 @@ typedef struct {
   board_watchdog_reset *resets; /* oldest first, to `end` */
   size_t first, end, capacity;
 } board_watchdog_log;
+
+/* A frame on the serial line: a start bit, eight data bits, the least significant first, then the line is high. Times are
+ * in cycles << 16. */
+typedef struct {
+  uint64_t start, bit_time;
+  uint8_t bits; /* the stop bit included */
+  uint8_t byte;
+  uint8_t unused[6];
+} board_frame;
+
+/* What the outside does to the pins, edge by edge, and what is on the line to the board and from it; while it is on. Whoever
+ * takes what is there sets `first` to `end`. */
+typedef struct {
+  bool on;
+  struct board_edges {
+    board_edge *items;
+    size_t first, end, capacity;
+  } driven;
+  struct board_frames {
+    board_frame *items;
+    size_t first, end, capacity;
+  } to_board, from_board;
+} board_outside_log;
 
 typedef struct {
   uint32_t version; /* BOARD_INTERFACE_VERSION */

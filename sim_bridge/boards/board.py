@@ -26,6 +26,15 @@ ROOM = 4096  # bytes that are read from the line at once
 EDGE = np.dtype(  # board_edge of board.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
 )
+FRAME = np.dtype(  # board_frame of board.h
+    {
+        "names": ["start", "bit_time", "bits", "byte"],
+        "formats": ["<u8", "<u8", "u1", "u1"],
+        "offsets": [0, 8, 16, 17],
+        "itemsize": 24,
+    }
+)
+FRACTION = 1 << 16  # of a cycle, in frames
 
 
 class Level(IntEnum):
@@ -224,6 +233,22 @@ class BoardMemory(ABC):
         if log is None:
             return []
         return [(int(log.resets[i].cycle), int(log.resets[i].address)) for i in range(log.end)]
+
+    def log_outside(self) -> None:
+        """From now on what the outside does to the pins, and what is on the line, is kept for `outside_log`."""
+        if (log := self.board.extension("outside log", "board_outside_log")) is not None:
+            log.on = True
+
+    def outside_log(self) -> dict[str, NDArray[Any]]:
+        """What the outside has done since the last call: `driven`, edges of pins (dtype EDGE); `to_board` and
+        `from_board`, frames on the line (dtype FRAME). Empty of a board that cannot be seen into."""
+        log, found = self.board.extension("outside log", "board_outside_log"), {}
+        for name, dtype in () if log is None else (("driven", EDGE), ("to_board", FRAME), ("from_board", FRAME)):
+            one = getattr(log, name)
+            rows = self.board.ffi.buffer(one.items + one.first, (one.end - one.first) * dtype.itemsize)[:]
+            found[name] = np.frombuffer(rows, dtype)
+            one.first = one.end
+        return found
 
     def notes(self, since: int = 0) -> list[tuple[int, int, str, str]]:
         """Cycle, address (bytes), what the program did there and why that is not what it seems (board.h): each once,

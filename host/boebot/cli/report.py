@@ -16,10 +16,11 @@ from boebot.record.reading import CutError, mend
 from boebot.record.run import Run
 from boebot.record.run_folder import RECORD, RunFolder
 from boebot.result import Result, read_run, robots_of
-from boebot.view import save_for_foxglove
+from boebot.view import save_for_foxglove, save_pins
 
-CSV, FOXGLOVE = "csv", "foxglove"
-_KINDS = (CSV, FOXGLOVE, *guests(FORMATS))
+CSV, FOXGLOVE, VCD = "csv", "foxglove", "vcd"
+_KINDS = (CSV, FOXGLOVE, VCD, *guests(FORMATS))
+_WHOLE = {FOXGLOVE: save_for_foxglove, VCD: save_pins}
 
 
 @ending.of_sensible_rows()
@@ -57,7 +58,8 @@ def report(
 
     A record that is cut is read up to there; of one that is damaged, what is left is read and the exit code is 1.
     --as csv writes run.csv, the bytes of the line, and the steps of a brain of processes; --as foxglove writes
-    foxglove.mcap, which Foxglove draws without set-up.
+    foxglove.mcap, which Foxglove draws without set-up; --as vcd of a run with --pins writes pins.vcd for GTKWave and
+    PulseView.
     """
     for name in formats or []:
         if name not in _KINDS:
@@ -93,8 +95,8 @@ def _files(run: Path, folder: Path, result: Result, formats: list[str], mended: 
     with RunFolder(folder):
         yield result.save(folder, csv=CSV in formats)
         for name in formats:
-            if name == FOXGLOVE:
-                yield [save_for_foxglove(result.robots, folder)]
+            if name in _WHOLE:
+                yield [_WHOLE[name](result.robots, folder)]
             elif name != CSV:
                 write: Callable[[Mapping[int, Run], Path], list[Path]] = guests(FORMATS)[name].load()
                 yield write(robots_of(result), folder)

@@ -116,7 +116,7 @@ def run(
         ),
     ] = False,
     pins: Annotated[
-        bool, typer.Option("--pins", help="Record the output edges of emulated boards, too: stream pins of the record.")
+        bool, typer.Option("--pins", help="Record the pins of emulated boards, too; boebot report --as vcd shows them.")
     ] = False,
     expect_text: Annotated[
         str,

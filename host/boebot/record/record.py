@@ -12,6 +12,8 @@ command             that of the observation     kind (index of KINDS), left, rig
 clock               0                           the transport's clock at the run's time 0 (s)
 truth               the world's                 of a simulated robot: doubles, `boebot.boards.TRUTH` without the time
 pins                transport's clock           of an emulated board, if asked for: a pin's Arduino number and its level
+inputs              transport's clock           likewise of the ATmega328P: what the outside drives a pin to
+line_in, line_out   transport's clock, start    likewise: a frame on its line, to it and from it: `LINE_FRAME`
 waits               the world's                 a moving shape has begun or ended to wait for a robot: shape, waited (s)
 shifts              the world's                 a moving shape was put elsewhere: shape, by how much it is off its way
                                                 from then on (m, m, rad)
@@ -55,6 +57,9 @@ WORLD = ("waits", "shifts")  # streams of a world, not of one of its robots
 KINDS = ("stop", "signal", "speed")  # of commands
 _STAMP = Struct("<dd")
 COMMAND = np.dtype([("kind", "u1"), ("left", "<f8"), ("right", "<f8")])
+LINE_FRAME = np.dtype(
+    [("bit_time", "<u8"), ("bits", "u1"), ("byte", "u1")]
+)  # cycles of 62.5 ns / 65536; with start, stop
 _COMMAND = Struct("<Bdd")
 _EVENT = Struct("<BIB")
 _CLOCK = Struct("<d")

@@ -30,7 +30,8 @@ from boebot.running.sources import arena_file, brain_files, write_copies
 from boebot.running.tasks import Member, Request
 
 BEYOND_S = 1.0  # by which the repetition of a record that is cut is longer than it
-_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", "waits", "shifts")
+_OUTSIDE = ("inputs", "line_in", "line_out")  # streams that records of before do not have
+_OTHER_CLOCKS = ("to_board", "to_host", "event", "truth", "pins", *_OUTSIDE, "waits", "shifts")
 """Streams whose times are of the transport's clock, or near it."""
 
 
@@ -284,6 +285,8 @@ def record_difference(one: Run, other: Run, *, is_cut: bool = False, until_s: fl
     the second one has beyond its end is no difference. `until_s`: of the run; rows from then on do not count."""
     found = []
     for stream in sorted(one.record.streams() | other.record.streams()):
+        if stream in _OUTSIDE and not one.record.count(stream):
+            continue
         offset_s = one.clock_offset if stream in _OTHER_CLOCKS else 0.0
         rows = zip_longest(one.record.each_row(stream), other.record.each_row(stream))
         for index, (a, b) in enumerate(rows):

@@ -64,7 +64,7 @@ def run(
             run; may be infinite. None: 10 s; in real time, on a board, the time to live of its set-points, after which
             its dead-man stops the motors.
         force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
-        pins: the output edges of emulated boards are recorded, too.
+        pins: what happens at the pins of emulated boards is recorded, too.
         out: folder for the record, and the files that are made from it (boebot.view).
         record: False: nothing is recorded; a result then has few figures, and `out` is refused.
         view: shows the run in the browser while it goes on, at real time at first; a person may interfere there, or

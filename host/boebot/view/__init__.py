@@ -11,9 +11,10 @@ brain.csv      of a brain of processes: one row per step of it; switches.csv: wh
 to_board.bin   every byte that went to the board; to_host.bin: every byte that came from it
 wire.csv       when which stretch of those two files crossed the wire
 foxglove.mcap  the run in the schemas of Foxglove, which draws it
+pins.vcd       the pins of the boards, for viewers of logic signals
 
-A run of several robots leaves picture, page and foxglove.mcap with all of them, and a folder of all other files for
-each.
+A run of several robots leaves picture, page, foxglove.mcap and pins.vcd with all of them, and a folder of all other
+files for each.
 """
 
 from __future__ import annotations
@@ -99,6 +100,17 @@ def save_for_foxglove(results: Sequence[Run], folder: Path) -> Path:
             "Foxglove's schemas are not installed; expected the extra of that name: pip install 'boebot[foxglove]'"
         ) from None
     return write_whole(folder / "foxglove.mcap", partial(foxglove.write, results))
+
+
+def save_pins(results: Sequence[Run], folder: Path) -> Path:
+    """Writes pins.vcd, with the boards of the robots of one run, into `folder`, which is there; returns its path.
+
+    Raises:
+        BoebotError: their pins are not recorded, or the folder cannot be written to.
+    """
+    from boebot.view import vcd
+
+    return write_whole(folder / "pins.vcd", partial(vcd.write, results))
 
 
 def _draw(robots: Sequence[Run], error: BaseException | None, path: Path) -> None:

@@ -236,16 +236,22 @@ def pins(block: Block, robot: robots.RobotDescription, begin: float) -> dict[str
     """Output edges of a record, rows of its stream "pins", by the name of the pin: on the run's clock, which begins at
     `begin` (s)."""
     times, rows = block.times, block.table(np.dtype([("pin", "u1"), ("level", "u1")]))
-    devices: dict[int, list[str]] = {}
-    for name, device in robot.device.items():
-        for pin in device.pins().values() if device.on else ():
-            devices.setdefault(pin, []).append(name.replace("_", " "))
+    users = users_of_pins(robot)
     found = {}
     for pin in np.unique(rows["pin"][times > begin]).tolist():  # pins that do something
         own = rows["pin"] == pin
-        name = " ".join([pin_name(pin), *devices.get(pin, [])[:1]])
+        name = " ".join([pin_name(pin), *users.get(pin, [])[:1]]).replace("_", " ")
         found[name] = times[own] - begin, rows["level"][own]
     return found
+
+
+def users_of_pins(robot: robots.RobotDescription) -> dict[int, list[str]]:
+    """Arduino number of each pin that devices of the robot use, and their names."""
+    users: dict[int, list[str]] = {}
+    for name, device in robot.device.items():
+        for pin in device.pins().values() if device.on else ():
+            users.setdefault(pin, []).append(name)
+    return users
 
 
 def _rises(flags: Bools) -> NDArray[np.intp]:

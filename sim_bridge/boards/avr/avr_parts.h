@@ -216,6 +216,7 @@ typedef struct {
   uint64_t bit_time; /* in cycles << 16 */
   uint8_t bits;      /* with start and stop bits */
   uint8_t byte;
+  bool logged; /* in the outside log */
 } line_frame;
 
 /* What stands on one direction of the line, in the order of time. */
@@ -398,6 +399,7 @@ typedef struct avr_board {
   converter_state converter;
   watchdog_state watchdog;
   board_watchdog_log watchdog_log;
+  board_outside_log outside_log;
   eeprom_state eeprom;
 } avr_board;
 

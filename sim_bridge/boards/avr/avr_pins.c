@@ -221,6 +221,12 @@ static void write_external_modes(avr_board *b, uint16_t address, uint8_t value, 
 
 /* ---- the outside ---- */
 
+static void log_driven(avr_board *b, uint64_t cycle, pin_change change) {
+  struct board_edges *log = &b->outside_log.driven;
+  log->items = board_room_for(log->items, sizeof *log->items, &log->first, &log->end, &log->capacity, 1);
+  log->items[log->end++] = (board_edge){.cycle = cycle, .pin = change.pin, .level = change.level};
+}
+
 void pins_due_driven(avr_board *b, uint64_t cycle) {
   change_queue *q = &b->driven_edges;
   while (first_due(q) <= cycle) {
@@ -230,6 +236,7 @@ void pins_due_driven(avr_board *b, uint64_t cycle) {
     p->driven = (uint8_t)(change.level == BOARD_RELEASED ? p->driven & ~mask : p->driven | mask);
     p->driven_level = (uint8_t)(change.level == BOARD_HIGH ? p->driven_level | mask : p->driven_level & ~mask);
     pins_update(b, port, cycle);
+    if (b->outside_log.on) log_driven(b, cycle, change);
   }
   set_due(b, DUE_DRIVEN_EDGE, first_due(q));
 }
@@ -281,4 +288,5 @@ void pins_init(avr_board *b) {
 void pins_free(avr_board *b) {
   free(b->driven_edges.items);
   free(b->seen_edges.items);
+  free(b->outside_log.driven.items);
 }

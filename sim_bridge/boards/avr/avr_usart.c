@@ -63,6 +63,21 @@ static uint64_t falling_edge(const line_queue *q, uint64_t time) {
   return NEVER;
 }
 
+static void log_frame(struct board_frames *log, const line_frame *f) {
+  log->items = board_room_for(log->items, sizeof *log->items, &log->first, &log->end, &log->capacity, 1);
+  log->items[log->end++] =
+      (board_frame){.start = f->start, .bit_time = f->bit_time, .bits = (uint8_t)f->bits, .byte = f->byte};
+}
+
+/* Frames to the board that have begun by then. */
+static void log_begun(avr_board *b, uint64_t time) {
+  line_queue *q = &b->usart.to_board;
+  for (size_t i = q->first; b->outside_log.on && i < q->end && q->frames[i].start <= time; i++) {
+    if (!q->frames[i].logged) log_frame(&b->outside_log.to_board, &q->frames[i]);
+    q->frames[i].logged = true;
+  }
+}
+
 static void forget_line(line_queue *q, uint64_t until) {
   while (q->first < q->end && end_of(&q->frames[q->first]) <= until) q->first++;
   if (q->first == q->end) q->first = q->end = 0;
@@ -108,6 +123,7 @@ static void start_bit(avr_board *b) {
   usart_state *u = &b->usart;
   u->from = falling_edge(&u->to_board, u->from);
   u->receiver = RECEIVER_SAMPLING;
+  log_begun(b, u->from);
   if (u->has_waiting) { /* the shift register is overwritten */
     u->has_waiting = false;
     u->lost = true;
@@ -234,7 +250,9 @@ uint8_t usart_at_pins(const avr_board *b, uint8_t level, uint64_t cycle) {
 static void begin_frame(avr_board *b, uint8_t byte, uint64_t cycle) {
   usart_state *u = &b->usart;
   u->sending = true;
-  put_on_line(&u->from_board, (line_frame){cycle << FRACTION, (uint64_t)u->bit_time << FRACTION, u->frame_bits, byte});
+  put_on_line(&u->from_board,
+              (line_frame){cycle << FRACTION, (uint64_t)u->bit_time << FRACTION, u->frame_bits, byte, false});
+  if (b->outside_log.on) log_frame(&b->outside_log.from_board, &u->from_board.frames[u->from_board.end - 1]);
   if (u->outside_start == NEVER) plan_outside(b);
   set_due(b, DUE_TRANSMITTER, cycle + (uint64_t)u->frame_bits * u->bit_time);
   if (b->avr->data[REG_PCMSK0 + PORT_D] & TX_MASK) set_due(b, DUE_BIT, cycle);
@@ -326,6 +344,7 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
   if ((value & RXEN) && u->receiver == RECEIVER_OFF) {
     u->receiver = RECEIVER_SEARCHING;
     u->from = end << FRACTION;
+    log_begun(b, u->from);
     forget_line(&u->to_board, u->from);
   } else if (!(value & RXEN)) {
     u->receiver = RECEIVER_OFF;
@@ -352,7 +371,7 @@ static void time_frames(avr_board *b) {
   for (size_t i = u->to_board.first; i < u->to_board.end; i++) {
     line_frame *f = &u->to_board.frames[i];
     bool has_changed = f->bit_time != u->line_bit_time || (f->start >= HELD) != waits;
-    if (f->start > now && has_changed) *f = (line_frame){start, u->line_bit_time, LINE_BITS, f->byte};
+    if (f->start > now && has_changed) *f = (line_frame){start, u->line_bit_time, LINE_BITS, f->byte, false};
     u->line_free = start = end_of(f);
   }
 }
@@ -364,7 +383,7 @@ void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count) {
   if (start < u->line_free) start = u->line_free;
   if (u->receiver == RECEIVER_OFF) forget_line(&u->to_board, b->clock << FRACTION);
   for (size_t i = 0; i < count; i++) {
-    put_on_line(&u->to_board, (line_frame){start, u->line_bit_time, LINE_BITS, bytes[i]});
+    put_on_line(&u->to_board, (line_frame){start, u->line_bit_time, LINE_BITS, bytes[i], false});
     start += (uint64_t)LINE_BITS * u->line_bit_time;
   }
   u->line_free = start;
@@ -423,4 +442,6 @@ void usart_free(avr_board *b) {
   free(b->usart.to_board.frames);
   free(b->usart.from_board.frames);
   free(b->usart.out);
+  free(b->outside_log.to_board.items);
+  free(b->outside_log.from_board.items);
 }
