@@ -57,7 +57,7 @@ def write(robots: Sequence[Run], path: Path) -> None:
     if not any(robot.record.count("pins") for robot in robots):
         raise BoebotError("the run has no pins to write; expected one with --pins (pins=True)")
     told: list[Iterator[tuple[int, Any, str]]] = []
-    about = {"timescale": f"{TICK_PS} ps", "date": "", "comment": _word(robots[0].summary())}
+    about: dict[str, Any] = {"timescale": f"{TICK_PS} ps", "date": "", "comment": _word(robots[0].summary())}
     with path.open("w", encoding="ascii") as file, vcd.VCDWriter(file, **about) as writer:
         for number, robot in enumerate(robots, 1):
             scope = f"{_word(robot.robot.name)}_{number}"
