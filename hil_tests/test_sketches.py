@@ -15,7 +15,7 @@ from boebot.record.reading import attachments_of
 
 pytestmark = pytest.mark.emulated
 
-# Both wheels forward; after 2.5 s it goes wild.
+# Both wheels forward; after 0.6 s it goes wild.
 SOURCE = """\
 #include <Servo.h>
 Servo left, right;
@@ -27,7 +27,7 @@ void setup() {
   Serial.println("driving");
 }
 void loop() {
-  if (millis() > 2500)
+  if (millis() > 600)
     ((void (*)())0x3F00)();
 }
 void drive() { // both wheels, whose servos look the other way
@@ -56,10 +56,10 @@ def test_a_sketch_drives_and_its_run_is_repeated_without_it(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder.parent)
-    result = boebot.run("forward", seconds=2, arena="empty", without=["slip"], out=tmp_path / "run")
+    result = boebot.run("forward", seconds=0.5, arena="empty", without=["slip"], out=tmp_path / "run")
     assert (result.brain, result.error) == ("forward.ino", None)
     assert b"".join(data for _, data in result.record.rows("to_host")) == b"driving\r\n"
-    assert result.true_distance is not None and result.true_distance > 0.1
+    assert result.true_distance is not None and result.true_distance > 0.01
     attached = attachments_of(tmp_path / "run")
     assert attached["sketch/forward.ino"] == SOURCE.encode()
     assert attached["brain/forward.elf"][:4] == b"\x7fELF"
@@ -72,9 +72,9 @@ def test_a_sketch_drives_and_its_run_is_repeated_without_it(
 
 
 def test_the_command_runs_it_and_a_fault_names_its_line(folder: Path) -> None:
-    done = command("run", folder / "forward.ino", "--timeout", 3000)
+    done = command("run", folder / "forward.ino", "--timeout", 1000)
     assert done.returncode == 1 and "forward.ino on shieldbot (avr)" in done.stdout
-    assert "crashed at 2.501 s" in done.stderr and "in main (forward.ino:12)" in done.stderr
+    assert "crashed at 0.601 s" in done.stderr and "in main (forward.ino:12)" in done.stderr
 
 
 def test_a_bundled_brain_wins_over_a_folder_of_its_name(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ A project may be made of anything; PlatformIO looks each time at what has change
 
     cache/core-HASH/            a core directory for PlatformIO, without its registry
     cache/libraries/            libraries that were downloaded
-    cache/objects/              compiled files, for all builds
+    cache/objects-HASH/         compiled files, for all builds
     cache/work/HASH/            of a user's folder: the copy, and PlatformIO's files; build.log: all that it said
     cache/programs/HASH/        finished ELF files
 
@@ -44,6 +44,7 @@ HERE = Path(__file__).resolve().parent
 BOARDS = sorted(path.stem for path in HERE.glob("platforms/atmelavr/boards/*.json"))  # with the chip that is emulated
 CLOCK = "16000000L"  # Hz, of that chip
 SILENCE_S = 30.0  # of PlatformIO, after which it waits for what cannot be reached
+DEBIAN = "avr-gcc and what Debian has in arduino-core-avr and avr-libc"
 FURTHER_ERRORS = 3  # that are shown after the first one
 SKETCH_INI = """\
 [platformio]
@@ -109,7 +110,7 @@ def _sketch(sketch: Sketch, progress: Progress | None) -> Built:
 
 
 def _build_sketch(tools: _Tools, sketch: Sketch, progress: Progress | None) -> Path:
-    work = _work(sketch.folder, sketch.name)
+    work = _work(tools.versions, sketch.folder, sketch.name)
     copy = work / "sketch"
     shutil.rmtree(copy, ignore_errors=True)
     for name, data in sketch.files.items():
@@ -124,7 +125,7 @@ def _build_sketch(tools: _Tools, sketch: Sketch, progress: Progress | None) -> P
 def _project(project: Project, progress: Progress | None) -> Built:
     tools = _Tools.found()
     with _alone():
-        process = _PlatformIO(tools, _work(project.folder), progress)
+        process = _PlatformIO(tools, _work(tools.versions, project.folder), progress)
         code, said = process.run("project", "config", "--json-output", "-d", str(project.folder))
         if code:
             raise CallError(f"{project.shown / PROJECT} is no project of PlatformIO's: {' '.join(said.split())}")
@@ -148,8 +149,9 @@ def _environment(project: Project, sections: Mapping[str, Mapping[str, Any]]) ->
     fitting = [name for name, board in boards.items() if board in BOARDS and clocks[name] == CLOCK]
     ini = project.shown / PROJECT
     if not fitting:
-        there = ", ".join(f"{name} for {board} at {clocks[name]} Hz" for name, board in boards.items()) or "none"
-        raise CallError(f"{ini} has environments {there}; expected one for {' or '.join(BOARDS)} at {CLOCK} Hz")
+        there = [f"{name} (board {board})" for name, board in boards.items()] or ["none"]
+        expected = f"one for {', '.join(BOARDS[:-1])} or {BOARDS[-1]}, whose clock is {CLOCK}"
+        raise CallError(f"{ini} has for environments {', '.join(there)}; expected {expected}")
     if len(fitting) > 1:
         names = ", ".join(fitting)
         raise CallError(f"{ini} has several environments, {names}; expected default_envs = {fitting[0]}, say, in it")
@@ -177,7 +179,12 @@ class _Tools:
         kits = [one.read_bytes() for one in sorted(HERE.rglob("*.*")) if one.suffix in (".py", ".json")]
         compiler, here = shutil.which("avr-gcc"), (sys.executable, "-m", "platformio")
         is_here = importlib.util.find_spec("platformio") is not None
-        if is_here and importlib.util.find_spec("SCons") and compiler and core_directory.ARDUINO.is_dir():
+        if (
+            is_here
+            and importlib.util.find_spec("SCons")
+            and compiler
+            and (core_directory.ARDUINO / "platform.txt").is_file()
+        ):
             files = [path.stat() for path in (Path(compiler).resolve(), core_directory.ARDUINO / "platform.txt")]
             told = [version("platformio"), version("scons"), *((one.st_size, one.st_mtime_ns) for one in files)]
             return cls(here, _hash(kits, told), True)
@@ -219,7 +226,7 @@ class _PlatformIO:
         settings = {
             "WORKSPACE_DIR": self.work / "workspace",
             "BUILD_DIR": self.work / "build",
-            "BUILD_CACHE_DIR": cache() / "objects",
+            "BUILD_CACHE_DIR": cache() / f"objects-{self.tools.versions}",
             "BUILD_FLAGS": "-gdwarf-4",
             "EXTRA_SCRIPTS": f"post:{HERE / 'link_flags.py'}",
             "SETTING_ENABLE_TELEMETRY": "no",
@@ -257,7 +264,8 @@ class _PlatformIO:
                 if now_s - heard_s > SILENCE_S:
                     last = log.read_text("utf-8", "replace").strip().rpartition("\n")[2]
                     silent = f"PlatformIO says nothing more for {SILENCE_S:g} s"
-                    raise BoebotError(f"{silent} after {last!r}; expected its registry within reach; see {log}")
+                    other = "" if self.tools.is_prepared else f", or here {DEBIAN}"
+                    raise BoebotError(f"{silent} after {last!r}; expected its registry within reach{other}; see {log}")
                 if self.progress is not None:
                     self.progress(now_s - begin_s)
         return process.returncode, log.read_text("utf-8", "replace")

@@ -75,7 +75,7 @@ def find(path: Path) -> Sketch | Project:
         if (path / PROJECT).is_file():
             return Project(name=as_utf8(folder.name), folder=folder, shown=path)
         inos = _inos(path)
-        named = [name for name in inos if Path(name).stem == folder.name]
+        named = [name for name in inos if Path(name).stem in (folder.name, path.absolute().name)]
         if not inos:
             raise CallError(f"{path} is neither a sketch nor a PlatformIO project; expected an .ino file or {PROJECT}")
         if not named and len(inos) > 1:

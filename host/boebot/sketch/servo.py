@@ -41,39 +41,26 @@ def libraries() -> Path:
         return folder
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=cache()) as scratch:
-        wanted = Path(scratch, "wanted.txt")
+        wanted, new = Path(scratch, "wanted.txt"), Path(scratch, "new")
         wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n", encoding="utf-8")
         pip = [sys.executable, "-m", "pip", "download", "--no-clean", "--no-deps", "--no-build-isolation"]
-        pip += [
-            "--retries",
-            "1",
-            "--timeout",
-            "10",
-            "--dest",
-            scratch,
-            "--require-hashes",
-            "--requirement",
-            str(wanted),
-        ]
-        ended = subprocess.run(
-            pip,
-            env=os.environ | {"TMPDIR": scratch},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            timeout=WAIT_S,
-            check=False,
-        )
-        found = {name: next(Path(scratch).glob(f"**/Servo/{name}"), None) for name in FILES}
-        new = Path(scratch, "Servo")
+        pip += ["--retries", "1", "--timeout", "10", "--dest", scratch, "--require-hashes", "-r", str(wanted)]
+        settings = os.environ | {"TMPDIR": scratch}
+        try:
+            ended = subprocess.run(
+                pip, env=settings, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAIT_S, check=False
+            )
+            said = ended.stderr.decode("utf-8", "replace").splitlines()
+        except subprocess.TimeoutExpired:
+            said = [f"pip does not end within {WAIT_S} s"]
         new.mkdir()
-        for name, path in found.items():
+        for name in FILES:
+            path = next(Path(scratch).glob(f"pip-*/**/Servo/{name}"), None)
             if path is None:
-                why = [line for line in ended.stderr.splitlines() if line.startswith("ERROR: ")] or ["no answer"]
+                why = next((line for line in said if line.startswith("ERROR: ")), (said or ["pip says nothing"])[-1])
                 raise BoebotError(
-                    f"the library Servo, package {PACKAGE}, cannot be had: {why[0].removeprefix('ERROR: ')}; expected "
-                    "a network the first time, or its two files in libraries/Servo beside the sketch"
+                    f"the library Servo, package {PACKAGE}, cannot be had: {why.removeprefix('ERROR: ')}; expected a "
+                    f"network the first time, or its files {' and '.join(FILES)} in libraries/Servo beside the sketch"
                 )
             shutil.copyfile(path, new / name)
         new.replace(folder / "Servo")
