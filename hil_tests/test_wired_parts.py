@@ -33,6 +33,12 @@ pin = "A0"
 position = 0.25
 position_m = [-0.02, -0.03]
 
+[device.sonar]
+type = "ultrasonic"
+trigger_pin = 8
+echo_pin = 4
+position_m = [0.06, 0.0]
+
 [device.lamp]
 type = "led"
 pin = 6
@@ -45,13 +51,41 @@ colour = "yellow"
 position_m = [-0.03, 0.0]
 """
 
-# Dims the lamp by the dial, and lights pin 13, a servo's as well, while the button is pressed.
+ARENA = """
+name = "wall"
+
+[[wall]]
+points_m = [[0.56, -1.0], [0.56, 1.0]]
+"""
+
+# Dims the lamp by the dial, lights pin 13, a servo's as well, while the button is pressed, and prints the length of the
+# echo in us after each trigger.
 SOURCE = """
 #include <avr/io.h>
+#include <stdio.h>
+#include <util/delay.h>
+static int put(char byte, FILE *out) {
+  while (!(UCSR0A & 1 << UDRE0)) {}
+  UDR0 = byte;
+  return 0;
+}
+static FILE serial = FDEV_SETUP_STREAM(put, NULL, _FDEV_SETUP_WRITE);
+static unsigned echo_us(void) {
+  PORTB |= 1 << PB0;
+  _delay_us(10);
+  PORTB &= ~(1 << PB0);
+  while (!(PIND & 1 << PD4)) {}
+  TCNT1 = 0;
+  while (PIND & 1 << PD4) {}
+  return TCNT1 / 2;
+}
 int main(void) {
+  UCSR0B = 1 << TXEN0;
+  UBRR0 = 103;
+  TCCR1B = 1 << CS11;
   DDRD = 1 << PD6;
   PORTD = 1 << PD2;
-  DDRB = 1 << PB5;
+  DDRB = 1 << PB5 | 1 << PB0;
   TCCR0A = 1 << COM0A1 | 1 << WGM01 | 1 << WGM00;
   TCCR0B = 1 << CS01;
   ADMUX = 1 << REFS0;
@@ -59,10 +93,11 @@ int main(void) {
   for (;;) {
     OCR0A = ADC >> 2;
     PORTB = PIND & 1 << PD2 ? 0 : 1 << PB5;
+    if (TCNT1 > 20000) fprintf(&serial, "%u us\\n", echo_us());
   }
 }
 """
-IDEAL = ["led_spread", "bounce", "potentiometer_noise"]
+IDEAL = ["led_spread", "bounce", "potentiometer_noise", "ping_misses", "ping_noise"]
 INPUTS = [("start", 1, 0.3), ("dial", 0.75, 0.5), ("start", 0, 0.6)]
 
 
@@ -72,6 +107,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("wired")
     (made / "wired.c").write_text(SOURCE)
     (made / "mine.toml").write_text(WIRING)
+    (made / "wall.toml").write_text(ARENA)
     flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-g", "-Wall"]
     subprocess.run(["avr-gcc", *flags, "-o", made / "wired.elf", made / "wired.c"], check=True)
     return made
@@ -80,7 +116,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def result(folder: Path) -> RunResult:
     program, robot, out = folder / "wired.elf", folder / "mine.toml", folder / "run"
-    return boebot.run(program, robot=robot, arena="empty", seconds=1, without=IDEAL, inputs=INPUTS, out=out)
+    return boebot.run(
+        program, robot=robot, arena=folder / "wall.toml", seconds=1, without=IDEAL, inputs=INPUTS, out=out
+    )
 
 
 def test_the_program_reads_button_and_dial_and_leds_are_as_bright_as_it_makes_them(result: RunResult) -> None:
@@ -96,6 +134,15 @@ def test_the_program_reads_button_and_dial_and_leds_are_as_bright_as_it_makes_th
     assert {name for name, *_ in series.signs()} == {"lamp", "board_led", "start"}
     assert np.array_equal(series.flag("start", "pressed"), (time > 0.3 + 1e-9) & (time < 0.6 + 1e-9))
     assert series.number("dial", "position")[-1] == 0.75
+
+
+def test_the_program_measures_the_wall_by_the_echo_as_long_as_sound_takes_there_and_back(result: RunResult) -> None:
+    """0.5 m ahead of the sensor at 20 °C; the program sees the pulse's ends with a few instructions between."""
+    printed = b"".join(data for _, data in result.record.rows("to_host")).decode().splitlines()
+    seen = [int(line.removesuffix(" us")) for line in printed[:-1]]
+    assert len(seen) > 20 and seen == pytest.approx([2 * 0.5 / 343.5 * 1e6] * len(seen), abs=2)
+    distance = result.series.number("sonar", "distance")
+    assert np.isnan(distance[0]) and distance[10:] == pytest.approx(0.5, abs=1e-9)
 
 
 def test_a_record_its_page_and_a_repetition_have_them(result: RunResult, folder: Path) -> None:

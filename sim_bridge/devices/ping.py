@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from boebot.devices.ping import PingSensor, Sonar
+from boebot.devices.ping import PingSensor, RangeFinder, Sonar
 from sim_bridge._core import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, beam_of, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
@@ -51,17 +51,19 @@ def sonar(device: Sonar, name: str, model: Model) -> None:
 
 def ping_parameters(ping: PingSensor, draw: Draw = AS_BUILT) -> Any:
     """The Ping))) in C."""
+    return ffi.new("sonar_parameters *", sonar_parameters(ping, draw, draw["ping_spread"]))
+
+
+def sonar_parameters(device: RangeFinder, draw: Draw, spread: float) -> dict[str, Any]:
+    """sonar_parameters in C of a range finder at a board; `spread`: noise of the distance, as a share."""
     height, rays = draw["ping_height_m"], int(draw["ping_rays"])
-    return ffi.new(
-        "sonar_parameters *",
-        {
-            "beam": beam_of(ping.position_m, ping.heading_rad, ping.beam_rad, height, rays),
-            "range_minimum": ping.range_min_m,
-            "range_maximum": ping.range_max_m,
-            "sigma": draw["ping_spread"],
-            "miss": draw["ping_miss"],
-            "grazing_cosine": math.cos(draw["ping_grazing_rad"]),
-            "temperature": draw["temperature_c"],
-            "absorption": 1,
-        },
-    )
+    return {
+        "beam": beam_of(device.position_m, device.heading_rad, device.beam_rad, height, rays),
+        "range_minimum": device.range_min_m,
+        "range_maximum": device.range_max_m,
+        "sigma": spread,
+        "miss": draw["ping_miss"],
+        "grazing_cosine": math.cos(draw["ping_grazing_rad"]),
+        "temperature": draw["temperature_c"],
+        "absorption": 1,
+    }

@@ -22,7 +22,7 @@ Its signal is on pin 8, the timer's capture input.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, Final, NamedTuple, Protocol
 
 import msgspec
 import numpy as np
@@ -53,7 +53,45 @@ TEMPERATURE_C = 20.0
 SPEED_OF_SOUND = 331.5 + 0.6 * TEMPERATURE_C  # m/s, in air
 METRES_PER_US = SPEED_OF_SOUND / 2 * 1e-6
 _SHADE, _ECHO = 0.10, 0.14
-_SHOWN = ("distance", "m", 1.0, 2)
+SHOWN: Final = ("distance", "m", 1.0, 2)
+
+
+class RangeFinder(Protocol):
+    """What range finders have in common."""
+
+    @property
+    def position_m(self) -> Point: ...
+    @property
+    def heading_rad(self) -> float: ...
+    @property
+    def beam_rad(self) -> float: ...
+    @property
+    def range_min_m(self) -> float: ...
+    @property
+    def range_max_m(self) -> float: ...
+
+
+def shown_columns(place: Place, run: Run) -> list[Column]:
+    """Of a range finder at a board that a program drives: distance (NaN: nothing near) and age."""
+    distance, age = run.values(place.name).T
+    return [
+        Column("distance", "m", np.where(distance >= 0, distance, np.nan), 4),
+        Column("age", "s", np.where(age >= 0, age, np.nan), 3),
+    ]
+
+
+def range_fault(device: RangeFinder) -> tuple[str, str] | None:
+    """See `Device.fault`."""
+    if device.range_min_m < device.range_max_m:
+        return None
+    return "range_min_m", f" is {device.range_min_m:g}; expected less than range_max_m, {device.range_max_m:g}"
+
+
+def beam(device: RangeFinder, name: str) -> list[Item]:
+    """Its beam; and as far as an echo comes from. `name`: of the device."""
+    seen = cone(device.position_m, device.heading_rad, device.beam_rad, device.range_max_m, _SHADE)
+    there = [device.position_m, *arc(device.position_m, device.heading_rad, device.beam_rad, 1.0)]
+    return [seen, seen._replace(points=there, ink="robot", width=0.6, alpha=_ECHO, reach_by=name)]
 
 
 class Ping(NamedTuple):
@@ -92,7 +130,7 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
     period_ticks: Annotated[int, msgspec.Meta(ge=4, le=250)]
 
     READING: ClassVar = Ping
-    SHOWN: ClassVar = _SHOWN
+    SHOWN: ClassVar = SHOWN
     NAMES: ClassVar[tuple[str, ...]] = ("ping",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "SIG"), Wire(FIVE_VOLTS, "5 V"), Wire(GROUND, "GND"))
@@ -135,7 +173,9 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
         return read
 
     def columns(self, place: Place, run: Run) -> list[Column]:
-        """Distance (NaN: no echo), age and status."""
+        """Distance (NaN: no echo), age and status; that only by the kit's firmware."""
+        if "ping_echo" not in (run.raw.dtype.names or ()):
+            return shown_columns(place, run)
         least_us, greatest_us = self._echo_range_us()
         echo_us, age = run.raw["ping_echo"], run.raw["ping_age"]
         echoed = (least_us <= echo_us) & (echo_us <= greatest_us) & (age < NEVER)
@@ -147,10 +187,7 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
 
     def drawing(self, name: str) -> list[Item]:
         """Its beam, which turns with the turret; and as far as an echo comes from."""
-        seen = cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE)
-        there = [self.position_m, *arc(self.position_m, self.heading_rad, self.beam_rad, 1.0)]
-        echo = seen._replace(points=there, ink="robot", width=0.6, alpha=_ECHO, reach_by=name)
-        return [seen._replace(turns=True), echo._replace(turns=True)]
+        return [item._replace(turns=True) for item in beam(self, name)]
 
 
 class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
@@ -167,13 +204,11 @@ class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
     height_m: NotNegative = 0.08
 
     READING: ClassVar = Ping
-    SHOWN: ClassVar = _SHOWN
+    SHOWN: ClassVar = SHOWN
 
     def fault(self) -> tuple[str, str] | None:
         """See `Device`."""
-        if self.range_min_m < self.range_max_m:
-            return None
-        return "range_min_m", f" is {self.range_min_m:g}; expected less than range_max_m, {self.range_max_m:g}"
+        return range_fault(self)
 
     def reading(self, values: Sequence[float], age: float) -> Ping:
         """See `VehicleDevice`."""

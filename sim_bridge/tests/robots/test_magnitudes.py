@@ -22,6 +22,7 @@ from boebot.devices.input import Button, Potentiometer
 from boebot.devices.led import Led
 from boebot.devices.light import Phototransistor
 from boebot.devices.line import ReflectanceSensor
+from boebot.devices.ultrasonic import UltrasonicSensor
 from boebot.errors import BoebotError, RobotError
 from boebot.imperfections import Imperfection, checked, imperfections
 from boebot.result import RunResult, read_run
@@ -36,7 +37,12 @@ pytestmark = pytest.mark.unsanitized  # whole runs: their C is that of the tests
 
 LEFT, RIGHT = 13, 12
 TABLE = imperfections()
-WIRED = {"led": Led(pin=6), "start": Button(pin=2), "dial": Potentiometer(pin="A0")}  # that no bundled robot has
+WIRED = {  # parts that no bundled robot has
+    "led": Led(pin=6),
+    "start": Button(pin=2),
+    "dial": Potentiometer(pin="A0"),
+    "sonar": UltrasonicSensor(trigger_pin=7, echo_pin=8, position_m=(0.05, 0.0)),
+}
 ROBOTS = [
     *(load_robot(name) for name in robot_names()),
     msgspec.structs.replace(load_robot("shieldbot"), firmware="none", device=WIRED),

@@ -113,7 +113,7 @@ class Run {
     return this.time.length ? this.time.last : 0;
   }
   reading(device) {
-    return this.readings.find(one => one.name === device);
+    return this.readings.find(one => one.name === device.replaceAll("_", " "));
   }
   // Whether a sign, or "contact", is on at a tick.
   isOn(name, i) {
