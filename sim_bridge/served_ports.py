@@ -159,6 +159,16 @@ class PtyPort(Port):
         os.close(self._master)
 
 
+def listening(port: int) -> socket.socket:
+    """A TCP port of loopback, 0: any free one. Raises BoardError where it is taken."""
+    try:
+        return socket.create_server(("127.0.0.1", port))
+    except (OSError, OverflowError) as error:  # Python's own text of it would name the call's arguments
+        number = getattr(error, "errno", None)
+        reason = "it is in use" if number == errno.EADDRINUSE else os.strerror(number or errno.ERANGE)
+        raise BoardError(f"TCP port {port} cannot be opened: {reason}; expected a free one, 0 to 65535") from None
+
+
 class TcpPort(Port):
     """A listening socket and at most one client. Who comes while one is there is refused with a sentence, and so is
     who speaks HTTP: any page in a browser may ask for a port of this computer. (HTTP begins with a capital letter, a
@@ -171,12 +181,7 @@ class TcpPort(Port):
     def __init__(self, port: int) -> None:
         """Raises BoardError where the port is taken."""
         super().__init__()
-        try:
-            self._listener = socket.create_server(("127.0.0.1", port))
-        except (OSError, OverflowError) as error:  # Python's own text of it would name the call's arguments
-            number = getattr(error, "errno", None)
-            reason = "it is in use" if number == errno.EADDRINUSE else os.strerror(number or errno.ERANGE)
-            raise BoardError(f"TCP port {port} cannot be opened: {reason}; expected a free one, 0 to 65535") from None
+        self._listener = listening(port)
         self._listener.setblocking(False)
         self.url = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self._socket: socket.socket | None = None

@@ -307,10 +307,16 @@ class Sim:
         """Raises BoardError where a run has ended since the board of robot `crashed` - 1 crashed."""
         if crashed:
             board = self.robot(crashed - 1).board
+            board.raise_ended()
             whose = f" of robot {crashed}" if len(self.members) > 1 else ""
             raise BoardError(
                 f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {board.fault()}"
             )
+
+    @property
+    def stood_still_s(self) -> float:
+        """How long it has stood still in debuggers, by the wall clock."""
+        return sum(member.board.stood_still_s for member in self.members.values() if member.board is not None)
 
     @property
     def is_recorded(self) -> bool:

@@ -46,6 +46,7 @@ for purpose in "$@"; do
     test)
       need doctest-dev sh -c 'echo "#include <doctest/doctest.h>" | c++ -x c++ -E -'
       need avrdude has avrdude
+      need gdb-avr has avr-gdb
       need chromium has_browser
       need "clang libclang-rt-dev" can_fuzz
       need build-essential has c++

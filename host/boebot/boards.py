@@ -49,6 +49,8 @@ class BoardRequest:
     noise: bool = True
     without: Sequence[str] = ()  # imperfections of this robot that are switched off, by name
     imperfections: Mapping[str, float] = field(default_factory=dict)  # magnitudes of others, by name
+    gdb: int | None = None  # TCP port for avr-gdb at an emulated ATmega328P; 0: any free one
+    gdb_waits: bool = True  # the program stands still until a debugger has come
 
 
 @dataclass(frozen=True, kw_only=True)

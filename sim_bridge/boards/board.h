@@ -33,6 +33,7 @@ typedef enum { BOARD_RESET_POWER, BOARD_RESET_EXTERNAL, BOARD_RESET_BROWN_OUT, B
 typedef enum {
   BOARD_RUNNING = 0,
   BOARD_CRASHED = 1, /* the program cannot go on; see `fault` */
+  BOARD_STOPPED = 2, /* a debugger has ended the run */
 } board_state;
 
 typedef struct {
@@ -155,7 +156,8 @@ typedef struct {
   /* The cycle up to which the board has run. */
   uint64_t (*now)(const board *self);
 
-  /* Runs until `now` >= `until` (an instruction is never split). Returns BOARD_RUNNING or BOARD_CRASHED. */
+  /* Runs until `now` >= `until` (an instruction is never split). Returns BOARD_RUNNING,
+   * BOARD_CRASHED or BOARD_STOPPED. */
   board_state (*advance)(board *self, uint64_t until);
 
   /* From cycle `at` on the outside drives `pin` to LOW, HIGH, or RELEASED. Replaces what was queued for that pin at or

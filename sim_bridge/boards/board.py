@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,13 @@ class SentByte(NamedTuple):
     byte: int
 
 
+class Closes(Protocol):
+    """What can be closed."""
+
+    def close(self) -> None:
+        """May be called twice."""
+
+
 class EmulatedBoard:
     """A board in C (boards/board.h). It is freed when nobody holds it any more, or by `close`.
 
@@ -91,6 +98,9 @@ class EmulatedBoard:
         elf: the file that says where in the source an address comes from.
         assumed: what that file does not say and was assumed.
         is_in_use: whether a simulation runs it.
+        debugger: what is closed before it.
+        ended: why a debugger has ended its run.
+        stood_still_s: how long the program has stood still in a debugger, by the wall clock.
     """
 
     def __init__(
@@ -103,6 +113,9 @@ class EmulatedBoard:
         self._free = weakref.finalize(self, board.op.destroy, board)
         self._free.atexit = False  # its world may still hold it
         self.is_in_use: Callable[[], bool] = lambda: False
+        self.debugger: Closes | None = None
+        self.ended: BaseException | None = None
+        self.stood_still_s = 0.0
 
     @property
     def handle(self) -> Any:
@@ -140,6 +153,12 @@ class EmulatedBoard:
         z = 0 if data is None else data[30] | data[31] << 8
         return with_place(self.ffi.string(text).decode(), self.elf, -1 if at is None else at[0], z)
 
+    def raise_ended(self) -> None:
+        """Raises why a debugger has ended its run, if one has: once."""
+        ended, self.ended = self.ended, None
+        if ended is not None:
+            raise ended
+
     def access(self) -> BoardAccess:
         """Its operations, for use without a simulated world."""
         return BoardAccess(self)
@@ -152,6 +171,8 @@ class EmulatedBoard:
         """
         if self.is_in_use():
             raise BoardError(f"the {self.description} is in a simulation; expected Sim.close()")
+        if self.debugger is not None:
+            self.debugger.close()
         self._free()
 
 
@@ -307,6 +328,7 @@ class BoardAccess(BoardMemory):
     def advance(self, until: int) -> None:
         """Runs until `until`, or up to an instruction's length beyond. A crash raises BoardError."""
         if self._call("advance", until):
+            self.board.raise_ended()
             raise BoardError(f"The board stopped: {self.fault}.")
 
     def run(self, cycles: int) -> None:

@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 from boebot.arenas import load_arena
 from boebot.boards import BoardRequest
-from boebot.errors import BoardError
+from boebot.errors import BoardError, CallError
 from sim_bridge._core import lib
 from sim_bridge.boards import avr
-from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
+from sim_bridge.boards.board import CLOCK_HZ, Closes, EmulatedBoard
 from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library
 from sim_bridge.sessions.places import places_of
 from sim_bridge.sessions.session import DirectSession, SimSession
@@ -37,11 +37,14 @@ class Pace:
 
     def __init__(self, sim: Sim) -> None:
         self._sim = sim
-        self._start = time.monotonic() - sim.cycle / CLOCK_HZ
+        self._start = self._now() - sim.cycle / CLOCK_HZ
+
+    def _now(self) -> float:
+        return time.monotonic() - self._sim.stood_still_s
 
     def due(self) -> int:
         """Cycles that the wall clock is ahead of the simulation."""
-        ahead = time.monotonic() - self._start - self._sim.cycle / CLOCK_HZ
+        ahead = self._now() - self._start - self._sim.cycle / CLOCK_HZ
         if ahead > self.LAG_S:
             self._start += ahead
             ahead = 0.0
@@ -49,7 +52,7 @@ class Pace:
 
     def wait(self) -> None:
         """Sleeps until the wall clock has caught up."""
-        behind = self._sim.cycle / CLOCK_HZ + self._start - time.monotonic()
+        behind = self._sim.cycle / CLOCK_HZ + self._start - self._now()
         if behind > 0:
             time.sleep(behind)
         elif behind < -self.LAG_S:
@@ -185,11 +188,21 @@ def _add(sim: Sim, kind: BoardKind | None, request: BoardRequest, pose: tuple[fl
             request.robot.expect_kit()
         board = kind.make(kind.find(request.robot.pin_map) if image is None else image_file(image))
     try:
+        if board is not None and request.gdb is not None:
+            board.debugger = _debugger(board, request.gdb, waits=request.gdb_waits)
         return sim.add(board, request.robot, pose=pose, without=request.without, imperfections=request.imperfections)
     except Exception:
         if board is not None and not board.is_in_use():  # else the simulation's end is the board's
             board.close()
         raise
+
+
+def _debugger(board: EmulatedBoard, port: int, *, waits: bool) -> Closes:
+    from sim_bridge.gdb import Gdb
+
+    if not isinstance(board, avr.AvrBoard):
+        raise CallError(f"a debugger looks into the emulated ATmega328P ({AVR.name}), not into the {board.description}")
+    return Gdb(board, port, waits=waits)
 
 
 def _new_sim(request: BoardRequest, step_s: float) -> Sim:

@@ -129,6 +129,17 @@ def _speed(given: str | float) -> float:
 View = Annotated[
     bool, typer.Option("--view", help="Show the run in the browser while it goes on, where people may interfere.")
 ]
+Gdb = Annotated[
+    int | None,
+    typer.Option(
+        "--gdb",
+        metavar="PORT",
+        min=1,
+        max=65535,
+        help="Let avr-gdb in at this TCP port of this computer; board and world stand still where it stops them. "
+        "Emulated ATmega328P only.",
+    ),
+]
 ServedView = Annotated[bool, typer.Option("--view", help="Show the robot in the browser meanwhile.")]
 Speed = Annotated[
     float | None,

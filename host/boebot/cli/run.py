@@ -150,6 +150,7 @@ def run(
     timeout_exit_code: Annotated[
         int, typer.Option(metavar="N", min=0, max=255, help="Exit code where --expect-text was not printed in time.")
     ] = 42,
+    gdb: options.Gdb = None,
     view: options.View = False,
     speed: options.Speed = None,
     view_port: options.ViewPort = None,
@@ -195,6 +196,7 @@ def run(
         fail_text=fail_text,
         typed=[_typed(text) for text in typed or []],
         inputs=[_input(text) for text in inputs or []],
+        gdb=gdb,
     )
     programs = [member for member in request.members if isinstance(member.brain, LoadedBrain)]
     name = brain[0] if len(brain) == 1 else f"{count} robots"

@@ -30,6 +30,7 @@ def serve(
     seed: options.Seed = 1,
     without: options.Without = None,
     imperfection: options.Imperfections = None,
+    gdb: options.Gdb = None,
     view: options.ServedView = False,
     view_port: options.ViewPort = None,
     json: options.Json = False,
@@ -53,6 +54,8 @@ def serve(
         record=view,
         without=options.names(without),
         imperfections=options.magnitudes(imperfection),
+        gdb=gdb,
+        gdb_waits=False,
     )
 
     page: ServedView | None = None

@@ -92,6 +92,7 @@ class Request(_NamesFiles):
         arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text, typed,
             inputs: as of `boebot.run`.
         record: what happens is recorded.
+        gdb: TCP port for avr-gdb at the one emulated ATmega328P, which waits for it; no record says of it.
     """
 
     members: Sequence[Member]
@@ -104,6 +105,7 @@ class Request(_NamesFiles):
     force_timing: bool = False
     record: bool = True
     pins: bool = False
+    gdb: int | None = None
     expect_text: str = ""
     fail_text: str = ""
     typed: Sequence[tuple[str, float]] = ()
@@ -208,6 +210,9 @@ class Request(_NamesFiles):
                 raise CallError(str(error)) from None
         if self.pins and (is_live(kind) or not any(task.board.robot.has_board for task in tasks)):
             raise BoebotError(f"the pins of {kind!r} cannot be recorded; expected an emulated board")
+        if self.gdb is not None and (kind != PROGRAM_BOARD or len(tasks) > 1):
+            got = f"{len(tasks)} robots" if len(tasks) > 1 else repr(kind)
+            raise CallError(f"--gdb is of one robot on the emulated ATmega328P (--on {PROGRAM_BOARD}); got {got}")
         for task in tasks:
             task.on = kind if len(tasks) == 1 or task.board.robot.has_board else DIRECT
         return tasks
@@ -318,6 +323,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
         without=_names("without", member.without),
         imperfections={} if member.imperfections is None else checked(member.imperfections),
         image=str(loaded.path) if loaded.is_program else None,
+        gdb=request.gdb,
     )
     return Task(
         brain=loaded,

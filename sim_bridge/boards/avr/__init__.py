@@ -5,7 +5,7 @@ The extension behind it contains simavr and is GPL-3.0-or-later; this module imp
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -75,6 +75,15 @@ class AvrBoard(EmulatedBoard):
     def one_by_one(self) -> None:
         """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""
         self.lib.avr_board_one_by_one(self.handle)
+
+    def debug(self, debugger: Callable[[int], int]) -> Any:
+        """Has a debugger called from now on, within the board's run, with a number of avr_halt (avr_debug.h).
+
+        Returns:
+            The C struct avr_debug, by which it says where to stop.
+        """
+        self._debugger = self.ffi.callback("avr_debugger", lambda _, why: debugger(why))
+        return self.lib.avr_board_debug(self.handle, self._debugger)
 
     # ---- recorder ----------------------------------------------------------------------------------------------------
 

@@ -80,6 +80,7 @@ static void destroy(board *self) {
   usart_free(b);
   watchdog_free(b);
   spans_free(b);
+  debug_free(b);
   free(b);
 }
 

@@ -180,6 +180,45 @@ static bool uncommon(avr_board *b, uint32_t *pc, uint64_t *until) {
          !b->crashed;
 }
 
+/* ---- looked at before it is executed ---- */
+
+data_access next_access(const avr_board *b) {
+  const uint8_t *data = b->avr->data;
+  const uint32_t pc = (uint32_t)b->avr->pc;
+  const unsigned opcode = pc < AVR_BOARD_FLASH_SIZE ? word_at(b->avr->flash, pc) : 0;
+  const uint16_t stack = (uint16_t)word_at(data, SP);
+  switch (avr_kinds[opcode]) {
+    case LDD:
+    case STD:
+      return (data_access){displaced(data, opcode), 1, avr_kinds[opcode] == STD};
+    case LD:
+    case ST:
+      return (data_access){(uint16_t)(word_at(data, pointer_of(opcode)) - (opcode >> 1 & 1u)), 1,
+                           avr_kinds[opcode] == ST};
+    case LDS:
+    case STS:
+      return (data_access){(uint16_t)word_at(b->avr->flash, pc + 2), 1, avr_kinds[opcode] == STS};
+    case PUSH:
+      return (data_access){stack, 1, true};
+    case POP:
+      return (data_access){(uint16_t)(stack + 1u), 1, false};
+    case CALL:
+    case RCALL:
+    case ICALL:
+      return (data_access){(uint16_t)(stack - 1u), 2, true};
+    default:
+      break;
+  }
+  if (is_return(opcode)) return (data_access){(uint16_t)(stack + 1u), 2, false};
+  if ((opcode & 0xF000u) == 0xB000u) { /* IN, OUT */
+    return (data_access){(uint16_t)(0x20u + ((opcode >> 5 & 0x30u) | (opcode & 0xFu))), 1, opcode & 0x0800u};
+  }
+  if ((opcode & 0xFC00u) == 0x9800u) { /* CBI, SBIC, SBI, SBIS */
+    return (data_access){(uint16_t)(0x20u + (opcode >> 3 & 0x1Fu)), 1, !(opcode & 0x0100u)};
+  }
+  return (data_access){0, 0, false};
+}
+
 /* ---- many ---- */
 
 static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t until,

@@ -4,7 +4,7 @@
  * time or pins is here: common instructions (avr_instructions.c, avr_opcodes.c), run loop and interrupts (avr_run.c),
  * registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
  * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), SPI (avr_spi.c), ADC (avr_converter.c), watchdog (avr_watchdog.c),
- * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c).
+ * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c), debugger (avr_debug.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
  * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
@@ -381,6 +381,7 @@ typedef struct avr_board {
   uint16_t lowest_stack;  /* that the stack may write: variables_end, or RAM_BEGIN while it lies among the variables */
   bool one_by_one;        /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
+  struct avr_debugging *debug;   /* NULL: no debugger */
   board_counters counters;
   register_read *reads[0x100];   /* by address */
   register_write *writes[0x100]; /* NULL: it is kept */
@@ -514,5 +515,12 @@ void spans_request_gone(avr_board *b, uint8_t vector);
 void spans_woke(avr_board *b);
 void spans_restart(avr_board *b);
 void spans_free(avr_board *b);
+
+/* avr_debug.c; all but debug_free only while there is a debugger. False: it has ended the run */
+bool debug_looks(avr_board *b);
+bool debug_before(avr_board *b); /* an instruction */
+bool debug_crashed(avr_board *b);
+uint32_t run_debugged(avr_board *b, uint64_t until); /* as execute_instructions */
+void debug_free(avr_board *b);
 
 #endif

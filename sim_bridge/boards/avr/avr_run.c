@@ -300,7 +300,7 @@ static void execute(avr_board *b, uint64_t until) {
   if (b->recorder) {
     address = run_recorded(b, until);
   } else {
-    address = execute_instructions(b, until, NULL);
+    address = b->debug ? run_debugged(b, until) : execute_instructions(b, until, NULL);
     core_stopped(b);
     b->counters.executed_cycles += avr->cycle - start;
   }
@@ -309,6 +309,7 @@ static void execute(avr_board *b, uint64_t until) {
 
 board_state run_until(avr_board *b, uint64_t until) {
   avr_t *avr = b->avr;
+  if (b->debug && !debug_looks(b)) return BOARD_STOPPED;
   while (avr->cycle < until) {
     catch_up(b, avr->cycle);
     if (b->reset_wanted) restart(b);
@@ -316,10 +317,12 @@ board_state run_until(avr_board *b, uint64_t until) {
       avr->cycle = earlier(until, b->next_due);
       continue;
     }
+    if (b->crashed && b->debug && !debug_crashed(b)) return BOARD_STOPPED;
     if (b->crashed) return BOARD_CRASHED;
     if (next_of_simavr(avr) <= avr->cycle) avr_cycle_timer_process(avr);
     if (b->reset_wanted) continue;
     if (avr->sreg[S_I] && avr->interrupt_state >= 0 && enter_interrupt(b)) continue;
+    if (b->debug && !debug_before(b)) return BOARD_STOPPED;
     uint64_t horizon = earlier(until, earlier(b->next_due, next_of_simavr(avr)));
     if (b->sleeping) {
       avr->cycle = horizon;

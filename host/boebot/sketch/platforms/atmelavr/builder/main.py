@@ -12,6 +12,7 @@ env.Replace(
     AS="avr-as",
     CC="avr-gcc",
     CXX="avr-g++",
+    GDB="avr-gdb",
     LINK="avr-gcc",
     OBJCOPY="avr-objcopy",
     RANLIB="avr-gcc-ranlib",

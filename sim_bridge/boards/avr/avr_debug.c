@@ -1,0 +1,156 @@
+/* avr_debug.c: see avr_debug.h.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ */
+#include "avr_debug.h"
+
+#include <stdlib.h>
+
+#include "avr_instructions.h"
+#include "avr_parts.h"
+#include "sim_core.h"
+
+#define DATA_BEGIN 0x800000u
+#define EEPROM_BEGIN 0x810000u
+#define IO_BEGIN 0x20u
+#define CHANGED "is changed", "by the debugger", "the run cannot be repeated from its record"
+
+struct avr_debugging {
+  avr_debug face;
+  avr_debugger *call;
+  instruction_stops stops;
+  uint8_t watched[BOARD_DATA_SIZE];
+  uint64_t halted_at; /* cycle of the last halt: from there it goes on */
+  avr_halt access;    /* of a watched cell by the last instruction; AVR_LOOKS: none */
+};
+
+/* ---- while it runs ---- */
+
+static bool call(avr_board *b, avr_halt why) {
+  avr_debug *d = &b->debug->face;
+  d->pc = (uint32_t)b->avr->pc;
+  if (b->debug->call(NULL, why) != 0) return false;
+  if (why != AVR_LOOKS && b->avr->pc != d->pc) {
+    note(b, (uint32_t)b->avr->pc, CHANGED);
+    b->avr->pc = d->pc;
+  }
+  return true;
+}
+
+static bool halt(avr_board *b, avr_halt why) {
+  struct avr_debugging *g = b->debug;
+  g->face.stepping = g->face.interrupted = false;
+  g->access = AVR_LOOKS;
+  g->halted_at = b->avr->cycle;
+  return call(b, why);
+}
+
+bool debug_looks(avr_board *b) { return call(b, AVR_LOOKS); }
+
+bool debug_crashed(avr_board *b) { return b->debug->halted_at == b->avr->cycle || halt(b, AVR_CRASHED); }
+
+bool debug_before(avr_board *b) {
+  const struct avr_debugging *g = b->debug;
+  const uint32_t pc = (uint32_t)b->avr->pc;
+  if (g->face.interrupted) return halt(b, AVR_INTERRUPTED);
+  if (b->sleeping || g->halted_at == b->avr->cycle) return true;
+  if (g->access != AVR_LOOKS) return halt(b, g->access);
+  if (pc < AVR_BOARD_FLASH_SIZE && g->stops.marked[pc / 2u]) return halt(b, AVR_REACHED);
+  return !g->face.stepping || halt(b, AVR_STEPPED);
+}
+
+static void look_at_access(const avr_board *b, struct avr_debugging *g) {
+  const data_access access = next_access(b);
+  for (unsigned i = 0; i < access.count; i++) {
+    const uint16_t cell = (uint16_t)(access.first + i);
+    const uint8_t kind = access.writes ? AVR_WATCH_WRITE : AVR_WATCH_READ;
+    if (cell >= BOARD_DATA_SIZE || !(g->watched[cell] & kind)) continue;
+    g->access = access.writes ? AVR_WROTE : AVR_READ;
+    g->face.accessed = cell;
+  }
+}
+
+uint32_t run_debugged(avr_board *b, uint64_t until) {
+  struct avr_debugging *g = b->debug;
+  if (g->face.watching) look_at_access(b, g);
+  if (g->face.watching || g->face.stepping) until = b->avr->cycle + 1;
+  return execute_instructions(b, until, &g->stops);
+}
+
+/* ---- from outside ---- */
+
+void debug_free(avr_board *b) {
+  free(b->debug);
+  b->debug = NULL;
+}
+
+avr_debug *avr_board_debug(board *self, avr_debugger *debugger) {
+  avr_board *b = (avr_board *)self;
+  debug_free(b);
+  struct avr_debugging *g = debugger ? calloc(1, sizeof *g) : NULL;
+  if (!g) return NULL;
+  g->call = debugger;
+  g->halted_at = NEVER;
+  g->stops.highest = UINT16_MAX;
+  g->face.breakpoints = g->stops.marked;
+  g->face.watched = g->watched;
+  b->debug = g;
+  return &g->face;
+}
+
+/* As it was but for the value: what a program's reading would change (a byte is taken, a flag is cleared) is put back. */
+static uint8_t peek(avr_board *b, uint16_t address) {
+  if (address == R_SREG) {
+    uint8_t flags = 0;
+    for (unsigned i = 0; i < 8; i++) flags |= (uint8_t)(b->avr->sreg[i] << i);
+    return flags;
+  }
+  if (address < IO_BEGIN || address > UINT8_MAX || !b->reads[address]) return b->avr->data[address];
+  const avr_board before = *b;
+  const uint8_t value = b->reads[address](b, address, b->avr->cycle);
+  *b = before;
+  return value;
+}
+
+static void poke(avr_board *b, uint16_t address, uint8_t value) {
+  if (address == R_SREG) {
+    for (unsigned i = 0; i < 8; i++) b->avr->sreg[i] = value >> i & 1;
+  } else if (address >= IO_BEGIN && address <= UINT8_MAX && b->writes[address]) {
+    b->writes[address](b, address, value, b->avr->cycle);
+  } else {
+    b->avr->data[address] = value;
+  }
+}
+
+int avr_debug_read(board *self, uint32_t address) {
+  avr_board *b = (avr_board *)self;
+  if (address < AVR_BOARD_FLASH_SIZE) return b->avr->flash[address];
+  if (address - DATA_BEGIN < BOARD_DATA_SIZE) return peek(b, (uint16_t)(address - DATA_BEGIN));
+  if (address - EEPROM_BEGIN < BOARD_EEPROM_SIZE) return b->eeprom.cells[address - EEPROM_BEGIN];
+  return -1;
+}
+
+bool avr_debug_write(board *self, uint32_t address, uint8_t value) {
+  avr_board *b = (avr_board *)self;
+  const int before = avr_debug_read(self, address);
+  if (before == value || before < 0) return before == value;
+  note(b, (uint32_t)b->avr->pc, CHANGED);
+  if (address < AVR_BOARD_FLASH_SIZE) {
+    b->avr->flash[address] = value;
+    b->code_end = AVR_BOARD_FLASH_SIZE; /* another program, of which nothing is known */
+    b->variables_end = b->lowest_stack = RAM_BEGIN;
+  } else if (address < EEPROM_BEGIN) {
+    poke(b, (uint16_t)(address - DATA_BEGIN), value);
+  } else {
+    b->eeprom.cells[address - EEPROM_BEGIN] = value;
+  }
+  return true;
+}
+
+void avr_debug_reset(board *self) {
+  avr_board *b = (avr_board *)self;
+  note(b, (uint32_t)b->avr->pc, CHANGED);
+  want_reset(b, BOARD_RESET_EXTERNAL);
+  restart(b);
+  b->debug->face.pc = (uint32_t)b->avr->pc;
+}
