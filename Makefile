@@ -20,7 +20,10 @@ CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name 'build_
 ARENA_SCHEMA := host/boebot/arenas/bundled/schema.json
 # A library that sketches in tests use.
 SERVO := build/cache/libraries/Servo/Servo.h
-IMAGES := $(patsubst %,build/images/%.elf,$(shell sed -n 's/^default_envs = //p' platformio.ini | tr -d ,))
+# The firmware for each pin map, and the boot loader.
+ENVIRONMENTS := $(shell sed -n 's/^default_envs = //p' platformio.ini | tr -d ,) bootloader
+IMAGES := $(ENVIRONMENTS:%=build/images/%.elf)
+BUILD_IMAGES := tools/pio run --silent $(addprefix -e ,$(ENVIRONMENTS))
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
@@ -268,9 +271,9 @@ build/.done-generated: $(GENERATED_FROM) build/.done-system-run
 $(sort $(GENERATED) $(filter firmware/src/generated/%,$(FIRMWARE_SOURCES))): build/.done-generated
 	@test -e $@ || $$(tools/find_python.sh) protocol/generate.py
 
-build/.done-images: platformio.ini tools/pio build/platformio-core/appstate.json $(FIRMWARE_SOURCES)
+build/.done-images: platformio.ini tools/pio build/platformio-core/appstate.json $(FIRMWARE_SOURCES) $(wildcard firmware/bootloader/*.c)
 	@echo "Building the firmware images"
-	@tools/pio run --silent
+	@$(BUILD_IMAGES)
 	@touch $@
 $(IMAGES): build/.done-images
-	@test -e $@ || tools/pio run --silent
+	@test -e $@ || $(BUILD_IMAGES)

@@ -7,6 +7,8 @@ It has the face of a board session, so that a Rig speaks with the board as with 
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import BoardAccess, Level
@@ -16,10 +18,13 @@ SLICE = 32  # cycles: 2 us
 SDA, SCL = 18, 19
 
 
-def power_on(kind: str, pin_map: str = "shieldbot", image: str | None = None) -> BoardAccess:
-    """A board, native or avr, with the image of that pin map or another one, and with nothing around it."""
+def power_on(
+    kind: str, pin_map: str = "shieldbot", image: str | None = None, bootloader: Path | None = None
+) -> BoardAccess:
+    """A board, native or avr, with the image of that pin map or another one, and with nothing around it; an avr behind
+    a boot loader, if one is given."""
     if kind == "avr":
-        return avr.create(image_file(image) if image else avr_image(pin_map)).access()
+        return avr.create(image_file(image) if image else avr_image(pin_map), bootloader).access()
     return native_board(native_library(pin_map)).access()
 
 

@@ -11,7 +11,7 @@ from elftools.elf.elffile import ELFFile
 
 from boebot import resources
 from boebot.link import messages
-from hil_tests.bootloader import with_bootloader
+from hil_tests.bootloader import KITS
 from hil_tests.device_bench import DeviceRig, power_on
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
@@ -263,7 +263,7 @@ def test_a_hang_is_told(
     """The watchdog warns after 125 ms and resets 16 ms later, or another 125 ms later if nobody heard it; then nobody
     marks the record, either, by which a program behind a bootloader knows it."""
     image = patched(tmp_path, HANG_AT, code)
-    board = power_on("avr", image=str(with_bootloader(image, tmp_path) if bootloader else image))
+    board = power_on("avr", image=str(image), bootloader=KITS if bootloader else None)
     host = DeviceRig(board)
     host.next_hello()
     host.send(messages.Identify())
@@ -277,11 +277,10 @@ def test_a_hang_is_told(
 
 
 @pytest.mark.parametrize("pin_map", IMAGES)
-def test_behind_a_bootloader_the_memory_tells_the_cause(tmp_path: Path, pin_map: str) -> None:
+def test_behind_a_bootloader_the_memory_tells_the_cause(pin_map: str) -> None:
     """It leaves nothing of the chip's own answer. RAM holds something else whenever the power comes; a brown-out that
     leaves it whole looks like an external reset."""
-    image = with_bootloader(resources.folder("images") / f"{pin_map}.elf", tmp_path)
-    host = DeviceRig(power_on("avr", image=str(image)))
+    host = DeviceRig(power_on("avr", pin_map, bootloader=KITS))
     assert host.next_hello().reset_cause == POWER
     for cause, reported in [
         (ResetCause.EXTERNAL, EXTERNAL),

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boebot import resources
 from boebot.description.robots import load_robot
 from boebot.devices.servo import ContinuousServo
 from boebot.devices.uart import Uart
 from boebot.link import messages
-from hil_tests.bootloader import with_bootloader
+from hil_tests.bootloader import KITS
 from hil_tests.device_bench import DeviceRig, power_on
 from hil_tests.rig import CYCLES_PER_S
 from sim_bridge.boards.board import Level, ResetCause
@@ -84,9 +83,9 @@ def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> No
 # ---- from a reset on -------------------------------------------------------------------------------------------------
 
 
-def low_after_ms(image: Path) -> float:
+def low_after_ms(pin_map: str, bootloader: Path | None = None) -> float:
     """From the reset until the servos' lines are low, where they stay."""
-    board = power_on("avr", image=str(image))
+    board = power_on("avr", pin_map, bootloader=bootloader)
     board.run(2 * CYCLES_PER_S)
     board.edges()
     start = board.now
@@ -100,9 +99,9 @@ def low_after_ms(image: Path) -> float:
 
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_servo_lines_are_low_within_milliseconds(pin_map: str) -> None:
-    assert low_after_ms(resources.folder("images") / f"{pin_map}.elf") < 5.0
+    assert low_after_ms(pin_map) < 5.0
 
 
-def test_behind_a_bootloader_too(tmp_path: Path) -> None:
+def test_behind_a_bootloader_too() -> None:
     """Which starts the program at once when the power comes; after an external reset it waits a second for another."""
-    assert low_after_ms(with_bootloader(resources.folder("images") / "shieldbot.elf", tmp_path)) < 5.0
+    assert low_after_ms("shieldbot", KITS) < 5.0

@@ -18,7 +18,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.ports import open_serial
-from hil_tests.bootloader import with_bootloader
+from hil_tests.bootloader import KITS, of_chip
 from sim_bridge.serve import carry
 from sim_bridge.served_ports import PtyPort
 from sim_bridge.sessions.session import SimSession
@@ -34,9 +34,9 @@ PATIENCE_S = 10.0  # by the wall clock: the bootloader waits one second for a pr
 
 
 @contextmanager
-def served(image: Path) -> Iterator[tuple[str, SimSession]]:
+def served(bootloader: Path) -> Iterator[tuple[str, SimSession]]:
     """The port of an emulated board, as `boebot serve` offers it."""
-    request = BoardRequest(robot=load_robot("shieldbot"), arena="empty", seed=1, noise=False, image=str(image))
+    request = BoardRequest(robot=load_robot("rover"), arena="empty", noise=False, bootloader=str(bootloader))
     session, port, ended = open_on(AVR, request), PtyPort(board.BAUD), threading.Event()
     thread = threading.Thread(target=carry, args=(session, port, lambda: not ended.is_set(), lambda _: None))
     thread.start()
@@ -61,9 +61,9 @@ def heard(port: str, question: bytes) -> Iterator[bytes]:
         line.close()
 
 
-def test_avrdude_writes_the_calibration_program(tmp_path: Path) -> None:
+def test_avrdude_writes_the_calibration_program() -> None:
     """And reads it back; then the program begins."""
-    with served(with_bootloader(None, tmp_path)) as (port, _):
+    with served(KITS) as (port, _):
         board.flash(port)
         talk = Talk()
         for data in heard(port, START):
@@ -74,17 +74,17 @@ def test_avrdude_writes_the_calibration_program(tmp_path: Path) -> None:
 
 
 def test_another_chip_is_not_written(tmp_path: Path) -> None:
-    image = with_bootloader(None, tmp_path, signature=0x1E9801)  # an ATmega2560
+    image = of_chip(0x1E9801, tmp_path)  # an ATmega2560
     with served(image) as (port, _), pytest.raises(BoardError, match=f"could not flash .* {port}"):
         board.flash(port)
 
 
 @pytest.mark.soak
-def test_the_tutorials_upload_works_as_written(tmp_path: Path) -> None:
+def test_the_tutorials_upload_works_as_written() -> None:
     """PlatformIO, avrdude, bootloader, firmware: afterwards the board says who it is."""
     found = re.search(r"^pio (.*)$", TUTORIAL.read_text(), re.MULTILINE)
     assert found
-    with served(with_bootloader(None, tmp_path)) as (port, _):
+    with served(KITS) as (port, _):
         words = shlex.split(found[1].replace("/dev/ttyACM0", port))
         done = subprocess.run([ROOT / "tools" / "pio", *words], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr

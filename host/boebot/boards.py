@@ -44,6 +44,7 @@ class BoardRequest:
     realtime: bool = False  # pace simulated time by the wall clock
     pose: tuple[float, float, float] | None = None  # x (m), y (m), heading (rad); None: the arena's own
     image: str | None = None  # firmware to load in place of the bundled one
+    bootloader: str | None = None  # file of the boot loader in which an emulated Uno's resets begin
     record: bool = True  # keep the truth for the pictures
     pins: bool = False  # record the edges of an emulated board's pins
     noise: bool = True

@@ -183,10 +183,7 @@ def _add(sim: Sim, kind: BoardKind | None, request: BoardRequest, pose: tuple[fl
     """Puts the request's robot into a world, with its board if it has one."""
     board = None
     if kind is not None and request.robot.has_board:
-        image = request.image
-        if image is None:
-            request.robot.expect_kit()
-        board = kind.make(kind.find(request.robot.pin_map) if image is None else image_file(image))
+        board = _board(kind, request)
     try:
         if board is not None and request.gdb is not None:
             board.debugger = _debugger(board, request.gdb, waits=request.gdb_waits)
@@ -203,6 +200,19 @@ def _debugger(board: EmulatedBoard, port: int, *, waits: bool) -> Closes:
     if not isinstance(board, avr.AvrBoard):
         raise CallError(f"a debugger looks into the emulated ATmega328P ({AVR.name}), not into the {board.description}")
     return Gdb(board, port, waits=waits)
+
+
+def _board(kind: BoardKind, request: BoardRequest) -> EmulatedBoard:
+    """With the request's program, or the kit's; behind a boot loader and for a robot of other programs with none."""
+    robot = request.robot
+    image = None if request.image is None else image_file(request.image)
+    if request.bootloader is None:
+        if image is None:
+            robot.expect_kit()
+        return kind.make(image or kind.find(robot.pin_map))
+    if kind is not AVR:
+        raise BoardError(f"a boot loader begins on an emulated Uno; expected avr, not {kind.name}")
+    return avr.create(image or (kind.find(robot.pin_map) if robot.takes_brain else None), Path(request.bootloader))
 
 
 def _new_sim(request: BoardRequest, step_s: float) -> Sim:

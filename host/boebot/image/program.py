@@ -25,7 +25,8 @@ SEGMENT = struct.Struct("<8I")  # type, offset, virtual and physical address, by
 LOADED, EXECUTABLE = 1, 1  # a segment's type, and one of its flags
 FLASH_SIZE, EEPROM_SIZE = 0x8000, 1024  # bytes
 RAM_BEGIN, RAM_END = 0x100, 0x900
-BOOT_BEGIN = 0x7000  # of the largest boot section
+BOOT_SECTIONS = (0x7E00, 0x7C00, 0x7800, 0x7000)  # where they can begin (table 27-7)
+BOOT_BEGIN = BOOT_SECTIONS[-1]  # of the largest one
 DATA_SPACE, EEPROM_SPACE = 0x800000, 0x810000  # where ELF files have these memories
 OTHER_SPACES = 0x820000  # from here on fuses, lock bits, signature
 SIZE_MAXIMUM = 64 << 20  # bytes of a file
@@ -67,6 +68,27 @@ def read_program(path: Path) -> Program:
     except OSError as error:
         raise AnalysisError(f"the firmware image {path} cannot be read: {error.strerror or error}") from error
     return hex_program(path, data) if path.suffix.lower() == HEX else elf_program(path, data)
+
+
+def behind_bootloader(path: Path, program: Program | None) -> Program:
+    """A chip whose reset leads into the boot loader in a file; with a program in the flash before it, or none.
+
+    Nothing is known of the code then, as another program may be written at any time.
+
+    Raises:
+        AnalysisError: as `read_program`; that is no boot loader, or the program reaches into its section.
+    """
+    loader = read_program(path)
+    first = FLASH_SIZE - len(loader.flash.lstrip(b"\xff"))
+    begin = next((section for section in BOOT_SECTIONS if section <= first), 0)
+    if not begin:
+        raise AnalysisError(f"{path} is no boot loader: it begins at 0x{first:04X}; expected 0x7000 at least")
+    erased = b"\xff" * FLASH_SIZE
+    flash, eeprom = (erased, loader.eeprom) if program is None else (program.flash, program.eeprom)
+    if flash[begin:] != erased[begin:]:
+        end = len(flash.rstrip(b"\xff"))
+        raise AnalysisError(f"the program fills {end} bytes of flash; expected {begin} at most before the boot loader")
+    return Program(flash[:begin] + loader.flash[begin:], eeprom, begin, FLASH_SIZE, RAM_BEGIN, None, "")
 
 
 def elf_program(path: Path, data: bytes) -> Program:

@@ -12,7 +12,7 @@ from SCons.Script import Import
 Import("env")
 env = globals()["env"]
 
-env.AppendUnique(LINKFLAGS=[flag for flag in env["CCFLAGS"] if str(flag).startswith(("-f", "-g", "-m"))])
+env.AppendUnique(LINKFLAGS=[flag for flag in env["CCFLAGS"] if str(flag).startswith(("-f", "-g", "-m", "-n"))])
 if "BOEBOT_FOLDERS" in os.environ:
     env.Append(LINKFLAGS=[f"-fdebug-prefix-map={pair}" for pair in json.loads(os.environ["BOEBOT_FOLDERS"])])
     env.Replace(LINKFLAGS=[flag for flag in env["LINKFLAGS"] if flag != "-Wl,--relax"])

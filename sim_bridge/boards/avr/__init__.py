@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from boebot import resources
 from boebot.errors import AnalysisError, BoardError
-from boebot.image.program import Program, read_program
+from boebot.image.program import Program, behind_bootloader, read_program
 from sim_bridge.boards.board import EmulatedBoard
 
 FUNCTION_IDS = 64  # id of the first watched function; below are vectors
@@ -120,14 +120,18 @@ class AvrBoard(EmulatedBoard):
         return int(self.lib.avr_board_lowest_stack(self.handle))
 
 
-def create(image: Path) -> AvrBoard:
-    """A board, powered on, with the program of an ELF or HEX file in flash.
+def create(image: Path | None, bootloader: Path | None = None) -> AvrBoard:
+    """A board, powered on, with the program of an ELF or HEX file in flash; behind a boot loader, if one is given, and
+    then `image` may be None: only that.
 
     Raises:
-        BoardError: it cannot be read, or is no program for this chip.
+        BoardError: a file cannot be read, or is no program for this chip.
     """
     try:
-        program = read_program(image)
+        program = None if image is None else read_program(image)
+        if bootloader is not None:
+            program = behind_bootloader(bootloader, program)
+        assert program is not None
     except AnalysisError as refused:
         raise BoardError(str(refused)) from None
     return AvrBoard(program)
