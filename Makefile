@@ -99,6 +99,7 @@ fuzz:
 	@$(PYTHON_VENV) host/fuzz/damaged_records.py
 	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis -o faulthandler_timeout=1800
 
+DISTANCE := distance/distance.ino --robot shieldbot --arena room --seconds 17
 pictures:
 	@$(SIDE_BY_SIDE) ready-test
 	@mkdir -p build/pictures
@@ -117,6 +118,11 @@ pictures:
 	@$(VENV)/bin/boebot report build/pictures/can --as can.log --quiet
 	@$(VENV)/bin/boebot can dbc build/pictures/boebot.dbc
 	@$(VENV)/bin/cantools plot build/pictures/boebot.dbc telemetry_5.ping_echo --ignore-unknown-frames -o docs/images/can-plot.png <build/pictures/can/can.log
+	@rm -rf build/pictures/distance && cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot new distance --sketch
+	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot run $(DISTANCE) --out sketch
+	@cp build/pictures/sketch/run.png docs/images/sketch-distance.png
+	@cd build/pictures && sed -i 's/delay(50)/delay(2000)/' distance/distance.ino && $(CURDIR)/$(VENV)/bin/boebot run $(DISTANCE) --out sketch
+	@cp build/pictures/sketch/run.png docs/images/sketch-blind.png
 	@$(PYTHON_VENV) -m tools.live_pictures
 	@$(PYTHON_VENV) -m boebot_course.pages
 	@$(MAKE) --no-print-directory timing

@@ -63,7 +63,7 @@ def test_centring_finds_the_pulse_of_a_servo_that_is_not_centred(letters: str, s
 
 def test_dance_ends_where_it_began() -> None:
     """With servos that are all alike: four legs of a second, each followed by half a turn, two of them to the left."""
-    truth = (result := drive("dance", 10.0, without=["servo_spread", "servo_asymmetry", "servo_centre"])).truth
+    truth = (result := drive("dance", 9.5, without=["servo_spread", "servo_asymmetry", "servo_centre"])).truth
     assert truth is not None
     heading = np.unwrap(truth.heading)
     assert np.ptp(heading) == pytest.approx(math.pi, abs=0.3)
@@ -76,7 +76,7 @@ def test_dance_ends_where_it_began() -> None:
 @pytest.mark.parametrize("name", ["whiskers", "infrared", "states"])
 def test_they_turn_away_from_a_wall_and_drive_on(name: str) -> None:
     """The wall is 0.6 m away, 4 s; a robot that goes on straight ahead bumps into it."""
-    result = drive(name, 12.0, pose=(0.9, -0.2, 0.3))
+    result = drive(name, 8.0, pose=(0.9, -0.2, 0.3))
     truth = result.truth
     assert truth is not None and result.true_contacts == 0
     assert result.true_distance is not None and result.true_distance > 0.1 * result.run_time
@@ -98,7 +98,7 @@ def test_they_never_stay_where_they_are(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_light_stops_at_the_lamp(seed: int) -> None:
-    result = drive("light", 22.0, seed)
+    result = drive("light", 14.0, seed)
     assert result.truth is not None and result.true_contacts == 0
     (lamp,) = load_arena("station").description.light
     assert math.hypot(result.truth.x[-1] - lamp.x_m, result.truth.y[-1] - lamp.y_m) < 0.4
@@ -117,7 +117,7 @@ def test_distance_stops_before_the_wall(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_line_stays_on_the_tape(seed: int) -> None:
     """In a minute once round; the sensor in the middle is 5 cm before the axle."""
-    result = drive("line", 15.0 if seed == 1 else 120.0, seed)
+    result = drive("line", 10.0 if seed == 1 else 120.0, seed)
     truth, (tape,) = result.truth, load_arena("track").description.line
     assert truth is not None
     x, y = truth.x + 0.05 * np.cos(truth.heading), truth.y + 0.05 * np.sin(truth.heading)

@@ -72,7 +72,7 @@ def _beginning(line: str) -> str:
 
 def printed(command: str, folder: Path) -> str:
     """What `boebot COMMAND` prints there, without colours."""
-    environment = {**os.environ, "COLUMNS": "80", "TERM": "dumb"}
+    environment = {"BOEBOT_CACHE": str(FOLDER.parent / "cache"), **os.environ, "COLUMNS": "80", "TERM": "dumb"}
     arguments = [sys.executable, "-m", "boebot", *shlex.split(command)]
     done = subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
     return done.stdout

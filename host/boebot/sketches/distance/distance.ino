@@ -33,7 +33,7 @@ void loop() {
   if (cm <= 20) {
     left.detach();  // without pulses the servos rest
     right.detach();
-    Serial.print("there: ");
+    Serial.print("stopped at ");
   }
   Serial.print(cm);
   Serial.println(" cm");
