@@ -115,7 +115,7 @@ def _build_sketch(tools: _Tools, sketch: Sketch, progress: Progress | None) -> P
     shutil.rmtree(copy, ignore_errors=True)
     for name, data in sketch.files.items():
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
-        (copy / name).write_bytes(data)
+        (copy / name).write_bytes(data.removeprefix(b"\xef\xbb\xbf"))  # UTF-8's mark, which joined files have inside
     (work / PROJECT).write_text(SKETCH_INI, encoding="utf-8")
     needs_servo = servo.is_needed(sketch.files)
     process = _PlatformIO(tools, work, progress, needs_servo)

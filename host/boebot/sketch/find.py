@@ -8,7 +8,8 @@ folder. Either takes the libraries in the folder `libraries` beside it.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ CODE = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx", ".inc", ".ipp"
 LIBRARIES = "libraries"
 OF_LIBRARY = (*CODE, "library.properties", "library.json")  # how the names of a library's files end
 NOT_BUILT = {"examples", "extras", "docs", "test", "tests"}  # folders of a library
+_ODD = re.compile(r"""["'`$;\\\x00-\x1f]""")  # what PlatformIO takes in no file name
 SIZE_MAXIMUM = 4 << 20  # bytes of a file
 
 
@@ -67,7 +69,7 @@ def find(path: Path) -> Sketch | Project:
         if path.name == PROJECT:
             path = path.parent
         if not path.is_dir():
-            if not path.is_file():
+            if path.suffix not in INO or not path.is_file():
                 raise CallError(f"there is no sketch {path}; expected an .ino file, or a folder with one")
             is_whole = path.stem == path.absolute().parent.name
             return _sketch(path.parent, path.name, _inos(path.parent) if is_whole else [path.name], with_src=is_whole)
@@ -93,20 +95,20 @@ def _inos(folder: Path) -> list[str]:
 def _sketch(folder: Path, main: str, inos: list[str], *, with_src: bool) -> Sketch:
     beside = [one for one in folder.iterdir() if one.suffix in CODE and one.is_file()]
     within = [*below(folder / "src")] if with_src else []
-    libraries = below(folder / LIBRARIES, OF_LIBRARY)
+    libraries = below(folder / LIBRARIES, OF_LIBRARY, NOT_BUILT)
+    files = sorted([*(folder / name for name in inos), *beside, *within, *libraries])
+    if odd := next((one for one in files if _ODD.search(one.name)), None):
+        raise CallError(f"{odd} cannot be built: expected a file name without $, quotes, ; and \\")
     return Sketch(
         name=as_utf8(main),
         folder=folder.resolve(),
         shown=folder,
-        files={
-            one.relative_to(folder).as_posix(): regular(one, SIZE_MAXIMUM).read_bytes()
-            for one in sorted([*(folder / name for name in inos), *beside, *within, *libraries])
-        },
+        files={one.relative_to(folder).as_posix(): regular(one, SIZE_MAXIMUM).read_bytes() for one in files},
     )
 
 
-def below(folder: Path, endings: tuple[str, ...] = (*CODE, *INO)) -> Iterator[Path]:
-    """Files whose names end so, however deep; not what only belongs to a library's making."""
+def below(folder: Path, endings: tuple[str, ...] = (*CODE, *INO), without: Collection[str] = ()) -> Iterator[Path]:
+    """Files whose names end so, however deep, but for those in folders `without`, and in hidden ones."""
     for where, folders, names in os.walk(folder):
-        folders[:] = [name for name in folders if name[0] != "." and name.lower() not in NOT_BUILT]
+        folders[:] = [name for name in folders if name[0] != "." and name.lower() not in without]
         yield from (one for name in names if name.endswith(endings) and (one := Path(where, name)).is_file())

@@ -50,6 +50,8 @@ def test_a_project_is_one(tmp_path: Path) -> None:
     [
         ([], ".", 2, r"is neither a sketch nor a PlatformIO project; expected an .ino file or platformio.ini"),
         (["a.ino", "b.ino"], ".", 2, "holds several sketches, a.ino, b.ino; expected one of them, or one named here"),
+        (["a$b.ino"], "a$b.ino", 2, r"a\$b.ino cannot be built: expected a file name without \$, quotes, ; and"),
+        (["other.ini"], "other.ini", 2, "there is no sketch"),
         ([], "no.ino", 2, "there is no sketch .*no.ino; expected an .ino file, or a folder with one"),
         (["a.ino/b.ino"], "pipe.ino", 2, "there is no sketch"),
         (["big.ino"], "big.ino", 1, r"big.ino cannot be read: it has 8,000,000 bytes; expected at most 4,194,304"),
