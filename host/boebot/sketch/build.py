@@ -117,9 +117,7 @@ def _build_sketch(tools: _Tools, sketch: Sketch, progress: Progress | None) -> P
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
         (copy / name).write_bytes(data.removeprefix(b"\xef\xbb\xbf"))  # UTF-8's mark, which joined files have inside
     (work / PROJECT).write_text(SKETCH_INI, encoding="utf-8")
-    needs_servo = servo.is_needed(sketch.files)
-    process = _PlatformIO(tools, work, progress, needs_servo)
-    return process.build(sketch, "uno", work, copy)
+    return _PlatformIO(tools, work, progress, servo.is_needed(sketch.files)).build(sketch, "uno", work, copy)
 
 
 def _project(project: Project, progress: Progress | None) -> Built:
@@ -129,7 +127,7 @@ def _project(project: Project, progress: Progress | None) -> Built:
         code, said = process.run("project", "config", "--json-output", "-d", str(project.folder))
         if code:
             raise CallError(f"{project.shown / PROJECT} is no project of PlatformIO's: {' '.join(said.split())}")
-        sections = {name: dict(options) for name, options in json.loads(said[said.index("[[") :])}
+        sections = {name: dict(options) for name, options in json.loads(said.strip().rpartition("\n")[2])}
         src = project.folder / sections.get("platformio", {}).get("src_dir", "src")
         process.needs_servo = "servo" not in str(sections).lower() and servo.is_needed(
             {one.name: one.read_bytes() for folder in (src, project.folder / "lib") for one in below(folder)}
@@ -151,7 +149,7 @@ def _environment(project: Project, sections: Mapping[str, Mapping[str, Any]]) ->
     if not fitting:
         there = [f"{name} (board {board})" for name, board in boards.items()] or ["none"]
         expected = f"one for {', '.join(BOARDS[:-1])} or {BOARDS[-1]}, whose clock is {CLOCK}"
-        raise CallError(f"{ini} has for environments {', '.join(there)}; expected {expected}")
+        raise CallError(f"{ini} has the environments {', '.join(there)}; expected {expected}")
     if len(fitting) > 1:
         names = ", ".join(fitting)
         raise CallError(f"{ini} has several environments, {names}; expected default_envs = {fitting[0]}, say, in it")
@@ -177,15 +175,10 @@ class _Tools:
             BoebotError: there is no PlatformIO.
         """
         kits = [one.read_bytes() for one in sorted(HERE.rglob("*.*")) if one.suffix in (".py", ".json")]
-        compiler, here = shutil.which("avr-gcc"), (sys.executable, "-m", "platformio")
-        is_here = importlib.util.find_spec("platformio") is not None
-        if (
-            is_here
-            and importlib.util.find_spec("SCons")
-            and compiler
-            and (core_directory.ARDUINO / "platform.txt").is_file()
-        ):
-            files = [path.stat() for path in (Path(compiler).resolve(), core_directory.ARDUINO / "platform.txt")]
+        compiler, framework = shutil.which("avr-gcc"), core_directory.ARDUINO / "platform.txt"
+        here, is_here = (sys.executable, "-m", "platformio"), importlib.util.find_spec("platformio") is not None
+        if is_here and importlib.util.find_spec("SCons") and compiler and framework.is_file():
+            files = [one.stat() for one in (Path(compiler).resolve(), framework)]
             told = [version("platformio"), version("scons"), *((one.st_size, one.st_mtime_ns) for one in files)]
             return cls(here, _hash(kits, told), True)
         pio = shutil.which("pio") or shutil.which("pio", path=Path("~/.platformio/penv/bin").expanduser())
@@ -278,8 +271,8 @@ class _PlatformIO:
             path, what = Path(folder, one["file"]), one["what"]
             place = found.shown / path.relative_to(base) if path.is_relative_to(base) else path
             if header := _MISSING.search(what):
-                what = f"there is no {header[1]}; expected its library in {found.shown / LIBRARIES}, or, of a project, "
-                what += f"in lib_deps of its {PROJECT}"
+                there = LIBRARIES if isinstance(found, Sketch) else f"lib, or named by lib_deps in {PROJECT}"
+                what = f"there is no {header[1]}; expected its library in {found.shown / there}"
             errors.append(f"{place}:{one['line']}: {what}")
         errors = list(dict.fromkeys(errors or _NO_PLACE.findall(said))) or ["PlatformIO has failed"]
         sentence = f"does not fit into {too_large[0]}" if too_large else f"does not compile: {errors[0]}"

@@ -68,7 +68,7 @@ def test_a_sketch_is_built_once_and_its_lines_are_the_users(tmp_path: Path, monk
         ),
         (
             "#include <No.h>\nvoid setup() {}\nvoid loop() {}",
-            "a.ino does not compile: {0}/a.ino:1: there is no No.h; expected its library in {0}/libraries, or",
+            "a.ino does not compile: {0}/a.ino:1: there is no No.h; expected its library in {0}/libraries",
             "all that was said is in",
         ),
         (
@@ -98,13 +98,14 @@ def test_what_does_not_compile_is_a_sentence(tmp_path: Path, text: str, sentence
     ("ini", "kind", "sentence"),
     [
         (INI.format("uno") + INI.format("nanoatmega328").replace(":a", ":b"), CallError, "several environments, a, b"),
-        (INI.format("megaatmega2560"), CallError, r"has for environments a \(board megaatmega2560\); expected"),
+        (INI.format("megaatmega2560"), CallError, r"has the environments a \(board megaatmega2560\); expected"),
         pytest.param(
             INI.format("uno\nboard_build.f_cpu = 8000000L"),
             CallError,
             "expected one for nano.* or uno, whose clock is 16000000L",
             marks=pytest.mark.soak,
         ),
+        ("", CallError, "car/platformio.ini has the environments none; expected one for"),
         pytest.param("[env:a", CallError, "is no project of PlatformIO's", marks=pytest.mark.soak),
         (
             INI.format("uno") + "extra_scripts = pre:wait.py\n",
