@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import base64
+import signal
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from live.test_live_view import Page, Run
 
 import boebot
 import copied_process
@@ -172,3 +176,35 @@ def test_inputs_that_are_none_get_one_sentence(folder: Path, words: list[str], s
     done = copied_process.command(["run", "wired.elf", "--robot", "mine.toml", *words], folder)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"boebot: {sentence}"), done.stderr
+
+
+def test_a_page_works_them(folder: Path) -> None:
+    """And they show in the newest rows that come to it; what cannot be set gets a sentence."""
+    words = [folder / "wired.elf", "--robot", folder / "mine.toml", "--arena", "empty", "--seconds", "inf"]
+    run = Run("run", *map(str, words), "--view", "--speed", "1")
+    try:
+        with run.stream() as stream:
+            page = Page(stream)
+            shown = page.until("run")
+            assert "set" in shown["live"]["can"] and "hand" not in shown["live"]["can"]
+            assert shown["live"]["robots"][0]["inputs"] == [
+                {"name": "start", "kind": "button"},
+                {"name": "dial", "kind": "slider"},
+            ]
+            names = [sign["device"] for sign in shown["runs"][0]["signs"]]
+            page.do("set", part="start", value=1)
+            page.until("chunk", where=lambda chunk: any(chunk_bytes(chunk, "signs", names.index("board_led"))))
+            page.do("set", part="dial", value=0.8)
+            assert page.state(lambda state: state["touched"] == 2)
+            page.do("set", part="start", value=0.5)
+            assert page.until("refused")["sentence"] == "start cannot be set to 0.5; expected 0 or 1"
+            page.do("set", part="lamp", value=1)
+            refused = "lamp of robot 'mine' is no button, switch or knob; expected one of start, dial"
+            assert page.until("refused")["sentence"] == refused
+    finally:
+        run.process.send_signal(signal.SIGINT)
+        assert run.end()[0] == 130
+
+
+def chunk_bytes(chunk: Any, name: str, index: int) -> bytes:
+    return base64.b64decode(chunk["runs"][0][name][index])

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from boebot.errors import BoebotError
 from boebot.live import messages
 from boebot.live.pace import Pace
-from boebot.record.interventions import Deed, Hand, Parameter, Place, Release, Shape
+from boebot.record.interventions import Deed, Hand, Parameter, Place, Release, Set, Shape
 
 SILENT_S = 0.3  # of the wall clock, after which a robot that is driven by hand stops
 WAITING = 100  # deeds of a robot that wait at most
@@ -30,6 +30,7 @@ _NEEDS: dict[type, str] = {
     Place: "drag",
     Shape: "drag",
     Parameter: "parameters",
+    Set: "set",
     Hand: "hand",
 }
 

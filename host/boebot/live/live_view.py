@@ -168,7 +168,7 @@ class LiveView(Onlooker):
             "can": sorted(self._controls.can),
             "seed": request.seed,
             "imperfections": [{"name": name, "text": text, "off": name in off} for name, text in switches().items()],
-            "robots": [{"parameters": _sliders(robot)} for robot in self._robots],
+            "robots": [{"parameters": _sliders(robot), "inputs": _inputs(robot)} for robot in self._robots],
         }
 
     def _state(self, time_s: float) -> Message:
@@ -248,6 +248,8 @@ def _possible(robots: Sequence[Hands]) -> frozenset[str]:
     can = {"type" if robot.driver.is_program else "hand" for robot in robots}
     if any(sliders(robot.task.brain) for robot in robots):
         can.add("parameters")
+    if any(_inputs(robot) for robot in robots):
+        can.add("set")
     first = robots[0]
     if first.driver.session.arena is not None:
         can |= {"drag", "restart"}
@@ -263,6 +265,12 @@ def _sliders(robot: Hands) -> list[Message]:
         least, most = bounds(brain, name)
         made.append({"name": name, "value": value, "least": least, "most": most})
     return made
+
+
+def _inputs(robot: Hands) -> list[Message]:
+    """What a person can work at its board, and how (`Device.CONTROL`)."""
+    devices = robot.driver.description.device.items()
+    return [{"name": name, "kind": device.CONTROL} for name, device in devices if device.on and device.CONTROL]
 
 
 def _pose_now(robot: Hands) -> tuple[float, float, float] | None:

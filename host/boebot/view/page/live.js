@@ -208,7 +208,7 @@ function tellSpeed() {
 // Off: nothing can be asked for, except another run where there may be one.
 function setControls(on) {
   const again = ended !== null && on;
-  document.querySelectorAll(".live, #speed, #drive button, #drive input, #parameters input").forEach(it => {
+  document.querySelectorAll(".live, #speed, #drive button, #drive input, #parameters input, #inputs button, #inputs input").forEach(it => {
     it.disabled = it.id === "newest" ? false : it.id === "restart" ? !(on || again) : !on || ended !== null;
   });
 }
@@ -262,6 +262,7 @@ function tellState() {
   tellSpeed();
   tellDrive();
   tellParameters();
+  tellInputs();
   tellLink();
 }
 function notice(sentence) {
@@ -350,4 +351,60 @@ function tellParameters() {
     one.input.value = value;
     tellSlider(one);
   }
+}
+
+// ---- buttons, switches and knobs at its board: each shows how it stands in the newest row ----
+let inputs = [];
+function makeInputs() {
+  const list = (live && live.robots[runs.indexOf(run)]?.inputs) || [];
+  hide("inputs", !list.length);
+  inputs = list.map(makeInput);
+  $("inputRows").replaceChildren(...inputs.map(({ whole }) => whole));
+}
+function makeInput({ name, kind }) {
+  const title = name.replaceAll("_", " "),
+    robot = runs.indexOf(run);
+  const set = value => act({ kind: "set", part: name, value }, robot);
+  if (kind === "button") {
+    const whole = element("button", { textContent: title, disabled: ended !== null, title: "Pressed while it is held" });
+    let held = false;
+    const press = on => {
+      if (on !== held) set((held = on) ? 1 : 0);
+    };
+    whole.onpointerdown = e => {
+      whole.setPointerCapture(e.pointerId);
+      press(true);
+    };
+    whole.onpointerup = whole.onpointercancel = whole.onblur = () => press(false);
+    whole.onkeydown = e => {
+      if (e.key !== " " && e.key !== "Enter") return;
+      e.stopPropagation(); // it is not the key that pauses
+      press(true);
+    };
+    whole.onkeyup = () => press(false);
+    return { name, whole, tell: i => (whole.ariaPressed = String(run.isOn(name, i))) };
+  }
+  const isSlider = kind === "slider",
+    input = element("input", isSlider ? { type: "range", min: 0, max: 1, step: 0.01 } : { type: "checkbox" });
+  const one = { name, changed: -Infinity, due: null };
+  input.disabled = ended !== null;
+  input.ariaLabel = title;
+  const value = () => (isSlider ? Number(input.value) : Number(input.checked));
+  input.oninput = () => {
+    one.changed = performance.now();
+    one.due ??= setTimeout(() => {
+      one.due = null;
+      set(value());
+    }, 100); // ten times a second at most, and the last value surely
+  };
+  one.tell = i => {
+    if (performance.now() - one.changed < 1000) return;
+    if (isSlider) input.value = run.reading(name).values.values[i] / 100;
+    else input.checked = run.isOn(name, i);
+  };
+  one.whole = element("label", { className: isSlider ? "parameter" : "choice" }, element("span", { textContent: title }), input);
+  return one;
+}
+function tellInputs() {
+  if (run.last >= 0) for (const one of inputs) one.tell(run.last);
 }

@@ -83,6 +83,7 @@ function chooseRobot(index) {
   $("cursor").ariaValueMax = run.duration;
   makePanels();
   makeParameters();
+  makeInputs();
   if (state) tellState();
   resize();
 }
@@ -109,7 +110,8 @@ const SCROLL_KEYS = ["ArrowUp", "ArrowDown", "PageUp", "PageDown", "Home", "End"
 function onKey(e) {
   if (!run || e.ctrlKey || e.metaKey || e.altKey) return;
   const { tagName, type, id } = e.target;
-  if (tagName === "SELECT" || type === "number" || tagName === "PRE" || document.querySelector("dialog[open]")) return;
+  if (["number", "text", "checkbox"].includes(type) || document.querySelector("dialog[open]")) return;
+  if (tagName === "SELECT" || tagName === "PRE") return;
   if (type === "range" && id !== "slider" && e.key !== " ") return;
   if (id === "panels" && SCROLL_KEYS.includes(e.key)) return;
   if (e.target === $("cursor") && (e.key === "+" || e.key === "-")) {
