@@ -16,7 +16,12 @@ static void step(part *base) {
   self->carried.angle = self->motor.angle;
 }
 
-static const part_operations OPERATIONS = {.edge = edge, .step = step};
+static int read(part *base, double *values) {
+  *values = ((turret *)base)->motor.angle;
+  return 1;
+}
+
+static const part_operations OPERATIONS = {.edge = edge, .step = step, .read = read};
 
 turret *turret_of(part *base) { return base->op == &OPERATIONS ? (turret *)base : NULL; }
 

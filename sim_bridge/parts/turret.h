@@ -1,4 +1,4 @@
-/* turret.h: a position servo (world/motor_position) that turns what is mounted on it, for example the Ping.
+/* turret.h: a position servo (world/motor_position) that turns what is mounted on it, for example a range finder.
  *
  * It measures the width of each pulse on its pin, at the falling edge, and turns there with the world's steps; between them
  * the angle is interpolated.
@@ -23,7 +23,7 @@ typedef struct {
   motor_position_parameters motor;
 } turret_parameters;
 
-/* It looks straight ahead at first. Parameters: turret_parameters. Pin: the signal. */
+/* It looks straight ahead at first. Shows its angle, rad. Parameters: turret_parameters. Pin: the signal. */
 extern const part_kind turret_kind;
 /* python: end */
 

@@ -8,7 +8,6 @@ from typing import Any
 from boebot.description import robots
 from boebot.devices.battery import BatteryDivider
 from boebot.devices.device import pin_number
-from boebot.devices.ping import PingSensor
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError
 from sim_bridge._core import ffi, lib
@@ -24,7 +23,7 @@ def join(robot: Any, description: robots.RobotDescription, draw: imperfections.D
     """Joins battery and every device that is on to a robot of a simulation (C `robot *`). Returns the numbers of the
     parts that devices have there.
 
-    Devices without a part in the world are left alone. A Ping sits on the turret where there are both.
+    Devices without a part in the world are left alone. Sensors that a turret carries turn with it.
 
     Raises:
         BoardError: a device cannot be joined; one sentence names it.
@@ -88,7 +87,7 @@ def _join_supply(robot: Any, description: robots.RobotDescription, draw: imperfe
 
 
 def _mount(robot: Any, turret: PositionServo, description: robots.RobotDescription) -> None:
-    """The Ping sits on the turret where there are both."""
-    for device in description.device.values():
-        if isinstance(device, PingSensor) and device.on:
-            done(lib.robot_mount(robot, pin_number(turret.pin), pin_number(device.pin)), "the Ping on the turret")
+    """What the turret carries turns with it."""
+    for name in turret.carried(description.device):
+        pins = description.device[name].pins().values()
+        done(max(lib.robot_mount(robot, pin_number(turret.pin), pin) for pin in pins), f"device {name!r} on the turret")

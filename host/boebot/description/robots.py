@@ -21,7 +21,10 @@ from boebot.description.outlines import Point, polygon_fault, way_out
 from boebot.devices.battery import Energy
 from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_number
 from boebot.devices.encoder import WheelEncoder
+from boebot.devices.h_bridge import HBridge
 from boebot.devices.motor import Motor
+from boebot.devices.servo import ContinuousServo
+from boebot.devices.turret import PositionServo
 from boebot.errors import CallError, RobotError, did_you_mean
 from boebot.imperfections import Imperfection, imperfections, switched_off, unknown
 
@@ -242,6 +245,7 @@ def _faults(robot: RobotDescription, path: Path) -> Faults:
     elif not supply.full_v > supply.empty_v:
         yield "supply.full_v", f" is {supply.full_v:g}; expected more than empty_v, {supply.empty_v:g} V"
     yield from _pin_faults(robot)
+    yield from _wheel_faults(robot)
     if robot.takes_brain:
         yield from _kit_faults(robot)
         yield from _image_faults(robot, path)
@@ -254,6 +258,10 @@ def _device_faults(robot: RobotDescription) -> Faults:
             yield f"device.{name}", ": a device cannot have this name; expected one that robot.NAME can have in a brain"
         if device.on and (fault := device.fault()):
             yield f"device.{name}.{fault[0]}", fault[1]
+        for other in (device.carries or ()) if isinstance(device, PositionServo) else ():
+            if other == name or not hasattr(robot.device.get(other), "position_m"):
+                sensors = [each for each, one in robot.device.items() if each != name and hasattr(one, "position_m")]
+                yield f"device.{name}.carries", f" names {other!r}; expected sensors, such as {', '.join(sensors)}"
 
 
 def _imperfection_faults(robot: RobotDescription) -> Faults:
@@ -351,6 +359,18 @@ def _vehicle_faults(robot: RobotDescription) -> Faults:
     batteries = [name for name, device in robot.device.items() if isinstance(device, Energy) and device.on]
     if len(batteries) > 1:
         yield f"device.{batteries[1]}", " is a second energy; expected one"
+
+
+def _wheel_faults(robot: RobotDescription) -> Faults:
+    """Two drives of one wheel: which one a drive turns says the end of its name."""
+    owners: dict[str, str] = {}
+    for name, device in robot.device.items():
+        if isinstance(device, ContinuousServo | HBridge) and device.on:
+            side = "right" if name.endswith("right") else "left"
+            owner = owners.setdefault(side, name)
+            if owner != name:
+                both = f"{owner} and {name} both turn the {side} wheel"
+                yield f"device.{name}", f": {both}; expected one name that ends in left and one that ends in right"
 
 
 _ALWAYS = ("servo_left", "servo_right", "uart")  # in every firmware image

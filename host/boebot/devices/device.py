@@ -225,7 +225,7 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
         if self.WIRES is not SERVO_CABLE:
             return self.CONNECTOR
         (pin,) = self.pins().values()
-        return f"servo port {pin}" if pin in SERVO_PORTS else "three-pin header on the breadboard"
+        return f"servo port {pin}" if pin in SERVO_PORTS else "three-pin header"
 
     def reader(self, place: Place) -> Reader:
         """What makes its reading; for kinds that have one."""
@@ -306,6 +306,8 @@ class SlowDevice(Device, frozen=True, kw_only=True):
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """One per entry of COLUMNS, and the age."""
+        if "values" in (run.raw.dtype.names or ()):  # of a program's run: what its part shows of itself
+            return super().columns(place, run)
         held = run.held(self.MESSAGE)
         reader = self.reader(place)
         readings = [reader(None, Latest({self.MESSAGE: message}, message.tick)) for message in held.messages]

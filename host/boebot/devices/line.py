@@ -15,11 +15,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import FIVE_VOLTS, GROUND, Checkup, NotNegative, Point, Sensor, Share, SlowDevice, Wire
+from boebot.devices.device import (
+    ANALOG_PINS,
+    FIVE_VOLTS,
+    GROUND,
+    Checkup,
+    Column,
+    Device,
+    NotNegative,
+    Place,
+    Point,
+    Run,
+    Sensor,
+    Share,
+    SlowDevice,
+    Wire,
+    pin_number,
+)
 from boebot.link.messages import LineTelemetry
 
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -96,3 +112,30 @@ class ReflectanceSensor(Sensor, tag="reflectance_sensor", frozen=True, kw_only=T
     def reading(self, values: Sequence[float], age: float) -> Line:
         """See `VehicleDevice`."""
         return Line(None, values[0], values[0] < self.dark_below, age, True)
+
+
+class LineModule(Device, tag="line_module", frozen=True, kw_only=True):
+    """A reflex coupler with a comparator (TCRT5000 or ITR20001 modules), or its voltage. For programs of one's own: the
+    kit's firmware has none."""
+
+    pin: int | str
+    position_m: Point
+    output: Literal["digital", "analog"] = "digital"
+    dark: Literal["low", "high"] = "high"  # level of a digital output over a dark floor
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "OUT"), Wire(FIVE_VOLTS, "VCC"), Wire(GROUND, "GND"))
+    COLUMNS: ClassVar = (("voltage", "v", 3), ("dark", "", None))
+    SHOWN: ClassVar = ("voltage", "V", 1.0, 2)
+    SIGN: ClassVar = ("dark", "ink")
+
+    def fault(self) -> tuple[str, str] | None:
+        """See `Device`."""
+        if self.output == "digital" or pin_number(self.pin) in ANALOG_PINS:
+            return None
+        return "pin", f" is pin {self.pin}, which measures no voltage; expected A0 to A5"
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Voltage before the comparator; and whether that takes the floor for dark."""
+        volts, dark = super().columns(place, run)
+        return [volts, dark._replace(values=dark.values > 0)]

@@ -2,12 +2,14 @@
 
 pulse = centre + gain · angle,   angle = (pulse - centre) / gain
 
-Pins 8 to 13 can do it. A Ping is mounted on it, where there is one.
+Pins 8 to 13 can do it. A Ping is mounted on it, where there is one; `carries` names other sensors. Of a robot that runs
+programs of one's own, pages show the angle that the turret has.
 
     [device.turret]
     type = "position_servo"
     pin = 11
     position_m = [0.045, 0.0]
+    carries = ["ping"]
 
     robot.turn_turret(0.5)
     robot.turret.angle
@@ -16,12 +18,13 @@ Pins 8 to 13 can do it. A Ping is mounted on it, where there is one.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import SERVO_CABLE, Checkup, Point, SlowDevice, Wire
+from boebot.devices.device import SERVO_CABLE, Checkup, Device, Point, SlowDevice, Wire
+from boebot.devices.ping import PingSensor
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.link.messages import Turret as TurretMessage
 
@@ -63,6 +66,7 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
     position_m: Point  # of its axis
     centre_us: Annotated[float, msgspec.Meta(ge=1000, le=2000)] = 1500.0
     gain_us_per_rad: Annotated[float, msgspec.Meta(ge=-1000, le=1000)] = 573.0  # 10 us a degree
+    carries: tuple[str, ...] | None = None  # names of the sensors on it; none given: the Ping
 
     READING: ClassVar = Turret
     NAMES: ClassVar[tuple[str, ...]] = ("turret",)
@@ -95,3 +99,14 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
         pulse_us = message.turret_pulse * PULSE_SCALE_US
         gain = self.gain_us_per_rad
         return Turret((pulse_us - self.centre_us) / gain if gain else None, pulse_us, age, fresh)
+
+    def carried(self, devices: Mapping[str, Device]) -> list[str]:
+        """Names of what turns with it, among these devices of its robot: those that are on."""
+        if self.carries is None:
+            return [name for name, device in devices.items() if isinstance(device, PingSensor) and device.on]
+        return [name for name in self.carries if devices[name].on]
+
+
+def turret_name(devices: Mapping[str, Device]) -> str:
+    """The turret that pictures show, the first that is on; "": there is none."""
+    return next((name for name, device in devices.items() if isinstance(device, PositionServo) and device.on), "")

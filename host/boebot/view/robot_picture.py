@@ -56,6 +56,7 @@ def write(robot: RobotDescription, path: Path) -> Path:
         axes = figure.add_axes((*place, across / style.WIDTH_IN, upwards / tall))
         axes.set_facecolor(style.FLOOR)
         frame(axes, low, high)
+        axes.locator_params(steps=[1, 2, 5, 10])
         axes.set_xlabel("x, forward (m)", color=style.INK, fontsize=9)
         axes.set_ylabel("y, left (m)", color=style.INK, fontsize=9)
         draw_robot(axes, robot, (0.0, 0.0, 0.0), style.END)

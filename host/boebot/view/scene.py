@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from boebot.arenas.floor_plan import FloorPlan, Solid
 from boebot.devices.drawing import BODY, PARTS, Item, circle
+from boebot.devices.turret import PositionServo, turret_name
 from boebot.record.truth import Pose
 
 if TYPE_CHECKING:
@@ -99,7 +100,8 @@ class View:
     @property
     def turret(self) -> Floats:
         """Its angle (rad) at each tick; 0 without one, or while it is free."""
-        return np.nan_to_num(self.columns.number("turret", "angle"), nan=0.0)
+        name = turret_name(self.columns.robot.device)
+        return np.nan_to_num(self.columns.number(name, "angle"), nan=0.0)
 
     @cached_property
     def swept(self) -> list[Swept]:
@@ -214,13 +216,15 @@ def robot_items(robot: RobotDescription) -> list[Item]:
 def device_items(robot: RobotDescription) -> dict[str, list[Item]]:
     """What the robot's devices look like, by their names: those that are on and can be seen."""
     found = {name: device.drawing(name) for name, device in robot.device.items() if device.on}
+    if isinstance(turret := robot.device.get(turret_name(robot.device)), PositionServo):
+        for name in turret.carried(robot.device):
+            found[name] = [item._replace(turns=True) for item in found[name]]
     return {name: items for name, items in found.items() if items}
 
 
 def pivot(robot: RobotDescription) -> tuple[float, float] | None:
     """About where that turns which sits on the robot's turret."""
-    turret = robot.device.get("turret")
-    return getattr(turret, "position_m", None) if turret is not None and turret.on else None
+    return getattr(robot.device.get(turret_name(robot.device)), "position_m", None)
 
 
 def ghost_items(robot: RobotDescription) -> list[Item]:

@@ -4,6 +4,7 @@ what its pack gives."""
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -178,7 +179,7 @@ def test_a_jumper_is_enable() -> None:
     assert amperes(robot)[0] > 0.1
 
 
-def test_what_is_wrong_gets_a_sentence(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_what_is_wrong_gets_a_sentence(tmp_path: Path) -> None:
     for text, sentence in (
         ("stall_a = 0.1", "stall_a is 0.1; expected more than no_load_a, 0.16 A"),
         (
@@ -191,3 +192,7 @@ def test_what_is_wrong_gets_a_sentence(tmp_path) -> None:  # type: ignore[no-unt
         file.write_text(f'extends = "rover"\n[device.motor_left]\n{text}\n')
         with pytest.raises(RobotError, match=sentence):
             load_robot(file)
+    servo = 'type = "continuous_servo"\npin = "A0"\ncentre_us = 1500\ngain_us = 200\n'
+    file.write_text(f'extends = "rover"\n[device.wheel]\n{servo}')
+    with pytest.raises(RobotError, match=r"device\.wheel: motor_left and wheel both turn the left wheel; expected one"):
+        load_robot(file)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -18,11 +19,11 @@ from boebot.devices.compass import MagneticCompass
 from boebot.devices.encoder import SingleEncoder
 from boebot.devices.light import LightSensor
 from boebot.devices.turret import PositionServo
-from boebot.errors import ArenaError, BoardError
+from boebot.errors import ArenaError, BoardError, RobotError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim
-from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripts, square
+from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, scripts, square
 
 DEVICES: dict[str, robots.AnyDevice] = {
     "turret": PositionServo(pin=11, position_m=(0.045, 0.0)),
@@ -141,3 +142,23 @@ def test_firmware_on_several_boards_does_not_depend_on_their_order() -> None:
     outcomes = [firmware_run(order) for order in itertools.permutations((0, 1, 2))]
     assert all(outcome == outcomes[0] for outcome in outcomes)
     assert all(len(data) > 20 for data in outcomes[0][1])  # each board says hello
+
+
+def test_a_turret_carries_what_its_robot_names(tmp_path: Path) -> None:
+    """Another sensor than the Ping, which then stays ahead; its angle is what the robot shows."""
+    text = 'firmware = "none"\nremove = ["uart"]\n[device.analog_infrared]\ntype = "analog_infrared"\npin = "A0"\n'
+    text += "position_m = [0.06, 0.0]\nheading_rad = 0.0\n[device.turret]\non = true\ncarries = "
+    file = tmp_path / "mine.toml"
+    file.write_text(f'extends = "shieldbot"\nname = "mine"\n{text}["analog_infrared"]\n')
+    wall = square(0.045, 0.4, 0.4)  # at the left of the turret
+    robot = scripted(arena_of(wall), load_robot(file))
+    robot.pulses(1.0, {11: 1500 + 573 * math.pi / 2})
+    ahead = scripts.script_board_volts(robot.script, 0)
+    robot.run(1.0)
+    where = robot.robot.layout["turret"].start
+    assert robot.robot.readings()[where] == pytest.approx(math.pi / 2, abs=0.01)
+    assert scripts.script_board_volts(robot.script, 0) > ahead + 1.0
+    for wrong in ("ears", "turret", "servo_left"):
+        file.write_text(f'extends = "shieldbot"\nname = "mine"\n{text}["{wrong}"]\n')
+        with pytest.raises(RobotError, match=f"device.turret.carries names '{wrong}'; expected sensors, such as "):
+            load_robot(file)
