@@ -7,6 +7,7 @@
 
 const int PING = 8;
 Servo left, right;
+int cm;  // to what is before the sensor
 
 // Distance (cm) of what is before the sensor; 300 if there is no echo.
 int distance() {
@@ -26,7 +27,7 @@ void setup() {
 }
 
 void loop() {
-  int cm = distance();
+  cm = distance();
   int speed = constrain(10 * (cm - 15), 0, 200);  // the nearer, the slower
   left.writeMicroseconds(1500 + speed);
   right.writeMicroseconds(1500 - speed);
