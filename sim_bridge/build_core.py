@@ -56,6 +56,8 @@ struct robot {
   int part_count;
   buffer received, received_at, truth, looks, tones;
   bool is_stamped;
+  double sampled[...];
+  uint8_t has_sampled;
   edge_log edges;
   uint64_t last_byte, listen_from, reset_at, contacts;
   ...;

@@ -8,16 +8,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot.arguments import number, shown, whole
+from boebot.boards import PinNow
+from boebot.devices.device import ANALOG_PINS
 from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
 from boebot.record.record import LINE_FRAME
 from sim_bridge._core import ffi, lib
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, FRACTION, BoardMemory, EmulatedBoard, Level, ResetCause, checked_pin
+from sim_bridge.boards.board import (
+    CLOCK_HZ,
+    EDGE,
+    FRACTION,
+    BoardMemory,
+    EmulatedBoard,
+    Level,
+    ResetCause,
+    checked_pin,
+)
 from sim_bridge.sim import CYCLES_MAXIMUM, SimRobot
 
 ECHO_MAXIMUM_US = 1e6
 SUPPLY_MAXIMUM_V = 30.0
 EDGES_KEPT = 1 << 20  # SIM_EDGES_KEPT of loop.h
+EDGES_SHOWN = 20_000  # newest ones that `BoardPins.now` looks at, of SHOWN cycles
+SHOWN = CLOCK_HZ // 10
 
 
 class BoardPins(BoardMemory):
@@ -64,6 +77,23 @@ class BoardPins(BoardMemory):
         edges = ffi.addressof(self._robot.handle, "edges")
         lib.edge_log_copy(edges, ffi.from_buffer("board_edge[]", log, require_writable=True), count)
         return log
+
+    def now(self) -> list[PinNow]:
+        """What is at the board's pins, for people; empty of a board that cannot be seen into."""
+        log, robot, found = self.pin_log(EDGES_SHOWN), self._robot.handle, []
+        for pin, level in enumerate(self.levels()):
+            does, share, rate = self.output(pin), None, None
+            edges = log[(log["pin"] == pin) & (log["cycle"] + SHOWN >= self.cycle)]
+            rises = np.flatnonzero(edges["level"] == Level.HIGH)
+            if does <= Level.HIGH and len(rises) > 1:  # over whole periods
+                whole_ones = edges[rises[0] : rises[-1] + 1]
+                lengths = np.diff(whole_ones["cycle"]).astype(float)
+                share = float(lengths[whole_ones["level"][:-1] == Level.HIGH].sum() / lengths.sum())
+                rate = float((len(rises) - 1) / lengths.sum() * CLOCK_HZ)
+            channel = pin - ANALOG_PINS[0]
+            volts = robot.sampled[channel] if channel >= 0 and robot.has_sampled >> channel & 1 else None
+            found.append(PinNow(int(does), level, share, rate, volts))
+        return found
 
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:
         """Takes a pin from its part and drives it from `at_cycle` on (now)."""

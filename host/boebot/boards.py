@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast, runtime_checkable
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
@@ -97,6 +97,29 @@ class WatchdogReset:
         """In the words of a fault."""
         where = f"at address 0x{self.address:04X} in cycle {self.cycle} {self.place}".rstrip()
         return f"the watchdog reset the program, which it found {where}"
+
+
+class PinNow(NamedTuple):
+    """What is at a pin of a board."""
+
+    does: int
+    """what the program does to it: 0 low, 1 high, 2 released, 3 pulled up"""
+    level: int
+    """0 or 1, as it would be read"""
+    share: float | None
+    """of an output that goes up and down: of the time that it is high"""
+    rate: float | None
+    """how often it does (Hz)"""
+    volts: float | None
+    """as the program's converter has last sampled it"""
+
+
+@runtime_checkable
+class ShowsPins(Protocol):
+    """A session whose board can be seen into."""
+
+    def pins_now(self) -> Sequence[PinNow]:
+        """Of each pin, by its Arduino number; empty where this one cannot be."""
 
 
 class Session(Protocol):

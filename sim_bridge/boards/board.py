@@ -255,6 +255,11 @@ class BoardMemory(ABC):
             return []
         return [(int(log.resets[i].cycle), int(log.resets[i].address)) for i in range(log.end)]
 
+    def levels(self) -> bytes:
+        """Of each pin the level, 0 or 1, as the program would read it; empty of a board that cannot be seen into."""
+        found = self.board.extension("pin levels", "uint8_t")
+        return b"" if found is None else bytes(self.board.ffi.buffer(found, PINS))
+
     def log_outside(self) -> None:
         """From now on what the outside does to the pins, and what is on the line, is kept for `outside_log`."""
         if (log := self.board.extension("outside log", "board_outside_log")) is not None:

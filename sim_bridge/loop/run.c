@@ -19,8 +19,10 @@ void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
 double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
   robot *self = context;
   if (channel == BOARD_ANALOG_SUPPLY) return self->chassis.supply * BOARD_NOMINAL_VOLTS;
-  part *p = channel < BOARD_ANALOG_COUNT ? self->analog[channel] : NULL;
-  return p == NULL || p->unplugged ? 0.0 : p->op->analog(p, cycle);
+  if (channel >= BOARD_ANALOG_COUNT) return 0.0;
+  part *p = self->analog[channel];
+  self->has_sampled |= (uint8_t)(1u << channel);
+  return self->sampled[channel] = p == NULL || p->unplugged ? 0.0 : p->op->analog(p, cycle);
 }
 
 /* ---- the world's step ---------------------------------------------------------------------------------------------- */

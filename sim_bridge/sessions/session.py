@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from boebot.boards import TruthNow, WatchdogReset
+from boebot.boards import PinNow, TruthNow, WatchdogReset
 from boebot.description import robots
 from boebot.devices.uart import Uart
 from boebot.record.blocks import Group
@@ -163,6 +163,10 @@ class SimSession(InWorld):
             "load": board["executed_cycles"] / cycle if cycle else 0.0,
             "true_supply_v": self.robot.supply_voltage,
         }
+
+    def pins_now(self) -> list[PinNow]:
+        """See `boebot.boards.ShowsPins`."""
+        return self.board.now()
 
     def notes(self) -> list[str]:
         """See `boebot.boards.BoardSession`."""

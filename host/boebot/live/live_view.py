@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
+from boebot.boards import PinNow, ShowsPins
 from boebot.errors import BoebotError
 from boebot.imperfections import switched_off, switches
 from boebot.link.transport import Measures
@@ -28,6 +29,7 @@ from boebot.running import interrupts
 from boebot.running.brain_parameters import bounds, sliders
 from boebot.running.hands import Hands, Onlooker
 from boebot.running.loop import gather_rows
+from boebot.view.page_data import named_pins
 
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
@@ -168,7 +170,10 @@ class LiveView(Onlooker):
             "can": sorted(self._controls.can),
             "seed": request.seed,
             "imperfections": [{"name": name, "text": text, "off": name in off} for name, text in switches().items()],
-            "robots": [{"parameters": _sliders(robot), "inputs": _inputs(robot)} for robot in self._robots],
+            "robots": [
+                {"parameters": _sliders(robot), "inputs": _inputs(robot), "pins": named_pins(robot.driver.description)}
+                for robot in self._robots
+            ],
         }
 
     def _state(self, time_s: float) -> Message:
@@ -185,6 +190,7 @@ class LiveView(Onlooker):
                     "driver": page,
                     "pose": _pose_now(robot),
                     "link": _quality(robot),
+                    "pins": _pins(robot) if self._audience.is_there else [],
                 }
                 for robot, page in zip(self._robots, self._controls.drivers(), strict=True)
             ],
@@ -276,6 +282,11 @@ def _inputs(robot: Hands) -> list[Message]:
 def _pose_now(robot: Hands) -> tuple[float, float, float] | None:
     now = robot.driver.session.truth_now()
     return None if now is None else now.pose
+
+
+def _pins(robot: Hands) -> Sequence[PinNow]:
+    session = robot.driver.session
+    return session.pins_now() if isinstance(session, ShowsPins) else ()
 
 
 def _quality(robot: Hands) -> Message:

@@ -34,6 +34,7 @@ import msgspec
 import numpy as np
 
 from boebot.description import robots
+from boebot.description.wiring import PINS
 from boebot.devices.device import pin_name
 from boebot.devices.drawing import Item
 from boebot.link.messages import Status
@@ -243,6 +244,12 @@ def pins(block: Block, robot: robots.RobotDescription, begin: float) -> dict[str
         name = " ".join([pin_name(pin), *users.get(pin, [])[:1]]).replace("_", " ")
         found[name] = times[own] - begin, rows["level"][own]
     return found
+
+
+def named_pins(robot: robots.RobotDescription) -> list[str]:
+    """Of each pin of an Arduino Uno its name on the board's print, and the devices there."""
+    users = users_of_pins(robot)
+    return [" ".join([pin_name(pin), *users.get(pin, [])]).replace("_", " ") for pin in range(PINS)]
 
 
 def users_of_pins(robot: robots.RobotDescription) -> dict[int, list[str]]:

@@ -401,6 +401,7 @@ typedef struct avr_board {
   watchdog_state watchdog;
   board_watchdog_log watchdog_log;
   board_outside_log outside_log;
+  uint8_t levels[BOARD_PIN_COUNT]; /* see BOARD_PIN_LEVELS */
   eeprom_state eeprom;
 } avr_board;
 
@@ -448,6 +449,7 @@ void pins_due_seen(avr_board *b, uint64_t cycle);
 void pins_due_noise_filter(avr_board *b, uint64_t cycle);
 void pins_update(avr_board *b, uint8_t port, uint64_t cycle); /* after a change of anything but `level` in `port` */
 void pins_drive(avr_board *b, uint64_t at, uint8_t pin, uint8_t level);
+uint8_t *pins_levels(avr_board *b);
 uint8_t pins_output(const avr_board *b, uint8_t pin);
 void pins_acknowledged(avr_board *b, uint8_t vector);
 

@@ -249,6 +249,13 @@ void pins_drive(avr_board *b, uint64_t at, uint8_t pin, uint8_t level) {
   set_due(b, DUE_DRIVEN_EDGE, first_due(&b->driven_edges));
 }
 
+uint8_t *pins_levels(avr_board *b) {
+  for (unsigned pin = 0; pin < BOARD_PIN_COUNT; pin++) {
+    b->levels[pin] = b->port[PLACES[pin].port].level >> PLACES[pin].bit & 1u;
+  }
+  return b->levels;
+}
+
 uint8_t pins_output(const avr_board *b, uint8_t pin) {
   if (pin >= BOARD_PIN_COUNT) return BOARD_RELEASED;
   return shown(&b->port[PLACES[pin].port], PLACES[pin].bit);

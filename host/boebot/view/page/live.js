@@ -264,6 +264,7 @@ function tellState() {
   tellParameters();
   tellInputs();
   tellLink();
+  tellPins();
 }
 function notice(sentence) {
   const it = $("notice");
@@ -298,6 +299,31 @@ function tellLink() {
   linkTold = String(known);
   hide("linkCard", !known.length);
   $("link").replaceChildren(...known.map(([name, value]) => row(name, value)[0]));
+}
+
+// ---- pins: what the program does to each, or what it reads there ----
+let pinCells = [];
+function makePins() {
+  const rows = (live?.robots[runs.indexOf(run)]?.pins ?? []).map(name => row(name));
+  pinCells = rows.map(([, cell]) => cell);
+  $("pinRows").replaceChildren(...rows.map(([it]) => it));
+  hide("pins", true);
+}
+function tellPins() {
+  const pins = robotState().pins ?? [];
+  if (!pins.length) return;
+  hide("pins", false);
+  pins.forEach((pin, k) => {
+    const text = pinNow(pin);
+    if (pinCells[k] && pinCells[k].textContent !== text) pinCells[k].textContent = text;
+  });
+}
+function pinNow([does, level, share, rate, volts]) {
+  const word = level ? "high" : "low";
+  if (share !== null) return "out " + (100 * share).toFixed(1) + " %, " + short(rate) + " Hz";
+  if (does < 2) return "out " + word;
+  if (volts !== null) return "in " + volts.toFixed(2) + " V";
+  return "in " + word + (does === 3 ? ", pulled up" : "");
 }
 
 // ---- a brain's parameters ----

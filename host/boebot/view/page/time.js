@@ -84,6 +84,7 @@ function chooseRobot(index) {
   makePanels();
   makeParameters();
   makeInputs();
+  makePins();
   if (state) tellState();
   resize();
 }

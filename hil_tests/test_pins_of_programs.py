@@ -1,19 +1,24 @@
-"""pins.vcd of a run, read by a parser of others: what the program does to pins, what is on the serial line, and what
-the outside does."""
+"""Pins of a board: pins.vcd of a run, read by a parser of others, has what the program does to them, what is on the
+serial line, and what the outside does; a session says what is there now."""
 
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from vcdvcd import VCDVCD
 
 import boebot
+from boebot.boards import ShowsPins
+from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
+from boebot.record.run import Run
 from boebot.record.run_folder import locked
 from boebot.result import read_run
 from boebot.running.again import again, recorded
+from boebot.running.hands import Hands, Onlooker
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot.view import save_pins
@@ -39,6 +44,8 @@ int main(void) {
     __builtin_avr_delay_cycles(98);
     PORTB &= ~(1 << 1);
   }
+  ADMUX = 1 << REFS0;
+  ADCSRA = 1 << ADEN | 1 << ADSC | 7;
   UCSR0B = 1 << RXEN0 | 1 << TXEN0;
   for (;;) {
     UBRR0 = 16000000 / 16 / 4800 - 1;
@@ -69,15 +76,55 @@ def read_uart(changes: list[tuple[int, str]], bits: tuple[float, ...], after: fl
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("vcd")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("pins")
     (folder / "pins.c").write_text(SOURCE)
     flags = ["-mmcu=atmega328p", "-Os", "-Wall"]
     subprocess.run(["avr-gcc", *flags, "-o", folder / "pins.elf", folder / "pins.c"], check=True)
-    request = Request.single(brain=folder / "pins.elf", seconds=0.2, pins=True, typed=[("e", 0.1)])
-    with locked(folder / "run") as kept:
+    return folder / "pins.elf"
+
+
+@pytest.fixture(scope="module")
+def run(program: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    request = Request.single(brain=program, seconds=0.2, pins=True, typed=[("e", 0.1)])
+    with locked(folder) as kept:
         execute(request, None, kept)
-    return folder / "run"
+    return folder
+
+
+class Looking(Onlooker):
+    """Looks at the pins of a robot when the run is over."""
+
+    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
+        self.session = robots[0].driver.session
+
+    def look(self, time_s: float, *, is_over: bool = False) -> None:
+        if is_over and isinstance(self.session, ShowsPins):
+            self.pins = self.session.pins_now()
+
+
+@pytest.mark.parametrize("on", ["program", "avr", "native"])
+def test_pins_as_the_live_page_shows_them(program: Path, on: str) -> None:
+    looking = Looking()
+    robot = load_robot("shieldbot-charging")
+    brain, board = (program, None) if on == "program" else ("wander", on)
+    execute(Request.single(brain=brain, robot=robot, seconds=0.2, on=board), onlooker=looking)
+    if on == "native":
+        assert not looking.pins
+        return
+    left, right = looking.pins[13], looking.pins[12]
+    battery = looking.pins[14].volts
+    assert robot.supply is not None and battery is not None
+    at_rest = robot.supply.empty_v + robot.supply.charge * (robot.supply.full_v - robot.supply.empty_v)
+    assert battery == pytest.approx(at_rest / 2, rel=0.1)  # behind a divider by 2; the motors load it
+    if on == "avr":  # pulses of 1.3 to 1.7 ms each 20 ms
+        assert left.rate == pytest.approx(50, rel=1e-3) and left.share == pytest.approx(0.075, abs=0.01)
+        assert right.does < 2 and looking.pins[9].volts is None
+        return
+    assert looking.pins[6].share == pytest.approx(0.25) and looking.pins[6].rate == pytest.approx(16e6 / 64 / 256)
+    assert looking.pins[4] == (3, 1, None, None, None) and looking.pins[11] == (2, 0, None, None, None)
+    assert (left.does, left.level, left.share) == (0, 0, None) and looking.pins[5].level == 1
 
 
 def test_a_parser_of_others_reads_pins_line_and_inputs(run: Path) -> None:
