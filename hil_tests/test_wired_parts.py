@@ -135,7 +135,7 @@ def test_the_program_reads_button_and_dial_and_leds_are_as_bright_as_it_makes_th
         assert seen.mean() == pytest.approx(position + 1 / 256, abs=1e-3)
     assert led[(time <= 0.3) | (time > 0.615)].max() == 0.0
     assert led[(time > 0.315) & (time <= 0.6)] == pytest.approx(1.0)
-    assert {name for name, *_ in series.signs()} == {"lamp", "board_led", "start"}
+    assert {name for name, *_ in series.signs()} == {"lamp", "board_led", "start", "whisker_right"}
     assert np.array_equal(series.flag("start", "pressed"), (time > 0.3 + 1e-9) & (time < 0.6 + 1e-9))
     assert series.number("dial", "position")[-1] == 0.75
 

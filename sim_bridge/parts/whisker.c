@@ -13,7 +13,12 @@ static void step(part *base) {
   part_bounce(base, part_step_end(base) + PART_GUARD, level, (uint8_t)!level, p->bounce_s);
 }
 
-static const part_operations OPERATIONS = {.step = step};
+static int read(part *base, double *values) {
+  *values = ((whisker *)base)->pressed;
+  return 1;
+}
+
+static const part_operations OPERATIONS = {.step = step, .read = read};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   whisker *self = (whisker *)base;

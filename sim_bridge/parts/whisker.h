@@ -23,7 +23,7 @@ typedef struct {
 } whisker;
 
 /* python: begin */
-/* Parameters: whisker_parameters. Pin: the switch. */
+/* Shows whether it is bent. Parameters: whisker_parameters. Pin: the switch. */
 extern const part_kind whisker_kind;
 /* python: end */
 

@@ -6,8 +6,11 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
+
 from boebot.devices.device import Place, Reader, kinds
 from boebot.devices.latest import MESSAGE_TICKS
+from boebot.devices.led import BOARD_LED_PIN, Led
 from boebot.devices.readings import Layout
 from boebot.errors import BoebotError, BrainError, did_you_mean
 
@@ -100,6 +103,15 @@ def places(
         where = slice(0, 1) if layout is None else layout[name]
         found[name] = Place(name, robot.device, robot.body.wheel_radius_m, tick_s, message_ticks, where)
     return found
+
+
+def with_board_led(robot: RobotDescription) -> RobotDescription:
+    """The robot with the LED "L" that an Uno itself has at pin 13, if no other device of it has that name, or is an LED
+    there."""
+    there = [one for one in robot.device.values() if isinstance(one, Led) and one.pin == BOARD_LED_PIN]
+    if robot.board != "uno" or there or "L" in robot.device:
+        return robot
+    return msgspec.structs.replace(robot, device={**robot.device, "L": Led(pin=BOARD_LED_PIN, colour="yellow")})
 
 
 def check_setting(robot: RobotDescription, name: str, value: float) -> None:

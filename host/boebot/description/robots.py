@@ -254,7 +254,7 @@ def _faults(robot: RobotDescription, path: Path) -> Faults:
 def _device_faults(robot: RobotDescription) -> Faults:
     """Keys that do not fit each other, and names that a brain could not write."""
     for name, device in robot.device.items():
-        if not name.isidentifier() or name[0] == "_" or name in TAKEN:
+        if not name.isidentifier() or name[0] == "_" or (name in TAKEN and robot.takes_brain):
             yield f"device.{name}", ": a device cannot have this name; expected one that robot.NAME can have in a brain"
         if device.on and (fault := device.fault()):
             yield f"device.{name}.{fault[0]}", fault[1]

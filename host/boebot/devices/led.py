@@ -22,6 +22,7 @@ from boebot.devices.drawing import TOP, Item, circle
 
 SEEN = 0.01  # of full brightness: less looks dark
 RADIUS_M = 0.005
+BOARD_LED_PIN = 13  # of an Uno, which has one itself, "L"
 _COLOURS = {"red": "#e53935", "yellow": "#fdd835", "green": "#43a047", "blue": "#1e88e5", "white": "#fafafa"}
 
 

@@ -84,7 +84,9 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
         return lambda sample, _: _PRESSED if sample.whiskers & bit else _FREE
 
     def columns(self, place: Place, run: Run) -> list[Column]:
-        """Pressed or not."""
+        """Pressed or not: by telemetry, or, where a program drives the robot, by its contact."""
+        if "whiskers" not in (run.raw.dtype.names or ()):
+            return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
         return [Column("pressed", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
 
     def drawing(self, name: str) -> list[Item]:

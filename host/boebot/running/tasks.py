@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from boebot import brains
 from boebot.boards import DIRECT, BoardRequest, default_board, is_live
 from boebot.brains import LoadedBrain
-from boebot.description.equipment import Equipment, check_setting
+from boebot.description.equipment import Equipment, check_setting, with_board_led
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoebotError, BrainError, CallError, NotRealisableError
 from boebot.guests import CHECKS, guests
@@ -366,6 +366,8 @@ def prepare(
     if loaded is None:
         description.expect_kit()
         loaded = brains.load_brain(brain)
+    else:
+        description = with_board_led(description)
     period_s = float(period if period is not None else loaded.period or DEFAULT_PERIOD)
     if description.has_board:
         check_time_to_live(period_s)
