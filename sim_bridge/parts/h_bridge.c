@@ -1,6 +1,8 @@
 /* h_bridge.c: see h_bridge.h. */
 #include "h_bridge.h"
 
+#define PULSES_S 0.01 /* several pulses of PWM */
+
 enum { ENABLE = 2, INPUTS };
 
 typedef struct {
@@ -11,6 +13,7 @@ typedef struct {
   h_bridge_flow flow;      /* since the world's step began */
   uint64_t until;          /* up to there */
   double speed;            /* of the shaft when it began, rad/s */
+  double carried;          /* by the gear to the wheel, N m, mean of some pulses */
   double shown;            /* A s since it was last asked */
   uint64_t shown_since;
 } h_bridge;
@@ -40,6 +43,19 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
 }
 
+/* The wheel's torque in a step of `dt` for that mean current. What a gear loses goes against the motion: it lessens what
+ * the motor gives to the wheel, and adds to what the wheel must give where it drives the motor. The teeth change sides by
+ * the mean of some pulses: the rotor's inertia carries it through each. */
+static double torque_of(h_bridge *self, double current, double dt) {
+  motor_dc_parameters motor = self->parameters.motor;
+  const double hold = body_wheel_hold(self->part.chassis->body, dt);
+  const double torque = motor_dc_shaft_torque(&motor, current, self->speed, hold);
+  self->carried += dt / (dt + PULSES_S) * (torque - self->carried);
+  if (self->carried * self->speed >= 0.0) return torque;
+  motor.efficiency = 1.0 / motor.efficiency;
+  return motor_dc_shaft_torque(&motor, current, self->speed, hold);
+}
+
 /* The torque of the coming step, by what flowed since the last one. */
 static void before_step(part *base) {
   h_bridge *self = (h_bridge *)base;
@@ -49,7 +65,7 @@ static void before_step(part *base) {
   pass(self, c->since);
   chassis_wheel *wheel = &c->wheel[self->side];
   self->speed = wheel->speed / p->wheel_radius;
-  wheel->torque = motor_dc_shaft_torque(&p->motor, self->flow.charge / dt, self->speed, body_wheel_hold(c->body, dt));
+  wheel->torque = torque_of(self, self->flow.charge / dt, dt);
   wheel->is_bridged = 1;
   c->bridges_a += p->idle_a + self->flow.drawn / dt;
   self->flow.charge = self->flow.drawn = 0.0;

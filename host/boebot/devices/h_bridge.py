@@ -3,8 +3,9 @@ right wheel's with a name that ends in `right`.
 
 Enable's PWM sets the speed, the two inputs the direction: different ones drive, equal ones brake, and without enable
 the motor coasts. Without an `enable_pin` the module's jumper is in: always enabled. The motor is what its data sheet
-says at `rated_v`; defaults are the yellow "TT" gear motor 1:48 at 6 V, as Adafruit measured it (#3777: 160 mA and 250
-rpm without a load, 1.5 A and 0.8 kg cm stalled). For programs of one's own: the kit's firmware has none.
+says at `rated_v`; defaults are the yellow "TT" gear motor 1:48 at 6 V: 160 mA and 250 rpm without a load (measured by
+Adafruit, #3777), 0.8 kg cm stalled (its sheet); stalled currents are said to be 0.6 to 1.5 A, and 0.8 A goes with that
+torque and a gear of three plastic stages. For programs of one's own: the kit's firmware has none.
 
     [device.motor_left]
     type = "h_bridge"
@@ -33,10 +34,10 @@ class HBridge(Device, tag="h_bridge", frozen=True, kw_only=True):
     rated_v: Positive = 6.0
     no_load_rpm: Positive = 250.0  # of the wheel
     no_load_a: NotNegative = 0.16  # what friction takes
-    stall_a: Positive = 1.5
+    stall_a: Positive = 0.8
     stall_torque_n_m: Positive = 0.0785  # at the wheel
     gear: Positive = 48.0
-    inductance_h: NotNegative = 0.0015  # chosen: a 130-size motor of 4 ohm
+    inductance_h: NotNegative = 0.002  # chosen: a 130-size motor
 
     PINS: ClassVar[dict[str, str]] = {"in1_pin": "in1", "in2_pin": "in2", "enable_pin": "enable"}
     HEARS: ClassVar[frozenset[str]] = frozenset(PINS)

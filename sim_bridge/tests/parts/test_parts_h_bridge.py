@@ -24,11 +24,12 @@ ENA, IN1, IN2, IN3, IN4, ENB = 5, 7, 8, 9, 11, 6
 RADIUS, MASS = BODY.wheel_radius_m, BODY.mass_kg
 ROLLING = MASS + 2 * BODY.wheel_mass_kg + 2 * BODY.wheel_inertia_kg_m2 / RADIUS**2  # kg, that a force at the rims moves
 
-OHM = 6.0 / 1.5  # the TT motor's sheet: 6 V, 1.5 A stalled, 0.16 A and 250 rpm without a load
+OHM = 6.0 / 0.8  # the TT motor's sheet: 6 V, 0.8 A and 0.0785 N m stalled, 0.16 A and 250 rpm without a load
 C = (6.0 - OHM * 0.16) / (48 * 250 * 2 * math.pi / 60)  # V s/rad, N m/A
-ETA = 0.0785 / (48 * C * (1.5 - 0.16))
+ETA = 0.0785 / (48 * C * (0.8 - 0.16))
 EMF = 48 * C / RADIUS  # V s/m, of the rim
 FORCE = 48 * ETA * C / RADIUS  # N/A, of one wheel
+HELD = 48 / ETA * C / RADIUS  # and of one that drives its motor
 DAMPING = BODY.linear_damping_n_s_m * ROLLING / MASS  # (2.31) has alpha / M
 
 
@@ -55,7 +56,7 @@ def test_the_motor_is_that_of_its_sheet() -> None:
     motor = ROVER.device["motor_left"]
     assert isinstance(motor, HBridge)
     assert (motor.resistance_ohm, motor.motor_constant, motor.efficiency) == pytest.approx((OHM, C, ETA))
-    assert 0.2 < ETA < 0.4
+    assert 0.6 < ETA < 0.75
 
 
 def test_steady_speed_current_and_load_on_the_pack() -> None:
@@ -80,8 +81,8 @@ def test_steady_speed_current_and_load_on_the_pack() -> None:
 
 
 def test_stalled_at_a_wall() -> None:
-    """Each motor draws (pack - 1.4 V) / (R + 1.15 ohm); its wheel slips, or the tyres hold it."""
-    robot = scripted(arena_of(square(0.70, 0.0, 1.0)), ROVER)
+    """Each motor draws (pack - 1.4 V) / (R + 1.15 ohm); the tyres hold."""
+    robot = scripted(arena_of(square(0.70, 0.0, 1.0)), ROVER, without=["slip"])
     drive(robot, 0.0, "forward")
     robot.run(1.0)
     amperes(robot)
@@ -92,8 +93,8 @@ def test_stalled_at_a_wall() -> None:
 
 
 def stopped(way: str) -> tuple[float, float]:
-    """Speed when it begins to stop that way, and how far it then goes (m/s, m)."""
-    robot = scripted(robot=ROVER)
+    """Speed when it begins to stop that way, and how far it then goes (m/s, m), on tyres that hold."""
+    robot = scripted(robot=ROVER, without=["slip"])
     drive(robot, 0.0, "forward")
     drive(robot, 1.5, way)
     robot.run(1.5)
@@ -113,14 +114,15 @@ def way_of_decay(v: float, to: float, constant: float, per_speed: float) -> floa
 def test_coasting_and_braking_distances_are_those_of_the_closed_form() -> None:
     """Coasting, friction alone stops it. The brake adds a current (e - 1.4 V) / (R + 0.775 ohm) until e is 1.4 V."""
     v, far = stopped("coast")
-    friction = 2 * FORCE * 0.16
+    friction = 2 * HELD * 0.16
     coasting = way_of_decay(v, 0.0, friction, DAMPING)
     assert far == pytest.approx(coasting + 0.001 * v, rel=0.01)  # it begins a step late
     v, near = stopped("brake")
     ohm, weak = OHM + 1.15 / 2 + 0.2, 1.4 / EMF
-    braked = way_of_decay(v, weak, friction - 2 * FORCE * 1.4 / ohm, DAMPING + 2 * FORCE * EMF / ohm)
+    braked = way_of_decay(v, weak, friction - 2 * HELD * 1.4 / ohm, DAMPING + 2 * HELD * EMF / ohm)
     expected = braked + way_of_decay(weak, 0.0, friction, DAMPING) + 0.001 * v
-    assert near == pytest.approx(expected, rel=0.01) and near < 0.4 * far
+    assert near == pytest.approx(expected, rel=0.02), "e is that of a step before"
+    assert near < 0.6 * far
 
 
 @pytest.mark.parametrize(("hertz", "on_enable"), [(976.5625, True), (490.196, True), (976.5625, False)])
@@ -147,7 +149,7 @@ def test_pwm_sets_the_speed(hertz: float, on_enable: bool) -> None:
     start, _, _ = integrated(4 * spans, v / RADIUS, pack_v=pack)
     _, charge, _ = integrated(spans, v / RADIUS, start, pack)
     total = charge / pulse_s
-    assert mean == pytest.approx(total, rel=0.003)
+    assert mean == pytest.approx(total, rel=0.005)
     assert mean == pytest.approx(0.16 + 0.5 * DAMPING * v / FORCE, rel=0.01)
     assert 0.2 < v < 0.8
 
@@ -184,7 +186,7 @@ def test_what_is_wrong_gets_a_sentence(tmp_path: Path) -> None:
         ("stall_a = 0.1", "stall_a is 0.1; expected more than no_load_a, 0.16 A"),
         (
             "stall_torque_n_m = 0.4",
-            "stall_torque_n_m is 0.4; expected at most 0.274 N m, that of a gear without losses",
+            "stall_torque_n_m is 0.4; expected at most 0.117 N m, that of a gear without losses",
         ),
         ("enable_pin = 20", "there is no pin 20"),
     ):

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from sim_bridge._core import ffi, lib
 
-OHM, HENRY, GEAR = 4.0, 1.5e-3, 48.0
-CONSTANT = (6.0 - 4.0 * 0.16) / (48 * 250 * 2 * math.pi / 60)  # of a TT motor: 6 V, 0.16 A, 250 rpm
+OHM, HENRY, GEAR = 7.5, 2e-3, 48.0
+CONSTANT = (6.0 - OHM * 0.16) / (48 * 250 * 2 * math.pi / 60)  # of a TT motor: 6 V, 0.16 A, 250 rpm
 DROP_V, DROP_OHM, DIODE_V, DIODE_OHM = 1.4, 1.15, 0.7, 0.2
 PACK_V = 7.4
 COAST, BRAKE, FORWARD, BACKWARD = range(4)
@@ -69,7 +69,7 @@ def integrated(
     return [current, charge, drawn]
 
 
-SPEEDS = (0.0, 12.0, -9.0, 45.0)  # rad/s: at rest, driven, driven against, faster than the pack
+SPEEDS = (0.0, 12.0, -9.0, 52.0)  # rad/s: at rest, driven, driven against, faster than the pack
 
 
 @pytest.mark.parametrize("off", [COAST, BRAKE, BACKWARD])
@@ -87,10 +87,10 @@ def test_pwm_is_that_of_an_integration_in_steps_of_1_us(off: int, hertz: int) ->
 
 
 def test_coasting_ends_the_current_within_the_pulse() -> None:
-    """From 0.5 A, R' = 4.4 ohm with two diodes: t = L / R' ln(1 + 0.5 R' / (pack + 1.4 V)); the charge flows back."""
+    """From 0.5 A, R' = 7.9 ohm with two diodes: t = L / R' ln(1 + 0.5 R' / (pack + 1.4 V)); the charge flows back."""
     ohm, back = OHM + 2 * DIODE_OHM, PACK_V + 2 * DIODE_V
     ends_s = HENRY / ohm * math.log1p(0.5 * ohm / back)
-    assert 0.05e-3 < ends_s < 0.1e-3
+    assert 0.05e-3 < ends_s < 0.11e-3
     current, charge, drawn = flow([(COAST, 1e-3)], 0.0, start=0.5)
     assert current == 0.0 and drawn == -charge
     assert charge == pytest.approx(0.5 * HENRY / ohm - back / ohm * ends_s, rel=1e-12)
@@ -98,14 +98,14 @@ def test_coasting_ends_the_current_within_the_pulse() -> None:
 
 @pytest.mark.parametrize("henry", [0.0, HENRY])
 def test_steady_currents_by_hand(henry: float) -> None:
-    """Stalled (7.4 - 1.4) / (4 + 1.15); braked by (e - 0.7 - 0.7) / (4 + 0.575 + 0.2), and not at all below 1.4 V."""
+    """Stalled (7.4 - 1.4) / (7.5 + 1.15); braked by (e - 0.7 - 0.7) / (7.5 + 0.575 + 0.2), not at all below 1.4 V."""
     long = [(FORWARD, 1.0)]
-    assert flow(long, 0.0, henry=henry)[0] == pytest.approx(6.0 / 5.15)
+    assert flow(long, 0.0, henry=henry)[0] == pytest.approx(6.0 / 8.65)
     emf = CONSTANT * GEAR * 20.0
-    assert flow([(BRAKE, 1.0)], 20.0, henry=henry)[0] == pytest.approx(-(emf - 1.4) / 4.775)
-    assert flow([(BRAKE, 1.0)], 6.8, start=0.0, henry=henry) == [0.0, 0.0, 0.0]
-    assert flow([(FORWARD, 1.0)], 30.0, henry=henry) == [0.0, 0.0, 0.0]  # e = 6.15 V: more than the pack less its drop
-    assert flow([(COAST, 1.0)], 45.0, henry=henry)[2] < 0.0  # e = 9.2 V: through the diodes into the pack
+    assert flow([(BRAKE, 1.0)], 20.0, henry=henry)[0] == pytest.approx(-(emf - 1.4) / 8.275)
+    assert flow([(BRAKE, 1.0)], 7.5, start=0.0, henry=henry) == [0.0, 0.0, 0.0]
+    assert flow([(FORWARD, 1.0)], 34.0, henry=henry) == [0.0, 0.0, 0.0]  # e = 6.2 V: more than the pack less its drop
+    assert flow([(COAST, 1.0)], 52.0, henry=henry)[2] < 0.0  # e = 9.5 V: through the diodes into the pack
 
 
 @given(
