@@ -50,6 +50,8 @@ class BoardRequest:
     noise: bool = True
     without: Sequence[str] = ()  # imperfections of this robot that are switched off, by name
     imperfections: Mapping[str, float] = field(default_factory=dict)  # magnitudes of others, by name
+    notes: bool = False  # also of what a bench does not show (boards/avr/avr_checks.h); emulated ATmega328P only
+    strict: bool = False  # the first such note ends the run as a fault
     gdb: int | None = None  # TCP port for avr-gdb at an emulated ATmega328P; 0: any free one
     gdb_waits: bool = True  # the program stands still until a debugger has come
 

@@ -79,6 +79,7 @@ typedef struct {
 #define BOARD_NOTES "notes" /* a board_notes */
 
 #define BOARD_PIN_LEVELS "pin levels" /* uint8_t[BOARD_PIN_COUNT]: 0 or 1, as the program would read them now */
+#define BOARD_CHECKS "checks" /* a board_checks */
 
 #define BOARD_OUTSIDE_LOG "outside log" /* a board_outside_log */
 
@@ -97,6 +98,15 @@ typedef struct {
   board_note notes[BOARD_NOTES_MAXIMUM]; /* oldest first */
   size_t count;
 } board_notes;
+
+/* What a program is checked by while it runs, off at first: whoever joins something to the board's pins says what, by bits of
+ * Arduino's numbers. */
+typedef struct {
+  bool on, strict;
+  uint32_t joined;     /* something is there */
+  uint32_t pulls_low;  /* and pulls it low harder than a resistor does, when it drives it low */
+  uint32_t pulls_high; /* the same for high */
+} board_checks;
 
 /* What a cell of the EEPROM holds after the supply failed while it was being written. */
 typedef enum {

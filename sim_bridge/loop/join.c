@@ -165,9 +165,16 @@ static int join(robot *r, part *p) {
     return SIM_PIN_TAKEN;
   }
   r->parts[r->part_count++] = p;
+  board_checks *checks = r->board->op->extension(r->board, BOARD_CHECKS);
   for (int i = 0; i < PART_PINS; i++) {
-    const uint8_t pin = p->pins[i].pin;
+    const uint8_t pin = p->pins[i].pin, role = p->pins[i].role;
     if (!is_pin(pin)) continue;
+    if (checks != NULL) {
+      const uint32_t drives = (uint32_t)((role & PART_DRIVES) != 0) << pin;
+      checks->joined |= 1u << pin;
+      if (!(role & (PART_PULLED_UP | PART_WEAK_HIGH))) checks->pulls_high |= drives;
+      if (!(role & PART_WEAK_LOW)) checks->pulls_low |= drives;
+    }
     if (p->pins[i].role & PART_ANALOG) r->analog[pin - BOARD_FIRST_ANALOG_PIN] = p;
     if (!(p->pins[i].role & PART_HEARS)) continue;
     part **last = r->hears[pin];

@@ -55,7 +55,8 @@ static const part_operations OPERATIONS = {.edge = edge};
 
 void capacitor_init(capacitor *self, const part_place *place, uint8_t pin, const capacitor_parameters *parameters,
                     capacitor_decay decay_time) {
-  part_join(&self->part, &OPERATIONS, place, &(part_pin){pin, PART_HEARS | PART_DRIVES}, 1);
+  part_join(&self->part, &OPERATIONS, place,
+            &(part_pin){pin, PART_HEARS | PART_DRIVES | PART_WEAK_HIGH | PART_WEAK_LOW}, 1);
   self->parameters = *parameters;
   self->decay_time = decay_time;
 }

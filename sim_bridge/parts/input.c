@@ -38,7 +38,7 @@ static int init_contact(part *base, const part_place *place, const uint8_t *pins
   contact *self = (contact *)base;
   const contact_parameters *p = parameters;
   self->parameters = *p;
-  const uint8_t pulled = p->resistor && !p->to_supply ? PART_PULLED_UP : 0;
+  const uint8_t resistor = p->to_supply ? PART_WEAK_LOW : PART_PULLED_UP, pulled = p->resistor ? resistor : 0;
   part_join(base, &CONTACT, place, &(part_pin){pins[0], PART_DRIVES | pulled}, 1);
   part_drive(base, 0, pins[0], level_of(p, p->closed));
   return 0;

@@ -26,10 +26,12 @@
 
 /* What a part does with its pin. */
 enum {
-  PART_HEARS = 1,     /* `edge` is called for what the board does to it */
-  PART_DRIVES = 2,    /* the part drives it */
-  PART_PULLED_UP = 4, /* a resistor pulls it up when nobody drives it */
-  PART_ANALOG = 8     /* `analog` is asked for the voltage there */
+  PART_HEARS = 1,      /* `edge` is called for what the board does to it */
+  PART_DRIVES = 2,     /* the part drives it */
+  PART_PULLED_UP = 4,  /* a resistor pulls it up when nobody drives it */
+  PART_ANALOG = 8,     /* `analog` is asked for the voltage there */
+  PART_WEAK_HIGH = 16, /* as which it drives it is a resistor's, or a charge: whoever drives it too is stronger */
+  PART_WEAK_LOW = 32
 };
 
 typedef struct {

@@ -19,7 +19,7 @@ from boebot.boards import BoardRequest
 from boebot.errors import BoardError, CallError
 from sim_bridge._core import lib
 from sim_bridge.boards import avr
-from sim_bridge.boards.board import CLOCK_HZ, Closes, EmulatedBoard
+from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
 from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library
 from sim_bridge.sessions.places import places_of
 from sim_bridge.sessions.session import DirectSession, SimSession
@@ -186,7 +186,11 @@ def _add(sim: Sim, kind: BoardKind | None, request: BoardRequest, pose: tuple[fl
         board = _board(kind, request)
     try:
         if board is not None and request.gdb is not None:
-            board.debugger = _debugger(board, request.gdb, waits=request.gdb_waits)
+            from sim_bridge.gdb import Gdb
+
+            board.debugger = Gdb(_inner(board, "a debugger looks"), request.gdb, waits=request.gdb_waits)
+        if board is not None and (request.notes or request.strict):
+            _inner(board, "these notes look").check(strict=request.strict)
         return sim.add(board, request.robot, pose=pose, without=request.without, imperfections=request.imperfections)
     except Exception:
         if board is not None and not board.is_in_use():  # else the simulation's end is the board's
@@ -194,12 +198,11 @@ def _add(sim: Sim, kind: BoardKind | None, request: BoardRequest, pose: tuple[fl
         raise
 
 
-def _debugger(board: EmulatedBoard, port: int, *, waits: bool) -> Closes:
-    from sim_bridge.gdb import Gdb
-
+def _inner(board: EmulatedBoard, who: str) -> avr.AvrBoard:
+    """Raises CallError of a board that `who` cannot look into."""
     if not isinstance(board, avr.AvrBoard):
-        raise CallError(f"a debugger looks into the emulated ATmega328P ({AVR.name}), not into the {board.description}")
-    return Gdb(board, port, waits=waits)
+        raise CallError(f"{who} into the emulated ATmega328P ({AVR.name}), not into the {board.description}")
+    return board
 
 
 def _board(kind: BoardKind, request: BoardRequest) -> EmulatedBoard:

@@ -150,6 +150,17 @@ def run(
     timeout_exit_code: Annotated[
         int, typer.Option(metavar="N", min=0, max=255, help="Exit code where --expect-text was not printed in time.")
     ] = 42,
+    notes: Annotated[
+        bool,
+        typer.Option(
+            "--notes",
+            help="Say of a program what a bench does not show: pins driven from both sides, floating inputs that "
+            "decide, RAM read before it is written.",
+        ),
+    ] = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="The first such note is an error, and ends the run.")
+    ] = False,
     gdb: options.Gdb = None,
     view: options.View = False,
     speed: options.Speed = None,
@@ -196,6 +207,8 @@ def run(
         fail_text=fail_text,
         typed=[_typed(text) for text in typed or []],
         inputs=[_input(text) for text in inputs or []],
+        notes=notes,
+        strict=strict,
         gdb=gdb,
     )
     programs = [member for member in request.members if isinstance(member.brain, LoadedBrain)]

@@ -210,6 +210,8 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
         step_timeout=None if all(result.program for result in run.results) else math.inf,
         force_timing=asked["force_timing"],
         pins=asked.get("pins", False),
+        notes=asked.get("notes", False),
+        strict=asked.get("strict", False),
         expect_text=asked.get("expect_text", ""),
         fail_text=asked.get("fail_text", ""),
     )

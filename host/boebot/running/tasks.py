@@ -92,6 +92,7 @@ class Request(_NamesFiles):
         arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text, typed,
             inputs: as of `boebot.run`.
         record: what happens is recorded.
+        notes, strict: of a program's board, as of `BoardRequest`.
         gdb: TCP port for avr-gdb at the one emulated ATmega328P, which waits for it; no record says of it.
     """
 
@@ -105,6 +106,8 @@ class Request(_NamesFiles):
     force_timing: bool = False
     record: bool = True
     pins: bool = False
+    notes: bool = False
+    strict: bool = False
     gdb: int | None = None
     expect_text: str = ""
     fail_text: str = ""
@@ -133,7 +136,7 @@ class Request(_NamesFiles):
         expect("step_timeout", self.step_timeout, "seconds or None", Real, type(None))
         if self.step_timeout is not None and not self.step_timeout > 0:
             raise BoebotError(f"a step cannot last {self.step_timeout:g} s; expected a step_timeout of more than 0")
-        for name in ("realtime", "force_timing", "record", "pins"):
+        for name in ("realtime", "force_timing", "record", "pins", "notes", "strict"):
             switch = getattr(self, name)
             if not isinstance(switch, bool):
                 raise BoebotError(f"{name} is {switch!r}; expected True or False")
@@ -172,6 +175,7 @@ class Request(_NamesFiles):
             "pins": self.pins,
             "expect_text": self.expect_text,
             "fail_text": self.fail_text,
+            **{name: True for name in ("notes", "strict") if getattr(self, name)},
             "members": [
                 {
                     "brain": _brain_file(task.brain),
@@ -324,6 +328,8 @@ def _task(member: Member, request: Request, number: int) -> Task:
         imperfections={} if member.imperfections is None else checked(member.imperfections),
         image=str(loaded.path) if loaded.is_program else None,
         gdb=request.gdb,
+        notes=request.notes,
+        strict=request.strict,
     )
     return Task(
         brain=loaded,

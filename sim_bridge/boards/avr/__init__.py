@@ -85,6 +85,11 @@ class AvrBoard(EmulatedBoard):
         self._debugger = self.ffi.callback("avr_debugger", lambda _, why: debugger(why))
         return self.lib.avr_board_debug(self.handle, self._debugger)
 
+    def check(self, *, strict: bool) -> None:
+        """Notes from now on what a bench does not show (avr_checks.h); `strict`: the first of it is a fault."""
+        if not self.lib.avr_board_check(self.handle, strict):
+            raise MemoryError("notes of a program")
+
     # ---- recorder ----------------------------------------------------------------------------------------------------
 
     def record(self, watch: Watch) -> None:

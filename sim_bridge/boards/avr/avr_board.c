@@ -81,6 +81,7 @@ static void destroy(board *self) {
   watchdog_free(b);
   spans_free(b);
   debug_free(b);
+  free(b->written);
   free(b);
 }
 
@@ -134,6 +135,7 @@ static void *extension(board *self, const char *name) {
   if (!strcmp(name, BOARD_WATCHDOG_LOG)) return &b->watchdog_log;
   if (!strcmp(name, BOARD_NOTES)) return &b->notes;
   if (!strcmp(name, BOARD_PIN_LEVELS)) return pins_levels(b);
+  if (!strcmp(name, BOARD_CHECKS)) return &b->checks;
   if (!strcmp(name, BOARD_OUTSIDE_LOG)) return &b->outside_log;
   if (!strcmp(name, BOARD_FAULT_ADDRESS)) {
     return b->crashed && b->fault_address != NO_ADDRESS ? &b->fault_address : NULL;

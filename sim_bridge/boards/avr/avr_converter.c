@@ -117,6 +117,7 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
     b->avr->data[address] |= ADSC; /* writing 0 does not stop it */
   } else if (value & ADSC) {
     note_missing(b);
+    check_analog(b, b->avr->data[REG_ADMUX] & MUX);
     start(b, end);
   }
 }

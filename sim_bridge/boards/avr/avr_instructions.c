@@ -27,19 +27,24 @@ enum { Y = 28, Z = 30 };
 #define H ((opcode >> 4 & 0xFu) + 16u) /* d of an instruction with a constant */
 #define K ((uint8_t)((opcode >> 4 & 0xF0u) | (opcode & 0xFu)))
 
-/* ---- RAM; false: the address is not there ---- */
+/* ---- RAM; false: the address is not there, or `written`, where the program is checked, says that nobody wrote there ---- */
 
 static inline bool in_ram(uint16_t address) { return (uint16_t)(address - RAM_BEGIN) < BOARD_DATA_SIZE - RAM_BEGIN; }
 
-static inline bool load(uint8_t *data, unsigned opcode, uint16_t address) {
-  if (!in_ram(address)) return false;
+static inline bool may_load(const uint8_t *written, uint16_t address) {
+  return in_ram(address) && (!written || written[address]);
+}
+
+static inline bool load(uint8_t *data, const uint8_t *written, unsigned opcode, uint16_t address) {
+  if (!may_load(written, address)) return false;
   data[D] = data[address];
   return true;
 }
 
-static inline bool store(uint8_t *data, unsigned opcode, uint16_t address) {
+static inline bool store(uint8_t *data, uint8_t *written, unsigned opcode, uint16_t address) {
   if (!in_ram(address)) return false;
   data[address] = data[D];
+  if (written) written[address] = 1;
   return true;
 }
 
@@ -53,19 +58,19 @@ static inline uint16_t displaced(const uint8_t *data, unsigned opcode) {
 static inline unsigned pointer_of(unsigned opcode) { return Z - (opcode >> 2 & 2u) - (opcode >> 1 & 2u); }
 
 /* X, Y or Z, as it is, one less before or one more behind. */
-static inline bool load_moving(uint8_t *data, unsigned opcode) {
+static inline bool load_moving(uint8_t *data, const uint8_t *written, unsigned opcode) {
   unsigned pointer = pointer_of(opcode);
   uint16_t address = (uint16_t)(word_at(data, pointer) - (opcode >> 1 & 1u));
-  if (!in_ram(address)) return false;
+  if (!may_load(written, address)) return false;
   put_word(data, pointer, address + (opcode & 1u));
   data[D] = data[address];
   return true;
 }
 
-static inline bool store_moving(uint8_t *data, unsigned opcode) {
+static inline bool store_moving(uint8_t *data, uint8_t *written, unsigned opcode) {
   unsigned pointer = pointer_of(opcode);
   uint16_t address = (uint16_t)(word_at(data, pointer) - (opcode >> 1 & 1u));
-  if (!store(data, opcode, address)) return false;
+  if (!store(data, written, opcode, address)) return false;
   put_word(data, pointer, address + (opcode & 1u));
   return true;
 }
@@ -75,33 +80,35 @@ static inline bool may_push(unsigned address, unsigned bytes, unsigned lowest) {
   return address - lowest - (bytes - 1u) < BOARD_DATA_SIZE - lowest - (bytes - 1u);
 }
 
-static inline bool push(uint8_t *data, unsigned opcode, unsigned lowest) {
+static inline bool push(uint8_t *data, uint8_t *written, unsigned opcode, unsigned lowest) {
   uint16_t stack = (uint16_t)word_at(data, SP);
   if (!may_push(stack, 1, lowest)) return false;
   data[stack] = data[D];
+  if (written) written[stack] = 1;
   put_word(data, SP, stack - 1u);
   return true;
 }
 
-static inline bool pop(uint8_t *data, unsigned opcode) {
+static inline bool pop(uint8_t *data, const uint8_t *written, unsigned opcode) {
   uint16_t stack = (uint16_t)(word_at(data, SP) + 1u);
-  if (!load(data, opcode, stack)) return false;
+  if (!load(data, written, opcode, stack)) return false;
   put_word(data, SP, stack);
   return true;
 }
 
-static inline bool push_address(uint8_t *data, uint32_t address, unsigned lowest) {
+static inline bool push_address(uint8_t *data, uint8_t *written, uint32_t address, unsigned lowest) {
   uint16_t stack = (uint16_t)word_at(data, SP);
   if (!may_push(stack, 2, lowest)) return false;
   data[stack] = (uint8_t)(address >> 1);
   data[stack - 1u] = (uint8_t)(address >> 9);
+  if (written) written[stack] = written[stack - 1u] = 1;
   put_word(data, SP, stack - 2u);
   return true;
 }
 
-static inline bool pop_address(uint8_t *data, uint32_t *address) {
+static inline bool pop_address(uint8_t *data, const uint8_t *written, uint32_t *address) {
   uint16_t stack = (uint16_t)word_at(data, SP);
-  if (!in_ram((uint16_t)(stack + 1u)) || !in_ram((uint16_t)(stack + 2u))) return false;
+  if (!may_load(written, (uint16_t)(stack + 1u)) || !may_load(written, (uint16_t)(stack + 2u))) return false;
   *address = (uint32_t)(data[stack + 1u] << 8 | data[stack + 2u]) << 1;
   put_word(data, SP, stack + 2u);
   return true;
@@ -159,11 +166,12 @@ static void check_stack_behind(avr_board *b, uint32_t at, uint32_t before) {
 }
 
 /* That at `pc`, which then is the next one's address. False: the core is to stop behind it. `until` may come nearer by it. */
-static bool uncommon(avr_board *b, uint32_t *pc, uint64_t *until) {
+static bool uncommon(avr_board *b, uint32_t *pc, uint64_t *until, bool checked) {
   avr_t *avr = b->avr;
   avr->run_cycle_count = 1; /* one instruction; what wants the core to stop makes it 0 */
   const uint32_t at = *pc, before = word_at(avr->data, SP);
   const uint16_t lowest = b->lowest_stack;
+  if (checked) check_access(b);
   const unsigned opcode = at < BOOT_BEGIN ? word_at(avr->flash, at) : 0;
   const bool is_erased = opcode == ERASED && at < avr->reset_pc;
   if (is_erased || opcode == SPM) { /* nothing, as the chip does, in a cycle */
@@ -221,8 +229,8 @@ data_access next_access(const avr_board *b) {
 
 /* ---- many ---- */
 
-static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t until,
-                                                          const instruction_stops *stops) {
+static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t until, const instruction_stops *stops,
+                                                          uint8_t *written) {
   avr_t *avr = b->avr;
   uint8_t *const data = avr->data, *const f = avr->sreg;
   const uint8_t *const flash = avr->flash;
@@ -295,28 +303,28 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
         break;
 
       case LDD:
-        here = load(data, opcode, displaced(data, opcode));
+        here = load(data, written, opcode, displaced(data, opcode));
         takes = 2;
         break;
       case STD:
-        here = store(data, opcode, displaced(data, opcode));
+        here = store(data, written, opcode, displaced(data, opcode));
         takes = 2;
         break;
       case LD:
-        here = load_moving(data, opcode);
+        here = load_moving(data, written, opcode);
         takes = 2;
         break;
       case ST:
-        here = store_moving(data, opcode);
+        here = store_moving(data, written, opcode);
         takes = 2;
         break;
       case LDS:
-        here = load(data, opcode, (uint16_t)word_at(flash, pc));
+        here = load(data, written, opcode, (uint16_t)word_at(flash, pc));
         pc += 2;
         takes = 2;
         break;
       case STS:
-        here = store(data, opcode, (uint16_t)word_at(flash, pc));
+        here = store(data, written, opcode, (uint16_t)word_at(flash, pc));
         pc += 2;
         takes = 2;
         break;
@@ -326,12 +334,12 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
         takes = 3;
         break;
       case PUSH:
-        here = push(data, opcode, lowest);
+        here = push(data, written, opcode, lowest);
         moves_stack = true;
         takes = 2;
         break;
       case POP:
-        here = pop(data, opcode);
+        here = pop(data, written, opcode);
         moves_stack = true;
         takes = 2;
         break;
@@ -407,25 +415,25 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
         takes = 2;
         break;
       case CALL:
-        here = push_address(data, pc + 2, lowest);
+        here = push_address(data, written, pc + 2, lowest);
         pc = word_at(flash, pc) << 1;
         moves_stack = jumps = true;
         takes = 4;
         break;
       case RCALL:
-        here = push_address(data, pc, lowest);
+        here = push_address(data, written, pc, lowest);
         pc = relative(pc, opcode);
         moves_stack = jumps = true;
         takes = 3;
         break;
       case ICALL:
-        here = push_address(data, pc, lowest);
+        here = push_address(data, written, pc, lowest);
         pc = word_at(data, Z) << 1;
         moves_stack = jumps = true;
         takes = 3;
         break;
       case RET:
-        here = pop_address(data, &pc);
+        here = pop_address(data, written, &pc);
         moves_stack = jumps = true;
         takes = 4;
         break;
@@ -450,7 +458,7 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
     if (!here) {
       avr->pc = pc = at;
       avr->cycle = cycle;
-      if (!uncommon(b, &pc, &until)) until = 0;
+      if (!uncommon(b, &pc, &until, written != NULL)) until = 0;
       cycle = avr->cycle;
       moves_stack = jumps = true;
       takes = 0;
@@ -470,6 +478,16 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
   return at;
 }
 
+/* By itself: the others are as fast as they were. */
+static __attribute__((noinline)) uint32_t run_checked(avr_board *b, uint64_t until, const instruction_stops *stops) {
+  return stops ? run(b, until, stops, b->written) : run(b, until, NULL, b->written);
+}
+
+static __attribute__((noinline)) uint32_t run_stopping(avr_board *b, uint64_t until, const instruction_stops *stops) {
+  return run(b, until, stops, NULL);
+}
+
 uint32_t execute_instructions(avr_board *b, uint64_t until, const instruction_stops *stops) {
-  return stops ? run(b, until, stops) : run(b, until, NULL);
+  if (b->written) return run_checked(b, until, stops);
+  return stops ? run_stopping(b, until, stops) : run(b, until, NULL, NULL);
 }

@@ -4,7 +4,7 @@
  * time or pins is here: common instructions (avr_instructions.c, avr_opcodes.c), run loop and interrupts (avr_run.c),
  * registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
  * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), SPI (avr_spi.c), ADC (avr_converter.c), watchdog (avr_watchdog.c),
- * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c), debugger (avr_debug.c).
+ * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c), debugger (avr_debug.c), checks of the program (avr_checks.c).
  * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
  *
  * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
@@ -382,6 +382,9 @@ typedef struct avr_board {
   bool one_by_one;        /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   struct avr_debugging *debug;   /* NULL: no debugger */
+  board_checks checks;
+  uint8_t
+      *written; /* by address of data memory: cells of RAM that were written since the power came; NULL: not checked */
   board_counters counters;
   register_read *reads[0x100];   /* by address */
   register_write *writes[0x100]; /* NULL: it is kept */
@@ -427,6 +430,8 @@ void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to
  * returns the cycle of the access. */
 uint64_t begin_access(avr_board *b);
 
+static inline unsigned word_of(const uint8_t *bytes, uint32_t at) { return bytes[at] | (unsigned)bytes[at + 1] << 8; }
+
 static inline bool is_code(const avr_board *b, uint32_t address) {
   return address - b->code_begin < b->code_end - b->code_begin;
 }
@@ -439,6 +444,7 @@ void on_ones(avr_board *b,
 void registers_init(avr_board *b); /* before all that claim registers */
 /* Keeps what the instruction at `address` does, and `why` that is not what it seems; all literals. Once for each. */
 void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why);
+void note_place(avr_board *b, uint32_t address, const char *does, const char *what, const char *why); /* at each once */
 
 /* avr_pins.c */
 void pins_init(avr_board *b);
@@ -452,6 +458,8 @@ void pins_drive(avr_board *b, uint64_t at, uint8_t pin, uint8_t level);
 uint8_t *pins_levels(avr_board *b);
 uint8_t pins_output(const avr_board *b, uint8_t pin);
 void pins_acknowledged(avr_board *b, uint8_t vector);
+uint8_t pin_of(uint8_t port, unsigned bit);       /* Arduino's number; no pin: 255 */
+bool pin_floats(const avr_board *b, uint8_t pin); /* an input without pull-up that the outside does not drive */
 
 /* avr_timers.c */
 void timers_init(avr_board *b);
@@ -517,6 +525,13 @@ void spans_request_gone(avr_board *b, uint8_t vector);
 void spans_woke(avr_board *b);
 void spans_restart(avr_board *b);
 void spans_free(avr_board *b);
+
+/* avr_checks.c; only while the program is checked, but for those of inputs */
+void check_driven(avr_board *b, uint8_t pin, bool high);      /* board and outside drive it against each other */
+void check_read(avr_board *b, uint8_t port);                  /* by the instruction under way */
+void check_watched(avr_board *b, uint8_t port, uint8_t mask); /* by an interrupt */
+void check_analog(avr_board *b, uint8_t channel);
+void check_access(avr_board *b); /* of the next instruction, to RAM */
 
 /* avr_debug.c; all but debug_free only while there is a debugger. False: it has ended the run */
 bool debug_looks(avr_board *b);

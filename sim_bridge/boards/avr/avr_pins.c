@@ -30,7 +30,7 @@ static const struct {
 /* Where a port's registers are: PIN, then DDR, then PORT. */
 static const uint8_t ADDRESSES[PORT_COUNT] = {REG_PINB, REG_PINC, REG_PIND};
 
-static uint8_t pin_of(uint8_t port, unsigned bit) {
+uint8_t pin_of(uint8_t port, unsigned bit) {
   static const uint8_t first[PORT_COUNT] = {8, 14, 0};
   unsigned count = port == PORT_D ? 8 : 6;
   return bit < count ? (uint8_t)(first[port] + bit) : NO_PIN;
@@ -108,6 +108,11 @@ void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
     if (b->base.sink) b->base.sink(b->base.sink_context, cycle, pin, shown(p, bit));
   }
   if (port == PORT_B) spi_pins_moved(b, cycle);
+  if (__builtin_expect(!b->checks.on, true)) return;
+  uint8_t against = (uint8_t)(p->out & p->driven & (p->out_level ^ p->driven_level));
+  for (unsigned bit = 0; against; bit++, against >>= 1) {
+    if ((against & 1) && pin_of(port, bit) != NO_PIN) check_driven(b, pin_of(port, bit), p->out_level >> bit & 1);
+  }
 }
 
 static uint8_t port_of(uint16_t address) { return (uint8_t)((address - REG_PINB) / 3); }
@@ -116,6 +121,7 @@ static uint8_t read_pins(avr_board *b, uint16_t address, uint64_t cycle) {
   const uint8_t port = port_of(address);
   const port_state *p = &b->port[port];
   uint8_t level = p->changed >= cycle ? p->level_before : p->level;
+  if (__builtin_expect(b->checks.on, false)) check_read(b, port);
   return port == PORT_D ? usart_at_pins(b, level, cycle) : level;
 }
 
@@ -198,16 +204,19 @@ static void write_pin_change_enables(avr_board *b, uint16_t address, uint8_t val
   b->avr->data[address] = value;
   for (uint8_t port = 0; port < PORT_COUNT; port++) {
     enable_interrupt(b, (uint8_t)(VECTOR_PCINT0 + port), value >> port & 1);
+    if (value >> port & 1) check_watched(b, port, b->avr->data[REG_PCMSK0 + port]);
   }
 }
 
 static void write_pin_change_mask_d(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   usart_watched(b, value, end);
   b->avr->data[address] = value;
+  if (b->avr->data[REG_PCICR] >> PORT_D & 1) check_watched(b, PORT_D, value);
 }
 
 static void write_external_enables(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   b->avr->data[address] = value;
+  check_watched(b, PORT_D, (uint8_t)(value << INT0_BIT));
   for (uint8_t number = 0; number < 2; number++) {
     enable_interrupt(b, (uint8_t)(VECTOR_INT0 + number), value >> number & 1);
     update_level_interrupt(b, number);
@@ -259,6 +268,11 @@ uint8_t *pins_levels(avr_board *b) {
 uint8_t pins_output(const avr_board *b, uint8_t pin) {
   if (pin >= BOARD_PIN_COUNT) return BOARD_RELEASED;
   return shown(&b->port[PLACES[pin].port], PLACES[pin].bit);
+}
+
+bool pin_floats(const avr_board *b, uint8_t pin) {
+  const port_state *p = &b->port[PLACES[pin].port];
+  return !((p->out | p->pulled | p->driven) >> PLACES[pin].bit & 1);
 }
 
 /* ---- construction ---- */

@@ -45,14 +45,24 @@ static const chip_register REGISTERS[] = {
 /* GPIOR0 to 2, SPMCSR (simavr's), SPL, SPH, SREG, PCMSK0 and 1. */
 static const uint8_t KEPT[] = {0x3E, 0x4A, 0x4B, 0x57, 0x5D, 0x5E, 0x5F, 0x6B, 0x6C};
 
-void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why) {
+/* Of the same thing, `address` tells one from the other, or NO_ADDRESS. */
+static void keep_note(avr_board *b, uint32_t place, uint32_t address, const char *does, const char *what,
+                      const char *why) {
   board_notes *all = &b->notes;
   for (size_t i = 0; i < all->count; i++) {
     const board_note *n = &all->notes[i];
-    if (n->does == does && n->what == what && n->why == why) return;
+    if (n->does == does && n->what == what && n->why == why && (place == NO_ADDRESS || place == n->address)) return;
   }
-  if (all->count == BOARD_NOTES_MAXIMUM) return; /* more than there are different ones */
+  if (all->count == BOARD_NOTES_MAXIMUM) return;
   all->notes[all->count++] = (board_note){b->avr->cycle, address, does, what, why};
+}
+
+void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why) {
+  keep_note(b, NO_ADDRESS, address, does, what, why);
+}
+
+void note_place(avr_board *b, uint32_t address, const char *does, const char *what, const char *why) {
+  keep_note(b, address, address, does, what, why);
 }
 
 static uint8_t read_register(avr_t *avr, avr_io_addr_t address, void *param) {

@@ -9,6 +9,7 @@
  */
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "avr_instructions.h"
 #include "avr_opcodes.h"
@@ -131,6 +132,7 @@ static bool enter_interrupt(avr_board *b) {
     if (b->recorder) spans_accept(b, vector, avr->cycle + (b->sleeping ? WAKE_UP_CYCLES : 0));
     acknowledge(b, vector);
     bool elsewhere = _avr_sp_get(avr) + 1u < b->lowest_stack;
+    if (b->written) b->written[_avr_sp_get(avr)] = b->written[_avr_sp_get(avr) - 1u] = 1;
     _avr_push_addr(avr, avr->pc);
     check_stack(b, (uint32_t)avr->pc, elsewhere);
     avr_sreg_set(avr, S_I, 0);
@@ -247,6 +249,7 @@ void restart(avr_board *b) {
   if (causes & (1u << BOARD_RESET_POWER)) {
     flags = RESET_FLAG_POWER;
     scramble_memory(b);
+    if (b->written) memset(b->written, 0, BOARD_DATA_SIZE);
   }
   b->reset_wanted = 0;
   b->counters.resets++;

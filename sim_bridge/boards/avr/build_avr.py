@@ -54,7 +54,7 @@ COMPILER_FLAGS = [
 ]
 
 # Ours that Python may call (what is between their marks).
-HEADERS = ("board.h", "board_access.h", "avr/avr_board.h", "avr/avr_spans.h", "avr/avr_debug.h")
+HEADERS = ("board.h", "board_access.h", "avr/avr_board.h", "avr/avr_spans.h", "avr/avr_debug.h", "avr/avr_checks.h")
 
 
 def simavr_folder() -> Path:

@@ -1,0 +1,93 @@
+"""`--notes` and `--strict`: what a program does on a robot that a bench does not show, with its cycle and line."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from boebot.cli.app import app
+from boebot.record.run_folder import locked
+from boebot.result import RunResult, read_run
+from boebot.running.again import again, recorded
+from boebot.running.loop import execute
+from boebot.running.tasks import Request
+
+pytestmark = pytest.mark.emulated
+
+# On a shieldbot: A2 is the left encoder's, 7 the right whisker's (10 kOhm to 5 V, not pressed); A4 and A5 are free.
+SOURCE = """
+#include <avr/io.h>
+unsigned char kept __attribute__((section(".noinit")));
+int main(void) {
+  DDRD = 1 << 7;
+  PORTD = 1 << 7;
+  for (int i = 0; i < 3; i++) {
+    if (PIND & 1 << 5) GPIOR0++;
+  }
+  ADMUX = 0x45;
+  ADCSRA = 0xC7; /* line 11 */
+  while (ADCSRA & 1 << ADSC) {}
+  if (bit_is_set(PINC, 4)) GPIOR0++; /* line 13 */
+  GPIOR0 = kept; /* line 14 */
+  DDRC = 1 << 2, PORTC ^= 1 << 2; /* line 15: low, then high, against whatever the encoder does */
+  for (;;) {}
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("program")
+    (folder / "fights.c").write_text(SOURCE)
+    flags = ["-mmcu=atmega328p", "-Os", "-gdwarf-4"]
+    subprocess.run(["avr-gcc", *flags, "-o", folder / "fights.elf", folder / "fights.c"], check=True)
+    return folder / "fights.elf"
+
+
+NOTES = [
+    ("converts the voltage at A5", "11"),
+    ("decides by A4", "13"),
+    ("reads RAM that was never written", "14"),
+    ("drives A2", "15"),
+]
+
+
+def run(image: Path, *options: str) -> tuple[int, str]:
+    shown = CliRunner().invoke(app, ["run", str(image), "--seconds", "0.1", *options])
+    return getattr(shown.exception, "exit_code", shown.exit_code), f"{shown.output}\n{shown.exception}"
+
+
+def test_notes_have_cycle_and_line_and_are_in_the_record(image: Path, tmp_path: Path) -> None:
+    code, said = run(image, "--notes")
+    assert code == 0
+    flat = " ".join(said.split())
+    found = re.findall(r"the program ([^:]*?) at address 0x\w+ in cycle \d+ in main \(fights.c:(\d+)\): ", flat)
+    assert found == NOTES
+    with locked(tmp_path) as folder:
+        execute(Request.single(brain=str(image), seconds=0.1, notes=True), None, folder)
+    result = read_run(tmp_path)
+    assert isinstance(result, RunResult)
+    assert [one for one in result.notices if "fights.c" in one and one in flat] == result.notices != []
+    repeated = again(recorded(tmp_path))
+    assert repeated.is_equal
+
+
+def test_strict_makes_the_first_one_a_fault(image: Path, tmp_path: Path) -> None:
+    code, said = run(image, "--strict")
+    assert code == 1
+    fault = r"the program converts the voltage at A5 \(nothing .*\) at address .* in main \(fights.c:11\)"
+    assert re.search(fault, said)
+    with locked(tmp_path) as folder:
+        execute(Request.single(brain=str(image), seconds=0.1, strict=True), None, folder)
+    result = read_run(tmp_path)
+    assert isinstance(result, RunResult) and re.search(fault, str(result.error))
+    assert again(recorded(tmp_path)).is_equal
+
+
+def test_nothing_is_noted_unasked(image: Path) -> None:
+    result = execute(Request.single(brain=str(image), seconds=0.1), None, None)
+    assert isinstance(result, RunResult) and result.notices == []
