@@ -79,7 +79,7 @@ typedef struct {
 #define BOARD_NOTES "notes" /* a board_notes */
 
 #define BOARD_PIN_LEVELS "pin levels" /* uint8_t[BOARD_PIN_COUNT]: 0 or 1, as the program would read them now */
-#define BOARD_CHECKS "checks" /* a board_checks */
+#define BOARD_CHECKS "checks"         /* a board_checks */
 
 #define BOARD_OUTSIDE_LOG "outside log" /* a board_outside_log */
 
