@@ -191,3 +191,57 @@ def test_it_looks_about_with_its_turret_and_avoids_walls(tmp_path: Path) -> None
     assert said[0] / 1000 == pytest.approx(float(seen[np.searchsorted(run.series.time, 1.0)]), rel=0.03)
     (shown,) = (row for row in scene.view(run).turret[[np.argmax(angle)]])
     assert shown == pytest.approx(float(angle.max()), abs=1e-4), "pictures turn the beam"
+
+
+COUNT = """
+#include <avr/interrupt.h>
+static void put(char byte) { while (!(UCSR0A & 1 << UDRE0)) {} UDR0 = byte; }
+static volatile int left, right;
+ISR(INT0_vect) { left++; }
+ISR(INT1_vect) { if (PIND & 1 << 3) right += PINB & 1 << 2 ? -1 : 1; }  /* B is still low as A rises: forward */
+int main(void) {
+  begin();
+  DDRD &= ~(1 << 3);
+  PORTD = 0;
+  EICRA = 1 << ISC10 | 1 << ISC00;                    /* both edges of 2 and 3 */
+  EIMSK = 1 << INT0 | 1 << INT1;
+  sei();
+  UBRR0 = 16;
+  UCSR0A = 1 << U2X0;
+  UCSR0B = 1 << TXEN0;
+  ways(1, 1); power(150); _delay_ms(700);
+  ways(-1, -1); _delay_ms(900);
+  ways(0, 0); _delay_ms(300);
+  for (int i = 0; i < 2; i++) {
+    put((i ? right : left) >> 8); put(i ? right : left);
+  }
+  for (;;) {}
+}
+"""
+
+
+def test_encoders_are_on_any_pins(tmp_path: Path) -> None:
+    """One channel at INT0 counts its edges whichever way; two channels at INT1 and 10 count periods with their sign."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'extends = "rover"\nname = "mine"\nremove = ["line_left", "line_right", "turret", "sonar"]\n'
+        '[device.encoder_left]\ntype = "encoder"\npin = 2\nedges_per_turn = 40\n'
+        '[device.encoder_right]\ntype = "quadrature_encoder"\npin_a = 3\npin_b = 10\nedges_per_turn = 80\n'
+    )
+    file = program(tmp_path, COUNT)
+    without = ["encoder_errors", "slip"]
+    run = boebot.run(file, robot=mine, arena="empty", seconds=2, without=without)
+    data = b"".join(data for _, data in run.record.rows("to_host"))
+    left, right = (int.from_bytes(data[i : i + 2], "big", signed=True) for i in (0, 2))
+    truth, turn_m = run.truth, 2 * math.pi * run.robot.body.wheel_radius_m
+    assert truth is not None and truth.right_speed is not None and truth.left_speed is not None
+    rolled = (
+        float(np.trapezoid(truth.right_speed, truth.time)),
+        float(np.trapezoid(np.abs(truth.left_speed), truth.time)),
+    )
+    assert rolled[0] < -0.02, "farther back than forth"
+    assert right == pytest.approx(rolled[0] / turn_m * 20, abs=1.1)
+    assert left == pytest.approx(rolled[1] / turn_m * 40, abs=2.1)
+    assert run.series.number("encoder_right", "count")[-1] == pytest.approx(rolled[0] / turn_m * 80, abs=1.1)
+    ahead = float(np.trapezoid(truth.left_speed, truth.time))
+    assert run.series.number("encoder_left", "count")[-1] == pytest.approx(ahead / turn_m * 40, abs=1.1)

@@ -64,7 +64,13 @@ static void step(part *base) {
   }
 }
 
-static const part_operations OPERATIONS = {.step = step};
+static int read(part *base, double *values) {
+  const encoder *self = (encoder *)base;
+  *values = (double)(self->index - self->first);
+  return 1;
+}
+
+static const part_operations OPERATIONS = {.step = step, .read = read};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   encoder *self = (encoder *)base;
@@ -75,7 +81,7 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   self->edges_per_rad = (double)p->edges_per_turn / (2.0 * NUMBERS_PI);
   self->phase = noise_next_uniform(&base->noise); /* 0.5 without noise */
   self->position = wheel_angle(self) * self->edges_per_rad + self->phase;
-  self->index = number_floor(self->position);
+  self->index = self->first = number_floor(self->position);
   part_drive(base, 0, pins[0], level_a(self, self->index));
   part_drive(base, 0, pins[1], level_b(self->index));
   return 0;

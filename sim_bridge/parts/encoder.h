@@ -30,10 +30,11 @@ typedef struct {
   double phase;    /* edges: where the disc stands at angle 0, in [0, 1) */
   double position; /* edges, at the end of the last step */
   long long index; /* its whole part */
+  long long first; /* and at power-on */
 } encoder;
 
 /* python: begin */
-/* At a wheel; parameters: encoder_parameters. Pins: channels A and B, or PART_NO_PIN. */
+/* At a wheel. Shows the edges that passed it, forward less backward. Parameters: encoder_parameters. Pins: channels A and B, or PART_NO_PIN. */
 extern const part_kind encoder_kind;
 /* python: end */
 

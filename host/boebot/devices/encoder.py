@@ -3,7 +3,8 @@
     distance = 2 pi r n / N,   speed = 2 pi r / (N t_edge)
 A single-channel encoder knows no direction: its count only grows, its speed is never negative.
 
-The pins are of port C (A0 to A5), whose interrupt stamps the edges.
+The kit's firmware stamps edges by the interrupt of port C, pins A0 to A5; programs of one's own have them on any pin,
+such as 2 and 3 for attachInterrupt.
 
     [device.encoder_left]
     type = "encoder"
@@ -20,6 +21,7 @@ from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
+import numpy as np
 
 from boebot.devices.device import ANALOG_PINS, FIVE_VOLTS, GROUND, Checkup, Column, Device, Place, Reader, Run, Wire
 from boebot.link.messages import Status, Telemetry
@@ -87,7 +89,10 @@ class WheelEncoder(Device, frozen=True, kw_only=True):
         return read
 
     def columns(self, place: Place, run: Run) -> list[Column]:
-        """Edges counted, and the time between the last two."""
+        """Edges counted, and the time between the last two; of a program's run the edges that passed it, forward less
+        backward."""
+        if "values" in (run.raw.dtype.names or ()):
+            return [Column("count", "", run.values(place.name)[:, 0].astype(np.int64), None)]
         side = place.name.removeprefix("encoder_")
         return [
             Column("count", "", run.raw[place.name], None),
