@@ -18,6 +18,7 @@ from boebot.arenas.floor_plan import Lateness, Shift
 from boebot.arguments import point, shown, whole
 from boebot.boards import TruthNow
 from boebot.description import robots
+from boebot.devices.display import letters_of
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.record.blocks import Block, Group, group_of
 from sim_bridge._core import ffi, lib
@@ -484,6 +485,15 @@ class SimRobot:
         lib.vehicles_sense(vehicle, 0)
         count = vehicle.model.readings
         return tuple(ffi.unpack(vehicle.readings, count)) if count else ()
+
+    def texts(self) -> dict[str, str]:
+        """What displays at its board show, line by line: by device and number of the line, from 1."""
+        room, found = ffi.new("uint8_t[]", lib.DISPLAY_LINES * lib.DISPLAY_LETTERS), {}
+        for name, number in self.parts.items():
+            for line in range(lib.robot_read_letters(self.handle, number, room)):
+                codes = ffi.buffer(room)[line * lib.DISPLAY_LETTERS : (line + 1) * lib.DISPLAY_LETTERS]
+                found[f"{name}_{line + 1}"] = letters_of(codes)
+        return found
 
     def signals(self, left: float, right: float) -> None:
         """Motor signals from now on, of a robot without a board; what is beyond -1 to 1 is limited.

@@ -190,6 +190,9 @@ class BoardSession(Session, Protocol):
     def transport(self) -> Transport:
         """The bytes to and from the board."""
 
+    def texts(self) -> Mapping[str, str]:
+        """What displays at a simulated board show now, by names for people; empty of a real one."""
+
     def watchdog_resets(self) -> Sequence[WatchdogReset]:
         """Those so far, oldest first; empty where nobody sees into the board."""
 
@@ -310,6 +313,10 @@ class LiveSession:
     def readings(self) -> tuple[float, ...]:
         """Nobody sees what is wired to a real board."""
         return ()
+
+    def texts(self) -> Mapping[str, str]:
+        """Nor that."""
+        return {}
 
     def set_part(self, device: str, value: float) -> None:
         """By hand only."""

@@ -72,6 +72,9 @@ int robot_add_part(robot *self, const part_kind *kind, int index, const uint8_t 
  * another; returns how many numbers. */
 int robot_read_parts(robot *self, int first, double *values);
 
+/* The letters that the part of that number shows, up to DISPLAY_LINES lines of DISPLAY_LETTERS codes; returns how many. */
+int robot_read_letters(const robot *self, int number, uint8_t *codes);
+
 /* A person works the part of that number. Returns SIM_OK or an error: it cannot be set so. */
 int robot_set_part(robot *self, int number, double value);
 

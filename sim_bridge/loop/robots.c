@@ -26,6 +26,11 @@ int robot_read_parts(robot *self, int first, double *values) {
   return count;
 }
 
+int robot_read_letters(const robot *self, int number, uint8_t *codes) {
+  part *p = self->parts[number];
+  return p->op->letters == NULL ? 0 : p->op->letters(p, codes);
+}
+
 int robot_set_part(robot *self, int number, double value) {
   part *p = self->parts[number];
   return p->op->set != NULL && p->op->set(p, value) == 0 ? SIM_OK : SIM_BAD_ARGUMENT;

@@ -98,6 +98,9 @@ typedef struct {
   /* What pages show of it, now or since they last asked: fills in up to PART_READINGS numbers, and returns how many. */
   int (*read)(part *self, double *values);
 
+  /* What it shows in letters, line by line, as codes of its kind; returns how many lines. */
+  int (*letters)(part *self, uint8_t *codes);
+
   /* A person works it: a button, a knob. Returns 0, or -1: it cannot be set so. */
   int (*set)(part *self, double value);
 } part_operations;

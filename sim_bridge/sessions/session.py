@@ -164,6 +164,10 @@ class SimSession(InWorld):
             "true_supply_v": self.robot.supply_voltage,
         }
 
+    def texts(self) -> dict[str, str]:
+        """See `boebot.boards.BoardSession`."""
+        return self.robot.texts()
+
     def pins_now(self) -> list[PinNow]:
         """See `boebot.boards.ShowsPins`."""
         return self.board.now()

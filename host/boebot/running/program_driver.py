@@ -73,6 +73,8 @@ class ProgramDriver(Driver):
         values = self.session.readings()
         readings = Readings(tick, int(StatusBits.MOTORS_ENABLED), (0.0,) * len(values), values)
         self.task.record.append_readings(time_s, readings, 0.0, 0.0)
+        for name, text in self.session.texts().items():
+            self.robot.showing.show(time_s, name, text)
 
     def type(self, text: str) -> None:
         """See `boebot.running.driver.Driver`."""

@@ -18,6 +18,7 @@ from boebot.cli.ending import Detail, print_run
 from boebot.cli.options import magnitudes
 from boebot.description.robots import RobotDescription, load_robot, magnitude, owners, robot_names
 from boebot.devices.accelerometer import Accelerometer
+from boebot.devices.display import Display
 from boebot.devices.input import Button, Potentiometer
 from boebot.devices.led import Led
 from boebot.devices.light import Phototransistor
@@ -41,6 +42,7 @@ WIRED = {  # parts that no bundled robot has
     "led": Led(pin=6),
     "start": Button(pin=2),
     "dial": Potentiometer(pin="A0"),
+    "display": Display(rs_pin=12, enable_pin=11, d4_pin=3, d5_pin=4, d6_pin=5, d7_pin=9),
     "sonar": UltrasonicSensor(trigger_pin=7, echo_pin=8, position_m=(0.05, 0.0)),
 }
 ROBOTS = [

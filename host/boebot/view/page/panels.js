@@ -18,6 +18,7 @@ function makePanels() {
   cells.lamps.forEach(lamp => lamp.setAttribute("role", "img"));
   $("lamps").replaceChildren(...cells.lamps);
   hide("sensors", !run.signs.length);
+  say("shownName", run.program ? "What it shows" : "What the brain shows");
   hide("mind", !run.mind);
   hide("motors", run.program); // it does not say what they get
   if (!pageIsLive) hide("printed", !run.printed.length);
