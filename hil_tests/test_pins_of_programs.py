@@ -131,7 +131,7 @@ def test_a_parser_of_others_reads_pins_line_and_inputs(run: Path) -> None:
     found = VCDVCD(str(save_pins(read_run(run).robots, run)))
     assert float(found.timescale["timescale"]) == pytest.approx(1e-10)
     signal = {name.split(".")[1]: found[name].tv for name in found.references_to_ids}
-    assert len(signal) == 20 and {"D9_infrared_left", "D13_servo_left", "A2_encoder_left", "D4"} <= signal.keys()
+    assert len(signal) == 20 and {"D9_infrared_left", "D13_servo_left_L", "A2_encoder_left", "D4"} <= signal.keys()
     nine = signal["D9_infrared_left"]
     rises = [time for time, value in nine if value == "1"]
     widths = [min(time for time, value in nine if time > rise) - rise for rise in rises]
@@ -139,8 +139,8 @@ def test_a_parser_of_others_reads_pins_line_and_inputs(run: Path) -> None:
     six = signal["D6"]
     times = [time for time, _ in six][-5:]
     assert {times[2] - times[0], times[3] - times[1]} == {64 * 256 * 625}  # a period of Timer0 at clk/64
-    assert level(signal["D4"], 1e8) == "1" and level(signal["D13_servo_left"], 0) == "z"
-    assert level(signal["D13_servo_left"], 0.15 * TICKS_PER_S) == "z"  # let go
+    assert level(signal["D4"], 1e8) == "1" and level(signal["D13_servo_left_L"], 0) == "z"
+    assert level(signal["D13_servo_left_L"], 0.15 * TICKS_PER_S) == "z"  # let go
     assert level(signal["D5_whisker_left"], 1e8) == "1"  # by the part's resistor
     slow, fast = 16 * 208 * 625, 16 * 26 * 625
     assert read_uart(signal["D0_uart"], (slow,), 0.1 * TICKS_PER_S) == b"e"
