@@ -34,7 +34,7 @@ static void plan(avr_board *b, uint64_t cycle) { set_due(b, DUE_SPI, cycle); }
 static void put(avr_board *b, uint64_t cycle) {
   const spi_state *s = &b->spi;
   port_state *p = &b->port[PORT_B];
-  const bool clock = !(s->control & CPOL) == (s->half & 1);
+  const bool clock = ((s->control & CPOL) != 0) != (s->half & 1);
   p->shifted = is_master(b) ? MOSI | SCK : 0;
   p->shifted_level = (uint8_t)(((s->bit ? MOSI : 0) | (clock ? SCK : 0)) & p->shifted);
   p->forced_in = 0;
@@ -66,7 +66,7 @@ static void sample_bit(avr_board *b) {
 void spi_due(avr_board *b, uint64_t cycle) {
   spi_state *s = &b->spi;
   s->half++;
-  if ((s->half & 1) == !(s->control & CPHA)) {
+  if ((s->half & 1) != ((s->control & CPHA) != 0)) {
     sample_bit(b);
   } else if (s->half < HALVES) {
     set_up_bit(s);
