@@ -15,6 +15,8 @@ from boebot.description.robots import load_robot, robot_names
 from boebot.description.wiring import connections
 from boebot.devices.battery import BatteryDivider
 from boebot.devices.device import FIVE_VOLTS, GROUND, PACK, SERVO_POWER, kinds
+from boebot.devices.input import Potentiometer, SlideSwitch
+from boebot.devices.led import Led
 from boebot.view import robot_picture
 from command import boebot
 
@@ -134,11 +136,12 @@ def test_robot_without_a_board_is_shown_without_wiring(
 def test_every_pin_of_every_kind_of_device_has_its_wire() -> None:
     supplies = {FIVE_VOLTS, GROUND, PACK, SERVO_POWER}
     seen = set()
-    for name in robot_names():
-        for device in load_robot(name).device.values():
-            pins = [wire.pin for wire in device.wires() if wire.pin not in supplies]
-            assert sorted(pins) == sorted(device.PINS)
-            seen.add(type(device))
+    devices = [device for name in robot_names() for device in load_robot(name).device.values()]
+    devices += [SlideSwitch(pin=2, to="supply", resistor=True), Potentiometer(pin="A0"), Led(pin=6, to="supply")]
+    for device in devices:
+        pins = [wire.pin for wire in device.wires() if wire.pin not in supplies]
+        assert sorted(pins) == sorted(device.PINS)
+        seen.add(type(device))
     assert {kind for kind in kinds() if kind.PINS} <= seen
 
 

@@ -49,7 +49,7 @@ def test_without_a_column_all_are_named(capsys: pytest.CaptureFixture[str], fold
 
 def test_options_of_another_way_are_refused(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     for asked, sentence in {
-        ("report", str(folder), "--as", "csvv"): "there is no format 'csvv'; expected one of csv, foxglove, can.",
+        ("report", str(folder), "--as", "csvv"): "there is no format 'csvv'; expected one of csv, foxglove, vcd, can.",
         ("report", str(folder), "tick"): "COLUMN, --robot and --out go with --plot",
         ("replay", str(folder)): "expected --brain BRAIN, or --again",
         ("replay", str(folder), "--brain", "wander", "--trust"): "expected --again with --trust",
