@@ -6,12 +6,14 @@ import hashlib
 import json
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
+from live.test_live_view import Page, Run
 from typer.testing import CliRunner
 
 import boebot
@@ -209,6 +211,26 @@ def test_a_program_has_no_commands_to_replay(program: Path, tmp_path: Path) -> N
 
 def test_an_outside_that_follows_reads_each_frame_at_its_own_rate(build: Callable[..., Path]) -> None:
     assert printed(boebot.run(build(1200, "-DRATES"), seconds=0.2, typed=[("go", 0.1)])) == b"slow fast GO"
+
+
+def test_page_and_script_type_in_one_run_and_the_page_has_its_pins(program: Path) -> None:
+    run = Run("run", str(program), "--view", "--seconds", "inf", "--type", "script\n@0.1")
+    try:
+        with run.stream() as stream:
+            page = Page(stream)
+            begun = page.until("run")
+            assert "type" in begun["live"]["can"] and begun["live"]["robots"][0]["pins"][1] == "1 uart"
+            page.do("typed", text="page\n")
+            state = page.state(lambda state: state["touched"] == 1 and state["robots"][0]["pins"])
+            assert state["robots"][0]["pins"][1][:2] == [1, 1]  # an output, and high: its line rests
+            page.do("stop")
+            refused = page.until("refused")["sentence"]
+            assert refused.startswith("a program drives this robot, no brain")
+    finally:
+        run.process.send_signal(signal.SIGINT)
+        code, printed, error = run.end()
+    assert (code, "Traceback" in error) == (130, False)
+    assert re.search(r"  SCRIPT\n", printed) and re.search(r"  PAGE\n", printed), printed
 
 
 def test_its_pulses_turn_the_wheel_on_that_pin(program: Path, tmp_path: Path) -> None:

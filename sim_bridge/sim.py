@@ -402,6 +402,7 @@ class SimRobot:
         self._received = ffi.addressof(self._robot, "received")
         self._room = ffi.new("uint8_t[]", ROOM)
         self._view = ffi.buffer(self._room)
+        self._displays: dict[str, int] | None = None  # numbers of parts that show letters, once somebody has asked
 
     @property
     def board(self) -> EmulatedBoard:
@@ -489,7 +490,12 @@ class SimRobot:
     def texts(self) -> dict[str, str]:
         """What displays at its board show, line by line: by device and number of the line, from 1."""
         room, found = ffi.new("uint8_t[]", lib.DISPLAY_LINES * lib.DISPLAY_LETTERS), {}
-        for name, number in self.parts.items():
+        if self._displays is None:
+            shown = (
+                (name, number, lib.robot_read_letters(self.handle, number, room)) for name, number in self.parts.items()
+            )
+            self._displays = {name: number for name, number, lines in shown if lines}
+        for name, number in self._displays.items():
             for line in range(lib.robot_read_letters(self.handle, number, room)):
                 codes = ffi.buffer(room)[line * lib.DISPLAY_LETTERS : (line + 1) * lib.DISPLAY_LETTERS]
                 found[f"{name}_{line + 1}"] = letters_of(codes)
