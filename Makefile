@@ -112,6 +112,7 @@ pictures:
 	@cp build/pictures/explored/run.png docs/images/explored.png
 	@$(PYTHON_VENV) -m tools.arena_pages --pictures
 	@$(VENV)/bin/boebot show robot shieldbot --out docs/images/robot-shieldbot.svg
+	@$(VENV)/bin/boebot show robot rover --out docs/images/robot-rover.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 	@$(VENV)/bin/boebot run wander --arena room --seconds 30 --out build/pictures/can

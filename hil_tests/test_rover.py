@@ -82,7 +82,7 @@ static unsigned look(unsigned us, int frames) {       /* there, and mm to what t
 enum { RIGHT = 544, AHEAD = 1472, LEFT = 2400 };      /* as Servo.write(0), (90), (180) */
 int main(void) {
   begin();
-  DDRC = 1 << 5;
+  DDRC = 1 << 5 | 1 << 3;
   TCCR1B = 1 << CS11 | 1 << CS10;                     /* 4 us */
   UBRR0 = 16;
   UCSR0A = 1 << U2X0;
@@ -91,11 +91,11 @@ int main(void) {
   print(look(RIGHT, 40));
   look(AHEAD, 30);
   for (;;) {
-    PORTB &= ~(1 << 5);
+    PORTC &= ~(1 << 3);
     ways(1, 1); power(100);
     while (look(AHEAD, 1) > 500) {}
     ways(0, 0); power(255);
-    PORTB |= 1 << 5;                                  /* the lamp, while it looks about */
+    PORTC |= 1 << 3;                                  /* the lamp, A3, while it looks about */
     unsigned left = look(LEFT, 25), right = look(RIGHT, 40);
     print(left); print(right);
     look(AHEAD, 25);
