@@ -214,13 +214,14 @@ def test_an_outside_that_follows_reads_each_frame_at_its_own_rate(build: Callabl
 
 
 def test_page_and_script_type_in_one_run_and_the_page_has_its_pins(program: Path) -> None:
-    run = Run("run", str(program), "--view", "--seconds", "inf", "--type", "script\n@0.1")
+    run = Run("run", str(program), "--view", "--seconds", "inf", "--type", "file\n@0.1")
     try:
         with run.stream() as stream:
             page = Page(stream)
             begun = page.until("run")
             assert "type" in begun["live"]["can"] and begun["live"]["robots"][0]["pins"][1] == "1 uart"
             page.do("typed", text="page\n")
+            page.until("chunk", where=lambda chunk: "PAGE" in chunk["printed"])
             state = page.state(lambda state: state["touched"] == 1 and state["robots"][0]["pins"])
             assert state["robots"][0]["pins"][1][:2] == [1, 1]  # an output, and high: its line rests
             page.do("stop")
@@ -230,7 +231,7 @@ def test_page_and_script_type_in_one_run_and_the_page_has_its_pins(program: Path
         run.process.send_signal(signal.SIGINT)
         code, printed, error = run.end()
     assert (code, "Traceback" in error) == (130, False)
-    assert re.search(r"  SCRIPT\n", printed) and re.search(r"  PAGE\n", printed), printed
+    assert re.search(r"  FILE\n", printed) and re.search(r"  PAGE\n", printed), printed
 
 
 def test_its_pulses_turn_the_wheel_on_that_pin(program: Path, tmp_path: Path) -> None:
