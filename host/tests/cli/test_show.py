@@ -15,6 +15,7 @@ from boebot.description.robots import load_robot, robot_names
 from boebot.description.wiring import connections
 from boebot.devices.battery import BatteryDivider
 from boebot.devices.device import FIVE_VOLTS, GROUND, PACK, SERVO_POWER, kinds
+from boebot.devices.display import Display
 from boebot.devices.input import Potentiometer, SlideSwitch
 from boebot.devices.led import Led
 from boebot.view import robot_picture
@@ -138,6 +139,7 @@ def test_every_pin_of_every_kind_of_device_has_its_wire() -> None:
     seen = set()
     devices = [device for name in robot_names() for device in load_robot(name).device.values()]
     devices += [SlideSwitch(pin=2, to="supply", resistor=True), Potentiometer(pin="A0"), Led(pin=6, to="supply")]
+    devices.append(Display(rs_pin=12, enable_pin=11, d4_pin=5, d5_pin=4, d6_pin=3, d7_pin=2))
     for device in devices:
         pins = [wire.pin for wire in device.wires() if wire.pin not in supplies]
         assert sorted(pins) == sorted(device.PINS)
@@ -157,7 +159,8 @@ def test_battery_is_divided_by_its_ratio(ratio: float) -> None:
     assert (upper + lower) / lower == ratio
 
 
-def test_picture_in_the_docs_is_of_this_kit(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["shieldbot", "rover"])
+def test_picture_in_the_docs_is_of_this_kit(name: str, tmp_path: Path) -> None:
     """`make pictures` renews it."""
-    shown = Path(__file__).parents[3] / "docs" / "images" / "robot-shieldbot.svg"
-    assert texts(shown) == texts(robot_picture.write(load_robot("shieldbot"), tmp_path / "now.svg"))
+    shown = Path(__file__).parents[3] / "docs" / "images" / f"robot-{name}.svg"
+    assert texts(shown) == texts(robot_picture.write(load_robot(name), tmp_path / "now.svg"))
