@@ -274,7 +274,10 @@ def test_csv_has_no_columns_of_what_the_host_does_not_know(program: Path, tmp_pa
     assert command("report", tmp_path, "--as", "csv").returncode == 0
     heading = (tmp_path / "run.csv").read_text().splitlines()[0].split(",")
     truth = ["true_x_m", "true_y_m", "true_heading_rad", "true_contact"]
-    parts = ["whisker_left_pressed", "whisker_right_pressed", "ping_distance_m", "ping_age_s", "L_brightness", "L_lit"]
+    seen = (
+        "encoder_left_count encoder_right_count whisker_left_pressed whisker_right_pressed ping_distance_m ping_age_s"
+    )
+    parts = [*seen.split(), "L_brightness", "L_lit"]
     assert heading == ["time_s", "tick", *parts, *truth], "parts show themselves, and the board its LED"
     assert (tmp_path / "to_host.bin").read_bytes() == b"ready\r\n"
     summary = json.loads((tmp_path / "summary.json").read_text())

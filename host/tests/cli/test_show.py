@@ -140,6 +140,7 @@ def test_every_pin_of_every_kind_of_device_has_its_wire() -> None:
     devices = [device for name in robot_names() for device in load_robot(name).device.values()]
     devices += [SlideSwitch(pin=2, to="supply", resistor=True), Potentiometer(pin="A0"), Led(pin=6, to="supply")]
     devices.append(Display(rs_pin=12, enable_pin=11, d4_pin=5, d5_pin=4, d6_pin=3, d7_pin=2))
+    devices.append(Display(rs_pin=12, enable_pin=11, d4_pin=5, d5_pin=4, d6_pin=3, d7_pin=2))
     for device in devices:
         pins = [wire.pin for wire in device.wires() if wire.pin not in supplies]
         assert sorted(pins) == sorted(device.PINS)
