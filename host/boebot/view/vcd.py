@@ -35,6 +35,7 @@ TICKS = 10**12 // TICK_PS // CLOCK_HZ  # 625 in a cycle
 LOW, HIGH, RELEASED, PULLED_UP = range(4)
 RX, TX = 0, 1  # pins of the serial line
 BOARD, OUTSIDE, LINE_OUT = range(3)  # who does something to a pin
+AT_ONCE = 100_000  # changes that Python looks at
 LINE_BITS = 13  # of a frame, at most: start, nine data bits, parity, two stop bits
 PIN = np.dtype([("pin", "u1"), ("level", "u1")])
 
@@ -97,11 +98,12 @@ def values(record: Record) -> Iterator[tuple[int, int, str]]:
     order = np.argsort(all_of.ticks, kind="stable")
     state = [[RELEASED, RELEASED, HIGH] for _ in range(PINS)]  # of each pin, by who
     shown = ["z"] * PINS
-    for tick, pin, who, level in zip(*(column[order].tolist() for column in all_of), strict=True):
-        state[pin][who] = level
-        if (value := _value(*state[pin])) != shown[pin]:
-            shown[pin] = value
-            yield tick, pin, value
+    for some in np.array_split(order, len(order) // AT_ONCE + 1):
+        for tick, pin, who, level in zip(*(column[some].tolist() for column in all_of), strict=True):
+            state[pin][who] = level
+            if (value := _value(*state[pin])) != shown[pin]:
+                shown[pin] = value
+                yield tick, pin, value
 
 
 def _value(board: int, outside: int, line_out: int) -> str:
