@@ -20,6 +20,7 @@ from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.served_ports import listening
 
 LOOK_S = 0.1  # between two looks for Ctrl-C while nothing comes
+SEND_S = 5.0  # a client that takes nothing for that long has gone
 PACKET_MAXIMUM = 0x1000  # bytes
 DATA, DATA_END = 0x800000, 0x800900  # where gdb has the data space
 FLASH_END = 0x8000
@@ -52,12 +53,6 @@ class Gdb:
         self._goes_on = True
         self._is_closed = False
         self._debug = board.debug(self._called)
-        self._halts = {
-            board.lib.AVR_INTERRUPTED: b"S02",
-            board.lib.AVR_CRASHED: b"S0B",
-            board.lib.AVR_STEPPED: b"S05",
-            board.lib.AVR_REACHED: b"S05",
-        }
         self.port = int(self._listener.getsockname()[1])
         what = "the program waits for a debugger" if waits else "a debugger may come"
         print(
@@ -75,7 +70,8 @@ class Gdb:
             if why == self._board.lib.AVR_LOOKS:
                 self._look()
             elif self._client is not None:
-                self._halt(self._halts.get(why) or b"T05watch:%x;" % (DATA + self._debug.accessed))
+                is_watch = why == self._board.lib.AVR_WATCHED
+                self._halt(b"T05watch:%x;" % (DATA + self._debug.accessed) if is_watch else b"S%02X" % why)
         except OSError:
             self._leave()
         except BaseException as error:
@@ -101,7 +97,13 @@ class Gdb:
             self._send(stop)
         self._goes_on = self._is_awaited = False
         while not self._goes_on:
-            self._answer(self._packet())
+            packet = self._packet()
+            try:
+                reply = self._reply(packet[:1], packet[1:])
+            except ValueError:
+                reply = b"E01"
+            if reply is not None:
+                self._send(reply)
 
     # ---- the line ----
 
@@ -120,6 +122,7 @@ class Gdb:
             newcomer, _ = self._listener.accept()
             if self._client is None:
                 newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                newcomer.settimeout(SEND_S)
                 self._client, self._received, self._debug.interrupted = newcomer, b"", True
             else:
                 newcomer.close()
@@ -178,16 +181,8 @@ class Gdb:
 
     # ---- packets ----
 
-    def _answer(self, packet: str) -> None:
-        try:
-            reply = self._reply(packet[:1], packet[1:])
-        except ValueError:
-            reply = b"E01"
-        if reply is not None:
-            self._send(reply)
-
     def _reply(self, kind: str, rest: str) -> bytes | None:
-        """None: none, or it is sent."""
+        """The answer to a packet. None: there is none, or it is sent. ValueError: it is wrong."""
         if kind == "?":
             return self._stop
         if kind == "g":

@@ -21,7 +21,7 @@ struct avr_debugging {
   instruction_stops stops;
   uint8_t watched[BOARD_DATA_SIZE];
   uint64_t halted_at; /* cycle of the last halt: from there it goes on */
-  avr_halt access;    /* of a watched cell by the last instruction; AVR_LOOKS: none */
+  bool accessed;      /* a watched cell, by the last instruction */
 };
 
 /* ---- while it runs ---- */
@@ -40,7 +40,7 @@ static bool call(avr_board *b, avr_halt why) {
 static bool halt(avr_board *b, avr_halt why) {
   struct avr_debugging *g = b->debug;
   g->face.stepping = g->face.interrupted = false;
-  g->access = AVR_LOOKS;
+  g->accessed = false;
   g->halted_at = b->avr->cycle;
   return call(b, why);
 }
@@ -54,9 +54,9 @@ bool debug_before(avr_board *b) {
   const uint32_t pc = (uint32_t)b->avr->pc;
   if (g->face.interrupted) return halt(b, AVR_INTERRUPTED);
   if (b->sleeping || g->halted_at == b->avr->cycle) return true;
-  if (g->access != AVR_LOOKS) return halt(b, g->access);
-  if (pc < AVR_BOARD_FLASH_SIZE && g->stops.marked[pc / 2u]) return halt(b, AVR_REACHED);
-  return !g->face.stepping || halt(b, AVR_STEPPED);
+  if (g->accessed) return halt(b, AVR_WATCHED);
+  const bool marked = pc < AVR_BOARD_FLASH_SIZE && g->stops.marked[pc / 2u];
+  return !(marked || g->face.stepping) || halt(b, AVR_TRAPPED);
 }
 
 static void look_at_access(const avr_board *b, struct avr_debugging *g) {
@@ -65,7 +65,7 @@ static void look_at_access(const avr_board *b, struct avr_debugging *g) {
     const uint16_t cell = (uint16_t)(access.first + i);
     const uint8_t kind = access.writes ? AVR_WATCH_WRITE : AVR_WATCH_READ;
     if (cell >= BOARD_DATA_SIZE || !(g->watched[cell] & kind)) continue;
-    g->access = access.writes ? AVR_WROTE : AVR_READ;
+    g->accessed = true;
     g->face.accessed = cell;
   }
 }

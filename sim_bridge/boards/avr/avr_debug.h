@@ -15,14 +15,14 @@
 #include "../board.h"
 
 /* python: begin */
+/* Why the program stands still, by the number of the signal that says it; AVR_LOOKS: it runs, and whoever wants to stop it
+ * is asked now and then. */
 typedef enum {
-  AVR_LOOKS, /* it runs: now and then, for whoever wants to stop it */
-  AVR_INTERRUPTED,
-  AVR_STEPPED,
-  AVR_REACHED, /* a breakpoint; the instruction there is the next one */
-  AVR_READ,    /* the last instruction has read a watched cell, */
-  AVR_WROTE,   /* or written one */
-  AVR_CRASHED
+  AVR_LOOKS = 0,
+  AVR_WATCHED = 1, /* the last instruction has read or written a watched cell */
+  AVR_INTERRUPTED = 2,
+  AVR_TRAPPED = 5, /* behind a step, or before the instruction at a breakpoint */
+  AVR_CRASHED = 11
 } avr_halt;
 
 /* Returns 0 for the program to go on; else `advance` ends with BOARD_STOPPED. */
