@@ -14,8 +14,9 @@ typedef struct {
   uint64_t until;          /* up to there */
   double speed;            /* of the shaft when it began, rad/s */
   double carried;          /* by the gear to the wheel, N m, mean of some pulses */
-  double shown;            /* A s since it was last asked */
-  uint64_t shown_since;
+  double through;          /* A s through the motor since power-on */
+  double through_then;     /* when it was last asked */
+  uint64_t asked;          /* and that cycle */
 } h_bridge;
 
 static int switches(const h_bridge *self) {
@@ -31,7 +32,7 @@ static void pass(h_bridge *self, uint64_t cycle) {
   const double before = self->flow.charge;
   h_bridge_run(&p->bridge, &p->motor, &self->flow, switches(self), self->part.chassis->pack_v, self->speed,
                (double)(cycle - self->until) / BOARD_CLOCK_HZ);
-  self->shown += self->flow.charge - before;
+  self->through += self->flow.charge - before;
   self->until = cycle;
 }
 
@@ -71,13 +72,15 @@ static void before_step(part *base) {
   self->flow.charge = self->flow.drawn = 0.0;
 }
 
+/* Of a copy: who looks at it changes no bit of the run. */
 static int read(part *base, double *values) {
   h_bridge *self = (h_bridge *)base;
-  pass(self, base->chassis->board->op->now(base->chassis->board));
-  const double seconds = (double)(self->until - self->shown_since) / BOARD_CLOCK_HZ;
-  *values = seconds > 0.0 ? self->shown / seconds : self->flow.current;
-  self->shown = 0.0;
-  self->shown_since = self->until;
+  h_bridge now = *self;
+  pass(&now, base->chassis->board->op->now(base->chassis->board));
+  const double seconds = (double)(now.until - self->asked) / BOARD_CLOCK_HZ;
+  *values = seconds > 0.0 ? (now.through - self->through_then) / seconds : now.flow.current;
+  self->through_then = now.through;
+  self->asked = now.until;
   return 1;
 }
 
@@ -90,7 +93,7 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   self->parameters = *(const h_bridge_part_parameters *)parameters;
   self->side = place->index;
   self->is_high[ENABLE] = pins[ENABLE] == PART_NO_PIN;
-  self->until = self->shown_since = place->chassis->board->op->now(place->chassis->board);
+  self->until = self->asked = place->chassis->board->op->now(place->chassis->board);
   return self->parameters.motor.resistance_ohm > 0.0 ? 0 : -1;
 }
 

@@ -198,3 +198,18 @@ def test_what_is_wrong_gets_a_sentence(tmp_path: Path) -> None:
     file.write_text(f'extends = "rover"\n[device.wheel]\n{servo}')
     with pytest.raises(RobotError, match=r"device\.wheel: motor_left and wheel both turn the left wheel; expected one"):
         load_robot(file)
+
+
+def test_who_looks_changes_no_bit() -> None:
+    ends = []
+    for looks in (1, 7):
+        robot = scripted(robot=ROVER, noise=True)
+        drive(robot, 0.0, "forward", "back")
+        for at in range(1, 600):
+            robot.edge(at * 8192, ENA, at % 2)
+        for _ in range(looks):
+            robot.run(0.21 / looks)
+            amperes(robot)
+        body = robot.robot.body()
+        ends.append((robot.sim.cycle, body.x, body.heading, robot.robot.handle.battery.supply.charge))
+    assert ends[0] == ends[1]
