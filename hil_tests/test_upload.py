@@ -12,17 +12,19 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import serial
 
-from boebot.boards import BoardRequest
+from boebot.boards import BoardRequest, open_port
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.ports import open_serial
 from hil_tests.bootloader import KITS, of_chip
 from sim_bridge.serve import carry
-from sim_bridge.served_ports import PtyPort
+from sim_bridge.served_ports import Port, PtyPort, TcpPort
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sessions.world import AVR, open_on
+from sim_bridge.tests.boards.avr.avr_program import assemble
 from tools.tests.calibration import board
 from tools.tests.calibration.talk import START, Talk
 
@@ -34,11 +36,24 @@ PATIENCE_S = 10.0  # by the wall clock: the bootloader waits one second for a pr
 
 
 @contextmanager
-def served(bootloader: Path) -> Iterator[tuple[str, SimSession]]:
-    """The port of an emulated board, as `boebot serve` offers it."""
-    request = BoardRequest(robot=load_robot("rover"), arena="empty", noise=False, bootloader=str(bootloader))
-    session, port, ended = open_on(AVR, request), PtyPort(board.BAUD), threading.Event()
-    thread = threading.Thread(target=carry, args=(session, port, lambda: not ended.is_set(), lambda _: None))
+def served(
+    bootloader: Path = KITS, image: Path | None = None, *, tcp: bool = False
+) -> Iterator[tuple[str, SimSession]]:
+    """The port of an emulated Uno, as `boebot serve` offers it."""
+    request = BoardRequest(
+        robot=load_robot("rover"),
+        arena="empty",
+        noise=False,
+        image=None if image is None else str(image),
+        bootloader=str(bootloader),
+    )
+    session, ended = open_on(AVR, request), threading.Event()
+    port: Port = TcpPort(0) if tcp else PtyPort(board.BAUD)
+    thread = threading.Thread(
+        target=carry,
+        args=(session, port, lambda: not ended.is_set(), lambda _: None),
+        kwargs={"has_bootloader": True},
+    )
     thread.start()
     try:
         yield port.url, session
@@ -63,7 +78,7 @@ def heard(port: str, question: bytes) -> Iterator[bytes]:
 
 def test_avrdude_writes_the_calibration_program() -> None:
     """And reads it back; then the program begins."""
-    with served(KITS) as (port, _):
+    with served() as (port, _):
         board.flash(port)
         talk = Talk()
         for data in heard(port, START):
@@ -79,12 +94,59 @@ def test_another_chip_is_not_written(tmp_path: Path) -> None:
         board.flash(port)
 
 
+SAYS_HELLO = """
+main: ldi r24, 103 ; 9600 baud
+ sts UBRR0L, r24
+ ldi r24, 0x08
+ sts UCSR0B, r24
+1: lds r25, UCSR0A
+ sbrs r25, 5
+ rjmp 1b
+ ldi r24, 'h'
+ sts UDR0, r24
+ rjmp 1b
+"""
+
+
+def program(folder: Path) -> Path:
+    image = folder / "program.elf"
+    image.write_bytes(assemble(SAYS_HELLO))
+    return image
+
+
+def test_the_boot_loader_waits_for_a_client_that_a_busy_computer_lets_wait(tmp_path: Path) -> None:
+    """Longer than its own second, before the first byte and after another. Then the program goes on as soon as the
+    client leaves."""
+    with served(image=program(tmp_path)) as (port, session):
+        with serial.Serial(port, 115_200, timeout=PATIENCE_S) as client:
+            for pause_s in (1.5, 1.5):
+                time.sleep(pause_s)
+                client.write(b"0 ")
+                assert client.read(2) == b"\x14\x10"
+            assert session.sim.cycle < 1.0 * 16e6
+        end = time.monotonic() + PATIENCE_S
+        while not session.board.counters()["bytes_out"] > 4 and time.monotonic() < end:
+            time.sleep(0.01)
+        assert session.board.counters()["bytes_out"] > 4
+
+
+def test_a_monitor_that_only_listens_meets_the_program_at_its_own_rate(tmp_path: Path) -> None:
+    """A bare TCP port has no rate: the boot loader's is 115,200 bit/s, the program's 9600."""
+    with served(image=program(tmp_path), tcp=True) as (url, _):
+        client = open_port(url, 9600)
+        begun, heard = time.monotonic(), b""
+        while not heard and time.monotonic() < begun + PATIENCE_S:
+            heard = client.read(0.1)
+        client.close()
+        assert set(heard) == set(b"h")
+
+
 @pytest.mark.soak
 def test_the_tutorials_upload_works_as_written() -> None:
     """PlatformIO, avrdude, bootloader, firmware: afterwards the board says who it is."""
     found = re.search(r"^pio (.*)$", TUTORIAL.read_text(), re.MULTILINE)
     assert found
-    with served(KITS) as (port, _):
+    with served() as (port, _):
         words = shlex.split(found[1].replace("/dev/ttyACM0", port))
         done = subprocess.run([ROOT / "tools" / "pio", *words], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr

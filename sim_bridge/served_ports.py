@@ -4,11 +4,17 @@ time."""
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import os
 import select
 import socket
+import struct
 import sys
+from collections.abc import Callable
+from typing import Any
+
+from serial import rfc2217
 
 from boebot.boards import Visit
 from boebot.errors import BoardError
@@ -28,6 +34,8 @@ READ = 4096  # bytes that are read at once
 TCGETS2 = 0x802C542A
 TERMIOS2_SIZE = 44  # Linux: the settings of a terminal with its bit rates as numbers, the last one that of the output
 NO_PAGE = "this port is a robot's serial line, no web page"
+HTTP_METHODS = (b"GET ", b"HEAD ", b"POST ", b"PUT ", b"DELETE ", b"CONNECT ", b"OPTIONS ", b"TRACE ", b"PATCH ")
+HTTP_LONGEST = max(map(len, HTTP_METHODS))
 HTTP_ANSWER = f"HTTP/1.1 403 Forbidden\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n{NO_PAGE}\r\n"
 
 
@@ -51,8 +59,8 @@ class Port:
         raise NotImplementedError
 
     def look(self) -> list[Visit]:
-        """Who came, went and was refused since the last call. Receives what the client sent, up to `BACKLOG` bytes; the
-        rest waits at the client. What earlier clients sent is dropped when another one comes."""
+        """Who came, went, was refused and reset the board since the last call. Receives what the client sent, up to
+        `BACKLOG` bytes; the rest waits at the client. What earlier clients sent is dropped when another one comes."""
         self._look()
         visits, self._visits = self._visits, []
         return visits
@@ -93,6 +101,36 @@ class Port:
         self._client, self._to_client = "", b""
 
 
+class _Openings:
+    """The openings and closings of a file, in their order, where the system says each of them: Linux (inotify(7))."""
+
+    OPEN, CLOSE = 0x20, 0x18
+    EVENT = struct.Struct("iIII")
+
+    def __init__(self, path: str) -> None:
+        self.descriptors: list[int] = []
+        with contextlib.suppress(AttributeError, OSError):
+            library = ctypes.CDLL(None)
+            descriptor = library.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
+            if descriptor >= 0:
+                self.descriptors.append(descriptor)
+                library.inotify_add_watch(descriptor, path.encode(), self.OPEN | self.CLOSE)
+
+    def read(self) -> list[bool]:
+        """Of each since the last call, whether it was an opening."""
+        found: list[bool] = []
+        for descriptor in self.descriptors:
+            with contextlib.suppress(BlockingIOError):
+                events = self.EVENT.iter_unpack(os.read(descriptor, READ // self.EVENT.size * self.EVENT.size))
+                found += [bool(mask & self.OPEN) for _, mask, _, _ in events if mask & (self.OPEN | self.CLOSE)]
+        return found
+
+    def close(self) -> None:
+        """No more of them."""
+        while self.descriptors:
+            os.close(self.descriptors.pop())
+
+
 class PtyPort(Port):
     """The master side of a pseudo-terminal: to programs a serial port of this computer. The other side hangs up when
     its last client closes it."""
@@ -109,33 +147,37 @@ class PtyPort(Port):
         termios.tcsetattr(slave, termios.TCSANOW, settings)
         self.url = os.ttyname(slave)
         os.close(slave)  # from now on the master hears a hang-up while nobody has the other side open
+        self._openings = _Openings(self.url)
+        self._open = 0  # openings that have not been closed
         os.set_blocking(self._master, False)
         self._poll = select.poll()
         self._poll.register(self._master, select.POLLIN)
 
     def wait(self, seconds: float) -> None:
         """See `Port`; a hang-up, which lasts, wakes nobody either."""
-        if self._is_open() and len(self._received) < BACKLOG:
-            self._poll.poll(seconds * 1000)
-        else:
-            select.select([], [], [], seconds)
+        is_heard = self._is_open() and len(self._received) < BACKLOG
+        select.select([*self._openings.descriptors, *([self._master] if is_heard else [])], [], [], seconds)
 
     def _is_open(self) -> bool:
         events = self._poll.poll(0)
         return not (events and events[0][1] & select.POLLHUP)
 
     def _look(self) -> None:
+        for is_opening in self._openings.read():
+            self._open = max(self._open + (1 if is_opening else -1), 0)
+            if is_opening and not self._client:
+                self._came(holder_of(self.url) or "a program")
+            elif self._client and not self._open:
+                self._went()
         is_open = self._is_open()
         if is_open and not self._client:
-            client = holder_of(self.url) or "a program"
-            for _ in range(BACKLOG // READ):  # what the client before has sent; this one may send without a pause
-                self._read()
-            self._came(client)
-            return
+            self._came(holder_of(self.url) or "a program")
         while len(self._received) < BACKLOG and (data := self._read()):
             self._received += data
-        if not is_open and self._client:
-            self._went()
+        if not is_open:
+            self._open = 0
+            if self._client:
+                self._went()
 
     def _read(self) -> bytes:
         try:
@@ -156,7 +198,43 @@ class PtyPort(Port):
 
     def close(self) -> None:
         """Ends the pseudo-terminal."""
+        self._openings.close()
         os.close(self._master)
+
+
+class _SharedLine:
+    """A serial port as pyserial's manager of RFC 2217 wants one, and the connection that it answers on.
+
+    Attributes:
+        baudrate: what the client has set; 0: nothing.
+    """
+
+    bytesize, parity, stopbits = 8, "N", 1
+    xonxoff = rtscts = break_condition = ri = False
+    rts = cts = dsr = cd = True
+
+    def __init__(self, write: Callable[[bytes], None], switched_on: Callable[[], None]) -> None:
+        """`switched_on`: is called when DTR is."""
+        self.write = write
+        self.baudrate = 0
+        self._switched_on = switched_on
+        self._dtr = True
+
+    @property
+    def dtr(self) -> bool:
+        """Data terminal ready, which is wired to an Uno's reset."""
+        return self._dtr
+
+    @dtr.setter
+    def dtr(self, is_on: bool) -> None:
+        was_on, self._dtr = self._dtr, is_on
+        if is_on and not was_on:
+            self._switched_on()
+
+    def reset_input_buffer(self) -> None:
+        """There is none."""
+
+    reset_output_buffer = reset_input_buffer
 
 
 def listening(port: int) -> socket.socket:
@@ -171,8 +249,10 @@ def listening(port: int) -> socket.socket:
 
 class TcpPort(Port):
     """A listening socket and at most one client. Who comes while one is there is refused with a sentence, and so is
-    who speaks HTTP: any page in a browser may ask for a port of this computer. (HTTP begins with a capital letter, a
-    frame with a zero.)
+    who speaks HTTP: any page in a browser may ask for a port of this computer.
+
+    A client that begins with Telnet's IAC speaks RFC 2217: it sets the bit rate, and resets the board by DTR. (A frame
+    begins with a zero, STK500 with 0x30.)
 
     A client that has closed its end while more of its bytes wait than are received cannot be told from one that sends
     too much; either of them gives way to the next client.
@@ -185,6 +265,9 @@ class TcpPort(Port):
         self._listener.setblocking(False)
         self.url = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self._socket: socket.socket | None = None
+        self._begin = b""  # of what the client has sent
+        self._shared: _SharedLine | None = None
+        self._manager: Any = None  # of RFC 2217, where the client speaks that
 
     def wait(self, seconds: float) -> None:
         """See `Port`; a client that comes wakes, too."""
@@ -209,7 +292,7 @@ class TcpPort(Port):
             return
         self._went("it sends more than the line carries")
         newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket, self._is_new = newcomer, True
+        self._socket, self._begin, self._manager, self._shared = newcomer, b"", None, None
         self._came(name)
 
     def _receive(self) -> None:
@@ -223,13 +306,29 @@ class TcpPort(Port):
                 data = b""
             if not data:
                 self._went()
-            elif self._is_new and data[:1].isupper():
+                return
+            is_new, self._begin = not self._begin, (self._begin + data)[:HTTP_LONGEST]
+            if self._begin.startswith(HTTP_METHODS):
                 _send_away(self._socket, HTTP_ANSWER)
                 self._visits.append(Visit("refused", self._client, "it speaks HTTP, as browsers do"))
-                self._socket, self._client, self._to_client = None, "", b""
-            else:
-                self._received += data
-            self._is_new = False
+                self._socket, self._client, self._to_client, self._received = None, "", b"", b""
+                return
+            if is_new and data.startswith(rfc2217.IAC):
+                self._shared = _SharedLine(super().write, self._switched_on)
+                self._manager = rfc2217.PortManager(self._shared, self._shared)  # type: ignore[arg-type]
+            self._received += data if self._manager is None else b"".join(self._manager.filter(data))
+
+    def _switched_on(self) -> None:
+        self._received = b""
+        self._visits.append(Visit("reset", self._client))
+
+    def write(self, data: bytes) -> None:
+        """See `Port`."""
+        super().write(data if self._manager is None else b"".join(self._manager.escape(data)))
+
+    def baud(self) -> int | None:
+        """What the client has set by RFC 2217."""
+        return self._shared.baudrate or None if self._shared is not None else None
 
     def _went(self, why: str = "") -> None:
         if self._socket is not None:

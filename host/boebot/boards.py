@@ -247,7 +247,7 @@ class Visit(NamedTuple):
     """What a client of a served robot did, or what its board notes (`BoardSession.notes`)."""
 
     what: str
-    """"came", "went", "refused" or "notes"."""
+    """"came", "went", "refused", "reset" or "notes"."""
     client: str
     """Its address, or the process that has opened the pseudo-terminal; "the board"."""
     why: str = ""

@@ -73,6 +73,7 @@ typedef struct {
 
 /* uint32_t: byte address in flash of the instruction that crashed the board; NULL: it has not crashed, or nobody knows. */
 #define BOARD_FAULT_ADDRESS "fault address"
+#define BOARD_PROGRAM_COUNTER "program counter" /* uint32_t: byte address of the next instruction */
 
 #define BOARD_WATCHDOG_LOG "watchdog log" /* a board_watchdog_log */
 

@@ -50,6 +50,10 @@ class Pace:
             ahead = 0.0
         return max(0, int(ahead * CLOCK_HZ))
 
+    def forget(self, but_s: float = 0.0) -> None:
+        """Whatever the wall clock is ahead of the simulation, `but_s` excepted, is not caught up."""
+        self._start += max(0.0, self._now() - self._start - self._sim.cycle / CLOCK_HZ - but_s)
+
     def wait(self) -> None:
         """Sleeps until the wall clock has caught up."""
         behind = self._sim.cycle / CLOCK_HZ + self._start - self._now()

@@ -165,11 +165,13 @@ def test_what_the_board_notes_is_heard_while_it_is_served(tmp_path: Path) -> Non
     assert note.why.startswith("the program writes to ACSR at address 0x")
 
 
-def test_what_the_board_notes_just_before_it_crashes_is_heard(tmp_path: Path) -> None:
+def test_a_program_that_crashes_stands_still_until_the_next_reset(tmp_path: Path) -> None:
+    """What it notes just before is heard, too."""
     visits: list[Visit] = []
-    with pytest.raises(BoardError, match="goes to 0x7000"):
-        serve_program(tmp_path, "jmp 0x7000", visits, lambda: True)
-    assert [visit.what for visit in visits] == ["notes"]
+    until = time.monotonic() + 5
+    serve_program(tmp_path, "jmp 0x7000", visits, lambda: len(visits) < 2 and time.monotonic() < until)
+    assert [visit.what for visit in visits] == ["notes", "notes"]
+    assert "goes to 0x7000" in visits[1].why and visits[1].why.endswith(" It stands still until it is reset.")
 
 
 def test_somebody_looks_where_the_robot_is() -> None:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from boebot import resources
 from boebot.boards import BoardRequest, Visit, board_kinds, check_board, find_server
 from boebot.cli import options, output, streams
 from boebot.description.robots import load_robot
-from boebot.errors import BoardError, BoebotError
+from boebot.errors import BoardError, BoebotError, CallError
 
 if TYPE_CHECKING:
     from boebot.live.served_view import ServedView
 
-_WORDS = {"came": "came; the board is reset", "went": "went", "refused": "was refused", "notes": "notes"}
+_WORDS = {"came": "came; the board is reset", "went": "went", "refused": "was refused", "reset": "resets the board"}
+_WORDS["notes"] = "notes"
 
 
 def serve(
@@ -24,6 +27,17 @@ def serve(
     tcp: Annotated[
         int | None,
         typer.Option("--tcp", metavar="PORT", min=0, max=65535, help="On this TCP port of loopback; 0: any."),
+    ] = None,
+    bootloader: Annotated[
+        bool,
+        typer.Option(
+            "--bootloader",
+            help="An Uno into which programs are flashed, by avrdude, boebot flash or pio run -t upload.",
+        ),
+    ] = False,
+    bootloader_file: Annotated[
+        Path | None,
+        typer.Option("--bootloader-file", metavar="FILE", help="With another boot loader than the kit's: ELF or HEX."),
     ] = None,
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
@@ -46,6 +60,9 @@ def serve(
         )
     description = load_robot(robot)
     check_board(on, description)
+    loader = bootloader_file or (resources.folder("images") / "bootloader.elf" if bootloader else None)
+    if loader is not None and on != "avr":
+        raise CallError(f"a boot loader begins on an emulated Uno; expected --on avr, not {on}")
     request = BoardRequest(
         robot=description,
         arena=arena,
@@ -54,6 +71,7 @@ def serve(
         record=view,
         without=options.names(without),
         imperfections=options.magnitudes(imperfection),
+        bootloader=None if loader is None else str(loader),
         gdb=gdb,
         gdb_waits=False,
     )
@@ -65,7 +83,11 @@ def serve(
             output.print_json({"url": url, "board": on, "robot": request.robot.name})
         else:
             output.line(f"{request.robot.name} on {on} is at {url}")
-            output.line(f"drive it:  boebot run wander --on {url}        end it:  Ctrl-C")
+            if loader is not None:
+                output.line(f"flash it:  boebot flash FILE --on {url}")
+            if description.takes_brain:
+                output.line(f"drive it:  boebot run wander --on {url}")
+            output.line("end it:    Ctrl-C")
 
     def visit(event: Visit) -> None:
         if page is not None:

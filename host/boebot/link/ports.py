@@ -166,7 +166,9 @@ class SerialPort(_Port):
 
 
 class SocketPort(_Port):
-    """A TCP connection that carries a board's bytes: `socket://HOST:PORT`."""
+    """A TCP connection that carries a board's bytes: `socket://HOST:PORT`. Who serves a board there resets it."""
+
+    resets_board = True
 
     def __init__(self, host: str, port: int) -> None:
         """Connects.
@@ -218,6 +220,7 @@ def open_serial(port: str, baud: int, *, baud_given: bool = False, reset: bool =
             _keep_for_us_alone(device.fileno())
             _keep_dtr_at_close(device.fileno(), keep=not reset)
         resets_board = pulse_dtr(device) if reset else POSIX and _has_dtr(device.fileno())
+        resets_board = resets_board or (reset and _is_pty(device.fileno()))
     except BaseException as error:  # Ctrl-C, too
         device.close()
         if isinstance(error, _FAILURES):
@@ -354,8 +357,13 @@ def remedy(port: str) -> str:
 
 def _keep_for_us_alone(descriptor: int) -> None:
     """Nobody else may open the port. Not so a pty, whose mark would outlive a killed process."""
-    if not os.ttyname(descriptor).startswith(("/dev/pts/", "/dev/ttys")):
+    if not _is_pty(descriptor):
         fcntl.ioctl(descriptor, termios.TIOCEXCL)
+
+
+def _is_pty(descriptor: int) -> bool:
+    """A pseudo-terminal: who serves a board there resets it when it is opened."""
+    return POSIX and os.ttyname(descriptor).startswith(("/dev/pts/", "/dev/ttys"))
 
 
 def _has_dtr(descriptor: int) -> bool:
