@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 FOLDER = Path(__file__).resolve().parent
 # In the order in which people learn.
-NAMES = ("centring", "dance", "whiskers", "light", "infrared", "distance", "line", "states")
+NAMES = ("centring", "dance", "whiskers", "light", "infrared", "distance", "line", "states", "avoider")
 _HEAD = re.compile(r"/\* (?P<name>\w+): (?P<title>[^\n]+)\.\n +Robot (?P<robot>[\w-]+), arena (?P<arena>\w+)\.\n")
 
 
