@@ -19,7 +19,7 @@ from boebot.record.reading import CutError
 from boebot.record.run import Run
 from boebot.result import read_run, robots_of
 from boebot.robot import Command
-from boebot.running.again import Repetition, again, recorded
+from boebot.running.again import Recorded, Repetition, again, recorded
 from boebot.running.replayed import replayed
 
 EXIT_DIFFERS, EXIT_USAGE = 1, 2
@@ -167,15 +167,16 @@ def _repeat(folder: Path, trust: bool) -> None:
         repetition = again(run, progress, trust=trust)
     if repetition.part is not None:
         output.say(repetition.part)
-    output.line(_sentence(folder, repetition))
+    output.line(_sentence(folder, run, repetition))
     if not repetition.is_equal:
         raise typer.Exit(EXIT_DIFFERS)
 
 
-def _sentence(folder: Path, repetition: Repetition) -> str:
+def _sentence(folder: Path, run: Recorded, repetition: Repetition) -> str:
     if repetition.difference is not None:
         return f"differs from {folder} first at robot {repetition.robot}, {repetition.difference}"
     if repetition.ends is not None:
         return f"differs from {folder}: robot {repetition.robot} ended by {' and by '.join(map(repr, repetition.ends))}"
     part = "" if repetition.part is None else ", as far as it goes"
-    return f"bit-equal to {folder}{part}: {repetition.steps} steps"
+    length = f"{repetition.steps} steps" if repetition.steps else f"{run.seconds:g} s"  # a program has no steps
+    return f"bit-equal to {folder}{part}: {length}"

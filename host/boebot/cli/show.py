@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from boebot.cli import options, output
 
@@ -20,8 +21,28 @@ SHAPES = ("shape", "name", "x", "y", "width", "depth", "height", "remarks")
 WIRES = ("device", "pin", "wire", "through", "to", "plugged into")
 _DIGITS = 6  # of lengths in JSON: micrometres
 
+
+class _Kinds(TyperGroup):
+    """Which of both a bundled name means need not be said."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """A name alone, which is no kind, is that of a robot or an arena."""
+        from boebot.arenas import arena_names
+        from boebot.description.robots import robot_names
+
+        kinds = {"arena": arena_names, "robot": robot_names}
+        kind = [kind for kind, names in kinds.items() if args[0] not in kinds and args[0] in names()]
+        if len(kind) > 1:
+            ctx.fail(
+                f"{args[0]} is the name of an arena and of a robot; expected 'arena {args[0]}' or 'robot {args[0]}'"
+            )
+        return super().resolve_command(ctx, kind + args)
+
+
 app = typer.Typer(
-    help="Show an arena or a robot: a picture, its measures, what stands there or how it is wired.",
+    cls=_Kinds,
+    help="Show an arena or a robot: a picture, its measures, what stands there or how it is wired. A bundled one is "
+    "named alone, too: boebot show rover.",
     no_args_is_help=True,
     add_completion=False,
     **options.SETTINGS,

@@ -107,6 +107,14 @@ def test_robot_by_arsims_scheme_is_shown_with_it_under_its_whole_name(
     assert "scheme" not in boebot(capsys, "show", "robot", "arsim")[1]
 
 
+def test_a_bundled_name_needs_no_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, kind in (("rover", "robot"), ("room", "arena")):
+        assert boebot(capsys, "show", name, "--json") == boebot(capsys, "show", kind, "--json", name)
+    for name, sentence in (("rovr", "No such command 'rovr'"), ("arsim", "'arena arsim' or 'robot arsim'")):
+        code, _, err = boebot(capsys, "show", name)
+        assert (code, sentence in err) == (2, True)
+
+
 def test_robot_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = boebot(capsys, "show", "robot", "shieldbot-basic", "--json")
     assert (code, err) == (0, "")
