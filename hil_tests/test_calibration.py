@@ -18,6 +18,7 @@ import pytest
 from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
+from boebot.image.program import read_program
 from sim_bridge.serve import serve
 from tools.tests.calibration import __main__ as command
 from tools.tests.calibration import board, emulator, table
@@ -170,7 +171,7 @@ def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     tool.parent.mkdir()
     tool.write_text(
         "#!/usr/bin/env python3\nimport json, sys\n"
-        "program = open(sys.argv[-1].split(':')[2]).read()\n"
+        "program = open(sys.argv[-1].split(':')[2], 'rb').read().hex()\n"
         f"json.dump([sys.argv[1:], program], open({str(recorded)!r}, 'w'))\n",
         encoding="utf-8",
     )
@@ -187,7 +188,7 @@ def test_board_on_a_port(tmp_path: Path, avrdude: Path, capsys: pytest.CaptureFi
         assert command.main(["--port", port]) == 0
     arguments, program = json.loads(avrdude.read_text(encoding="utf-8"))
     assert arguments[:-1] == ["-p", "atmega328p", "-c", "arduino", "-b", "115200", "-P", port, "-D", "-U"]
-    assert program.startswith(":10000000") and program.endswith(":00000001FF\n")
+    assert bytes.fromhex(program) == read_program(elf).flash.rstrip(b"\xff")
     shown = capsys.readouterr().out
     judged = sum(not row.board_only_shown for row in ROWS)
     assert f"board {judged} (of {judged} that are judged)" in shown and "Not as expected" not in shown
@@ -212,5 +213,5 @@ def test_board_that_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_avrdude_that_fails(tmp_path: Path, avrdude: Path) -> None:
     tool = tmp_path / "bin" / "avrdude"
     tool.write_text("#!/bin/sh\necho >&2; echo 'avrdude: no answer' >&2; exit 1\n", encoding="utf-8")
-    with pytest.raises(BoardError, match=r"could not flash the board at /dev/robot: avrdude: no answer"):
+    with pytest.raises(BoardError, match=r"the board at /dev/robot does not answer; expected an Uno"):
         board.flash("/dev/robot")

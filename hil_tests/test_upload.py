@@ -31,7 +31,7 @@ from tools.tests.calibration.talk import START, Talk
 pytestmark = pytest.mark.emulated
 
 ROOT = Path(__file__).resolve().parents[1]
-TUTORIAL = ROOT / "docs" / "tutorial" / "first-brain.md"
+PAGE = ROOT / "docs" / "reference" / "robots.md"
 PATIENCE_S = 10.0  # by the wall clock: the bootloader waits one second for a program
 
 
@@ -90,27 +90,30 @@ def test_avrdude_writes_the_calibration_program() -> None:
 
 def test_another_chip_is_not_written(tmp_path: Path) -> None:
     image = of_chip(0x1E9801, tmp_path)  # an ATmega2560
-    with served(image) as (port, _), pytest.raises(BoardError, match=f"could not flash .* {port}"):
+    with served(image) as (port, _), pytest.raises(BoardError, match=f"{port} has the signature 1e9801"):
         board.flash(port)
 
 
-SAYS_HELLO = """
+PRINTS = """
 main: ldi r24, 103 ; 9600 baud
  sts UBRR0L, r24
  ldi r24, 0x08
  sts UCSR0B, r24
-1: lds r25, UCSR0A
+"""
+PRINTS_ONE = """
+{0}: lds r25, UCSR0A
  sbrs r25, 5
- rjmp 1b
- ldi r24, 'h'
+ rjmp {0}b
+ ldi r24, {1}
  sts UDR0, r24
- rjmp 1b
 """
 
 
-def program(folder: Path) -> Path:
+def program(folder: Path, says: bytes = b"h") -> Path:
+    """That prints this for ever, at 9600 bit/s."""
     image = folder / "program.elf"
-    image.write_bytes(assemble(SAYS_HELLO))
+    parts = [PRINTS_ONE.format(number, byte) for number, byte in enumerate(says, 1)]
+    image.write_bytes(assemble(PRINTS + "".join(parts) + "\n rjmp 1b"))
     return image
 
 
@@ -142,9 +145,9 @@ def test_a_monitor_that_only_listens_meets_the_program_at_its_own_rate(tmp_path:
 
 
 @pytest.mark.soak
-def test_the_tutorials_upload_works_as_written() -> None:
+def test_platformios_upload_works_as_written() -> None:
     """PlatformIO, avrdude, bootloader, firmware: afterwards the board says who it is."""
-    found = re.search(r"^pio (.*)$", TUTORIAL.read_text(), re.MULTILINE)
+    found = re.search(r"`pio (.* /dev/ttyACM0)`", PAGE.read_text())
     assert found
     with served() as (port, _):
         words = shlex.split(found[1].replace("/dev/ttyACM0", port))

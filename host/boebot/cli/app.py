@@ -34,6 +34,10 @@ COMMANDS = {
         "boebot.cli.show:app",
     ),
     "serve": Command("Offer the emulated robot to other programs, until Ctrl-C.", "boebot.cli.serve:serve"),
+    "flash": Command(
+        "Write the kit's firmware or a program of your own into a board, and say what answers.",
+        "boebot.cli.flash:flash",
+    ),
     "doctor": Command(
         "Examine port, firmware and each device of a robot that stands still; say what is not as it should be.",
         "boebot.cli.doctor:doctor",

@@ -2,49 +2,28 @@
 
 from __future__ import annotations
 
-import subprocess
 import tempfile
 from pathlib import Path
 
+from boebot import flashing
 from boebot.errors import BoardError
+from boebot.image.program import read_program
 from boebot.link.ports import open_serial
-from tools.tests.calibration.program import flash_hex
+from tools.tests.calibration.program import image
 from tools.tests.calibration.talk import START, Talk
 
 BAUD = 500_000
-UPLOAD_BAUD = 115_200  # of the Uno's bootloader
-UPLOAD_TIMEOUT_S = 60.0  # a lost byte lets avrdude try for minutes
 ASK_AGAIN_S = 0.5  # while the bootloader waits, nobody hears
 GREETING_S = 20.0
 QUIET_S = 20.0  # no row takes as long
 
 
 def flash(port: str) -> None:
-    """Writes the calibration program into the board's flash, through its bootloader; the EEPROM stays.
-
-    Raises:
-        BoardError: avrdude is missing, fails, or takes too long.
-    """
+    """Writes the calibration program into the board's flash; the EEPROM stays. Raises as `boebot.flashing.write`."""
     with tempfile.TemporaryDirectory() as folder:
-        program = Path(folder, "calibration.hex")
-        program.write_text(flash_hex(), encoding="ascii")
-        command = ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(UPLOAD_BAUD), "-P", port, "-D"]
-        try:
-            done = subprocess.run(
-                [*command, "-U", f"flash:w:{program}:i"],
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=UPLOAD_TIMEOUT_S,
-            )
-        except OSError as error:
-            raise BoardError(f"avrdude, which flashes the board, cannot be run: {error.strerror}") from error
-        except subprocess.TimeoutExpired:
-            raise BoardError(f"avrdude did not end within {UPLOAD_TIMEOUT_S:.0f} s; is the board at {port}?") from None
-    if done.returncode:
-        lines = [line for line in done.stderr.splitlines() if line.strip()]
-        said = next((line for line in lines if "avrdude" in line), "it said nothing")
-        raise BoardError(f"avrdude could not flash the board at {port}: {said.strip()}")
+        program = Path(folder, "calibration.elf")
+        program.write_bytes(image())
+        flashing.write(read_program(program).flash, port)
 
 
 def listen(port: str) -> list[int | None]:

@@ -45,19 +45,6 @@ def image() -> bytes:
         return elf.read_bytes()
 
 
-def flash_hex() -> str:
-    """What lies in flash, as an Intel hex file.
-
-    Raises:
-        BoardError: avr-objcopy is missing or fails.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        elf, converted = Path(folder, "calibration.elf"), Path(folder, "calibration.out")
-        elf.write_bytes(image())
-        _run(["avr-objcopy", "-O", "ihex", str(elf), str(converted)], "takes the program out of its ELF file")
-        return converted.read_text(encoding="ascii")
-
-
 def _run(command: list[str], purpose: str) -> None:
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -1,0 +1,115 @@
+"""Writes programs into an Uno through its boot loader, by avrdude (STK500 at 115,200 bit/s), which reads them back."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO
+
+from boebot.boards import is_live
+from boebot.errors import BoardError, CallError
+from boebot.image.program import BOOT_SECTIONS
+from boebot.link.ports import holder_of
+
+UPLOAD_BAUD = 115_200  # of the Uno's boot loader
+ROOM = BOOT_SECTIONS[0]  # bytes of flash before the boot loader
+BARS = 100  # marks that avrdude prints while it writes and reads back
+SILENCE_S = 15.0  # of avrdude, which tries for minutes where a byte was lost
+LEAST_S, PER_BYTE_S = 30.0, 0.005  # for all of it; a byte takes 0.25 ms on a computer that does nothing else
+_SIGNATURE = re.compile(r"device signature = 0x([0-9a-f]{6})(?: \(probably (\w+)\))?")
+_EXPECTED = "1e950f"  # ATmega328P (data sheet 28.3)
+
+
+def write(
+    flash: bytes, port: str, progress: Callable[[float], object] = lambda _: None, *, silence_s: float = SILENCE_S
+) -> None:
+    """Writes the flash from address 0 on, and reads it back; the EEPROM stays.
+
+    Args:
+        flash: what it will hold; what is erased at its end is left as it is.
+        port: a serial port, a pseudo-terminal, or socket://HOST:PORT.
+        progress: called with the percentage that is done.
+        silence_s: without news from avrdude, after which it is ended.
+
+    Raises:
+        CallError: avrdude knows no such port.
+        BoardError: the program is too large, avrdude is missing, the port is held or none, the board does not answer,
+            is another chip, or did not keep the program. The port is free then, and another try may work.
+    """
+    flash = flash.rstrip(b"\xff")
+    if len(flash) > ROOM:
+        raise BoardError(f"the program has {len(flash)} bytes; expected {ROOM} at most, before the boot loader")
+    if shutil.which("avrdude") is None:
+        raise BoardError("avrdude, which writes programs into boards, is missing; expected it installed, as by apt")
+    path = _path(port)
+    if holder := None if path.startswith("net:") else holder_of(path):
+        raise BoardError(f"{port} is busy: {holder} has it open")
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder, "program.bin")
+        program.write_bytes(flash)
+        command = ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(UPLOAD_BAUD), "-P", path, "-D"]
+        command += ["-U", f"flash:w:{program}:r"]
+        with subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        ) as tool:
+            try:
+                assert tool.stderr is not None
+                said, is_late = _listen(tool.stderr, LEAST_S + len(flash) * PER_BYTE_S, silence_s, progress)
+                if not is_late:
+                    tool.wait()
+            finally:  # Ctrl-C, too
+                tool.kill()
+    if is_late or tool.returncode:
+        raise BoardError(_why(port, said))
+
+
+def _path(port: str) -> str:
+    """The port as avrdude names it."""
+    if not is_live(port) or port.startswith("rfc2217:"):
+        raise CallError(f"programs cannot be written through {port!r}; expected a serial port or socket://HOST:PORT")
+    if port.startswith("socket://"):
+        return f"net:{port.removeprefix('socket://').rstrip('/')}"
+    return port.removeprefix("serial:").partition("?")[0]
+
+
+def _listen(
+    stream: IO[bytes], limit_s: float, silence_s: float, progress: Callable[[float], object]
+) -> tuple[str, bool]:
+    """All that avrdude says until it ends or is too late, and whether it is."""
+    said, begun = b"", time.monotonic()
+    heard = begun
+    while (now := time.monotonic()) < min(begun + limit_s, heard + silence_s):
+        if not select.select([stream], [], [], min(1.0, heard + silence_s - now))[0]:
+            continue
+        data = os.read(stream.fileno(), 4096)
+        if not data:
+            return said.decode("utf-8", "replace"), False
+        said, heard = said + data, now
+        progress(100 * min(said.count(b"#") / BARS, 1.0))
+    return said.decode("utf-8", "replace"), True
+
+
+def _why(port: str, said: str) -> str:
+    """Why avrdude has failed, in a sentence."""
+    words = said.lower()
+    signature = _SIGNATURE.search(words)
+    if signature and signature[1] != _EXPECTED:
+        chip = f", as of a {signature[2]}" if signature[2] else ""
+        return f"the board at {port} has the signature {signature[1]}{chip}; expected {_EXPECTED}, an ATmega328P"
+    if "verification" in words and ("mismatch" in words or "error" in words):
+        return f"the board at {port} did not keep the program: what was read back differs; flash it again"
+    if opening := re.search(r"cannot (?:open port|connect)[^:]*: (.+)|cannot resolve (.+)", said, re.IGNORECASE):
+        return f"{port} cannot be opened: {(opening[1] or opening[2]).strip().lower()}"
+    share = 100 * said.count("#") // BARS
+    if "writing |" in words:
+        return (
+            f"the board at {port} stopped answering after {share} % of the upload: is its cable sound? flash it again"
+        )
+    return f"the board at {port} does not answer; expected an Uno with its boot loader, and nobody else at its port"
