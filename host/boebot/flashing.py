@@ -21,6 +21,7 @@ from boebot.link.ports import holder_of
 UPLOAD_BAUD = 115_200  # of the Uno's boot loader
 ROOM = BOOT_SECTIONS[0]  # bytes of flash before the boot loader
 BARS = 100  # marks that avrdude prints while it writes and reads back
+LIFE = re.compile(rb"#|\navrdude: ")  # what it prints of what went well
 SILENCE_S = 15.0  # of avrdude, which tries for minutes where a byte was lost
 LEAST_S, PER_BYTE_S = 30.0, 0.005  # for all of it; a byte takes 0.25 ms on a computer that does nothing else
 _SIGNATURE = re.compile(r"device signature = 0x([0-9a-f]{6})(?: \(probably (\w+)\))?")
@@ -36,7 +37,7 @@ def write(
         flash: what it will hold; what is erased at its end is left as it is.
         port: a serial port, a pseudo-terminal, or socket://HOST:PORT.
         progress: called with the percentage that is done.
-        silence_s: without news from avrdude, after which it is ended.
+        silence_s: in which nothing goes well, after which avrdude is ended.
 
     Raises:
         CallError: avrdude knows no such port.
@@ -75,6 +76,8 @@ def _path(port: str) -> str:
     if not is_live(port) or port.startswith("rfc2217:"):
         raise CallError(f"programs cannot be written through {port!r}; expected a serial port or socket://HOST:PORT")
     if port.startswith("socket://"):
+        if not re.fullmatch(r"socket://[^:/]+:\d{1,5}/?", port):
+            raise CallError(f"{port!r} is no socket address; expected socket://HOST:PORT")
         return f"net:{port.removeprefix('socket://').rstrip('/')}"
     return port.removeprefix("serial:").partition("?")[0]
 
@@ -84,15 +87,17 @@ def _listen(
 ) -> tuple[str, bool]:
     """All that avrdude says until it ends or is too late, and whether it is."""
     said, begun = b"", time.monotonic()
-    heard = begun
+    heard, marks = begun, 0
     while (now := time.monotonic()) < min(begun + limit_s, heard + silence_s):
         if not select.select([stream], [], [], min(1.0, heard + silence_s - now))[0]:
             continue
         data = os.read(stream.fileno(), 4096)
         if not data:
             return said.decode("utf-8", "replace"), False
-        said, heard = said + data, now
-        progress(100 * min(said.count(b"#") / BARS, 1.0))
+        said += data
+        if marks != (marks := len(LIFE.findall(said))):
+            heard = now
+            progress(100 * min(said.count(b"#") / BARS, 1.0))
     return said.decode("utf-8", "replace"), True
 
 

@@ -38,3 +38,5 @@ def test_what_cannot_be_written() -> None:
     for port in ("avr", "rfc2217://host:1"):
         with pytest.raises(CallError, match="cannot be written through"):
             flashed(port)
+    with pytest.raises(CallError, match="is no socket address; expected socket://HOST:PORT"):
+        flashed("socket://host")
