@@ -123,8 +123,8 @@ def test_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path: Path) -> None:
         (tmp_path / "slow.py").write_text("import time\ndef step(robot):\n    time.sleep(0.01)\n")
         done = boebot("run", str(tmp_path / "slow.py"), "--seconds", "1e6", "--out", str(disk / "run"))
         assert done.returncode == 1
-        first = done.stderr.splitlines()[0]
-        assert first == f"boebot: the record cannot be written to {disk}/run/record.mcap: No space left on device"
+        sentence = f"boebot: the record cannot be written to {disk}/run/record.mcap: No space left on device"
+        assert sentence in done.stderr.splitlines()  # on a busy computer behind one about the sleep
         result = read(disk / "run")
         assert isinstance(result.error, CutError) and result.run_time > 1
     finally:

@@ -74,7 +74,7 @@ def test_silent_port_is_given_up_in_time() -> None:
     with line() as board:
         transport = open_serial(board.path, 500_000)
         begun = time.monotonic()
-        with pytest.raises(BoardError, match=r"nothing answers at .* within 2 s: is the robot on and flashed"):
+        with pytest.raises(BoardError, match=r"nothing answers at .* within 4 s: is the robot on and flashed"):
             Link(transport).open()
         assert time.monotonic() - begun < 10
         transport.close()
