@@ -120,7 +120,7 @@ def test_the_monitor_has_the_rate_of_the_program(build: Callable[..., Path], bau
         (
             ("--expect-text", "no such", "--timeout", "100"),
             42,
-            "did not print what was expected, 'no such' within",
+            "did not print what was expected, 'no such', within",
         ),
         (("--expect-text", "no such", "--timeout", "100", "--timeout-exit-code", "7"), 7, "did not print"),
         (("--fail-text", "ead"), 1, "the program printed 'ead'; expected that it does not"),
@@ -196,6 +196,7 @@ def test_standard_input_and_a_script_type_beside_each_other(program: Path) -> No
         ("--type x", "--type 'x' cannot be typed: there is no @; expected TEXT@TIME"),
         (r"--type \x@1", "cannot be typed: 'unicodeescape'"),
         ("--type x@-1", "cannot be typed at -1 s; expected at most 1000 letters, and a time from 0 s on"),
+        ("--type x@2 --seconds 1", "'x' at 2 s is never: the run ends at 1 s"),
     ],
 )
 def test_what_a_program_cannot_have_is_refused(program: Path, options: str, sentence: str) -> None:

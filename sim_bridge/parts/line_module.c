@@ -22,16 +22,19 @@ static double volts(const line_module *self, double share) {
   return share * self->part.chassis->supply * BOARD_NOMINAL_VOLTS;
 }
 
-static void step(part *base) {
+/* Looks at the floor as it is at `cycle`; the comparator follows at `at`. */
+static void look(part *base, uint64_t cycle, uint64_t at) {
   line_module *self = (line_module *)base;
   const line_module_parameters *p = &self->parameters;
-  self->share = share_at(self, part_step_end(base));
+  self->share = share_at(self, cycle);
   self->is_dark = self->share > p->threshold + (self->is_dark ? -p->hysteresis : p->hysteresis);
   const uint8_t level = (uint8_t)(self->is_dark == (p->dark_level == BOARD_HIGH) ? BOARD_HIGH : BOARD_LOW);
   if (p->is_digital && level != base->level[0]) {
-    part_drive(base, part_step_end(base) + PART_GUARD, base->pins[0].pin, level);
+    part_drive(base, at, base->pins[0].pin, level);
   }
 }
+
+static void step(part *base) { look(base, part_step_end(base), part_step_end(base) + PART_GUARD); }
 
 static double analog(part *base, uint64_t cycle) {
   line_module *self = (line_module *)base;
@@ -53,6 +56,7 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   if (reflectance_init(&self->sensor, &self->parameters.floor) != 0) return -1;
   const uint8_t role = self->parameters.is_digital ? PART_DRIVES : PART_ANALOG;
   part_join(base, &OPERATIONS, place, &(part_pin){pins[0], role}, 1);
+  look(base, place->chassis->since, 0); /* setup() may read it at once */
   return 0;
 }
 

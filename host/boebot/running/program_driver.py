@@ -60,7 +60,7 @@ class ProgramDriver(Driver):
             if self._monitor.failed:
                 raise BoardError(f"the program printed {printable(request.fail_text)!r}; expected that it does not")
         if request.expect_text and not self._monitor.found:
-            expected = f"{printable(request.expect_text)!r} within {request.seconds:g} s"
+            expected = f"{printable(request.expect_text)!r}, within {request.seconds:g} s"
             raise MissingTextError(f"the program did not print what was expected, {expected}")
 
     def _hear(self, wait_s: float) -> None:

@@ -31,6 +31,9 @@ def modules(**imperfections: float) -> RobotDescription:
 def test_voltage_and_level_over_tape_and_floor() -> None:
     """The floor throws back 0.8 and 0.01 of stray light, the tape 0.05: 5 V (1 - 1.1 r), and 0.3 V at least."""
     robot = scripted(load_arena("track"), modules(), TAPE)
+    assert robot.robot.readings()[1] == 1.0 and robot.inputs(DIGITAL) == [(0, 0)], (
+        "from power-on, before the first step"
+    )
     robot.run(0.01)
     middle, dark, side, bright, other, _ = robot.robot.readings()
     assert (dark, bright) == (1.0, 0.0)
