@@ -156,7 +156,7 @@ class Request(_NamesFiles):
                 raise BoebotError(f"inputs has {one!r}; expected devices, each with a number and its time in s")
             if not 0 <= one[2] < math.inf:
                 raise CallError(f"{one[0]} cannot be set at {one[2]:g} s; expected a time from 0 s on")
-        for what, *_, time_s in (*self.typed, *self.inputs):
+        for what, time_s in (*self.typed, *((name, time_s) for name, _, time_s in self.inputs)):
             if time_s >= self.seconds:
                 raise CallError(f"{what!r} at {time_s:g} s is never: the run ends at {self.seconds:g} s")
         expect("members", self.members, "a list of boebot.Member", list, tuple)
