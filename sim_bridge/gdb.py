@@ -27,7 +27,7 @@ FLASH_END = 0x8000
 SREG, SPL, SPH = DATA + 0x5F, DATA + 0x5D, DATA + 0x5E
 REGISTERS = [*range(DATA, DATA + 32), SREG, SPL, SPH]  # in gdb's order; then the program counter
 PC_BYTES = 4
-COMMANDS = {"init": False, "halt": False, "reset": True, "reset halt": True, "reset init": True}  # whether it resets
+RESETS, OTHER_COMMANDS = ("reset", "reset halt", "reset init"), ("init", "halt")  # of `monitor`
 
 
 class Gdb:
@@ -207,9 +207,7 @@ class Gdb:
         if kind == "D":
             self._let_go()
             return b"OK"
-        if kind == "k" or (kind == "v" and rest.startswith("Kill")):
-            if kind == "v":
-                self._send(b"OK")
+        if kind == "k":
             raise BoardError("the debugger has ended the run")
         if kind == "q":
             return self._query(rest)
@@ -223,11 +221,11 @@ class Gdb:
         if not what.startswith("Rcmd,"):
             return b""
         command = " ".join(bytes.fromhex(what[5:]).decode("latin-1").split())
-        if command not in COMMANDS:
-            sentence = f"no command {command!r}; expected one of: {', '.join(COMMANDS)}\n"
-            self._send(b"O" + sentence.encode().hex().encode())
-        elif COMMANDS[command]:
+        if command in RESETS:
             self._board.lib.avr_debug_reset(self._board.handle)
+        elif command not in OTHER_COMMANDS:
+            sentence = f"no command {command!r}; expected one of: {', '.join((*OTHER_COMMANDS, *RESETS))}\n"
+            self._send(b"O" + sentence.encode().hex().encode())
         return b"OK"
 
     def _cell(self, address: int) -> int:

@@ -238,7 +238,7 @@ def test_a_program_that_runs_is_interrupted(image: Path) -> None:
         cycle = run.session.sim.cycle
         time.sleep(0.05)
         assert cycle == run.session.sim.cycle > 0
-        assert ask(client, "vKill;1") == "OK"
+        client.sendall(packet("k"))
         run.thread.join(10)
         assert str(run.error) == "the debugger has ended the run"
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -35,10 +34,6 @@ def serve(
             help="An Uno into which programs are flashed, by avrdude, boebot flash or pio run -t upload.",
         ),
     ] = False,
-    bootloader_file: Annotated[
-        Path | None,
-        typer.Option("--bootloader-file", metavar="FILE", help="With another boot loader than the kit's: ELF or HEX."),
-    ] = None,
     robot: options.RobotName = "shieldbot",
     arena: options.ArenaName = None,
     seed: options.Seed = 1,
@@ -60,7 +55,7 @@ def serve(
         )
     description = load_robot(robot)
     check_board(on, description)
-    loader = bootloader_file or (resources.folder("images") / "bootloader.elf" if bootloader else None)
+    loader = resources.folder("images") / "bootloader.elf" if bootloader else None
     if loader is not None and on != "avr":
         raise CallError(f"a boot loader begins on an emulated Uno; expected --on avr, not {on}")
     request = BoardRequest(

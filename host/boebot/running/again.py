@@ -19,6 +19,7 @@ from boebot.brain.composition import composed
 from boebot.brains import PROGRAMS
 from boebot.errors import BoebotError, as_utf8
 from boebot.record.blocks import Row
+from boebot.record.interventions import interventions
 from boebot.record.reading import CutError, attachments_of
 from boebot.record.recording import BEGIN
 from boebot.record.run import Run, why
@@ -174,7 +175,7 @@ def again(run: Recorded, progress: Progress | None = None, *, trust: bool = Fals
             write_copies(brought, copies)
             files[name] = str(copies / as_utf8(Path(name).name))
         request = _request(run, files, Path(folder))
-        repeated = Repeated([result.record for result in run.results])
+        repeated = Repeated([interventions(result.record) for result in run.results])
         new = execute(request, progress, onlooker=repeated).robots
     for result in new:
         if isinstance(result.error, KeyboardInterrupt):

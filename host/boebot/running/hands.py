@@ -28,14 +28,12 @@ from boebot.record.interventions import (
     Stop,
     Tally,
     Typed,
-    interventions,
 )
-from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.robot import Robot
 from boebot.running.brain_parameters import set_parameters
 from boebot.running.driver import Driver
-from boebot.running.tasks import Task
+from boebot.running.tasks import Request, Task
 
 
 class Onlooker:
@@ -90,24 +88,12 @@ class Together(Onlooker):
             one.look(time_s, is_over=is_over)
 
 
-class Script(Onlooker):
-    """Does things to the one robot that a program drives, at given times."""
-
-    def __init__(self, typed: Iterable[tuple[str, float]], inputs: Iterable[tuple[str, float, float]]) -> None:
-        """As of `boebot.run`."""
-        deeds: list[tuple[Deed, float]] = [(Typed(text, scripted=True), time_s) for text, time_s in typed]
-        deeds += [(Set(part, float(value), scripted=True), time_s) for part, value, time_s in inputs]
-        self._due = sorted(deeds, key=itemgetter(1))
-        self._robot = 0
-
-    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
-        """See `Onlooker`."""
-        self._robot = next(number for number, robot in enumerate(robots) if robot.driver.is_program)
-
-    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
-        """See `Onlooker`."""
-        while number == self._robot and self._due and self._due[0][1] <= time_s:
-            yield self._due.pop(0)[0]
+def script(request: Request, tasks: Sequence[Task]) -> Repeated:
+    """What a run was asked for with, at the one robot that a program drives."""
+    deeds: list[tuple[float, Deed]] = [(time_s, Typed(text, scripted=True)) for text, time_s in request.typed]
+    deeds += [(time_s, Set(part, float(value), scripted=True)) for part, value, time_s in request.inputs]
+    deeds.sort(key=itemgetter(0))
+    return Repeated([deeds if task.brain.is_program else [] for task in tasks])
 
 
 class Hands:
@@ -187,12 +173,12 @@ def carry_out(one: Deed, robot: Robot, brain: LoadedBrain, held: Hand | None) ->
 
 
 class Repeated(Onlooker):
-    """Does again what a record says that was done. What could be done once can be done again, or the runs differ: they
-    are compared."""
+    """Does what a script says, or again what a record says that was done. What could be done once can be done again, or
+    the runs differ: they are compared."""
 
-    def __init__(self, records: Sequence[Record]) -> None:
-        """`records`: one for each robot."""
-        self._due = [interventions(record) for record in records]
+    def __init__(self, due: Sequence[list[tuple[float, Deed]]]) -> None:
+        """`due`: of each robot its deeds with their times (s), in order."""
+        self._due = due
 
     def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
         """See `Onlooker`."""

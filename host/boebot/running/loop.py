@@ -74,9 +74,9 @@ def execute(
         on = next((task.on for task in tasks if task.board.robot.has_board), request.on or DIRECT)
         world = open_world(on, [task.board for task in tasks])
         if request.typed or request.inputs:
-            from boebot.running.hands import Onlooker, Script, Together
+            from boebot.running.hands import Onlooker, Together, script
 
-            onlooker = Together(Script(request.typed, request.inputs), onlooker or Onlooker())
+            onlooker = Together(script(request, tasks), onlooker or Onlooker())
         try:
             return _Loop(world, request, tasks, progress, recording, folder, onlooker).run()
         finally:

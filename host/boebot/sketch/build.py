@@ -161,30 +161,28 @@ def _environment(project: Project, sections: Mapping[str, Mapping[str, Any]]) ->
 
 @dataclass(frozen=True)
 class _Tools:
-    """How PlatformIO is called, on what its builds depend, and whether the distribution's packages do it."""
+    """On what PlatformIO's builds depend, and whether the distribution's packages do it."""
 
-    command: tuple[str, ...]
     versions: str
     is_prepared: bool
 
     @classmethod
     def found(cls) -> _Tools:
-        """With the distribution's packages where all of them are there, else the user's own PlatformIO.
+        """With the distribution's packages where all of them are there, else with PlatformIO's registry.
 
         Raises:
             BoebotError: there is no PlatformIO.
         """
         kits = [one.read_bytes() for one in sorted(HERE.rglob("*.*")) if one.suffix in (".py", ".json")]
         compiler, framework = shutil.which("avr-gcc"), core_directory.ARDUINO / "platform.txt"
-        here, is_here = (sys.executable, "-m", "platformio"), importlib.util.find_spec("platformio") is not None
+        is_here = importlib.util.find_spec("platformio") is not None
         if is_here and importlib.util.find_spec("SCons") and compiler and framework.is_file():
             files = [one.stat() for one in (Path(compiler).resolve(), framework)]
             told = [version("platformio"), version("scons"), *((one.st_size, one.st_mtime_ns) for one in files)]
-            return cls(here, _hash(kits, told), True)
-        pio = shutil.which("pio") or shutil.which("pio", path=Path("~/.platformio/penv/bin").expanduser())
-        if not is_here and pio is None:
+            return cls(_hash(kits, told), True)
+        if not is_here:
             raise BoebotError("sketches are built by PlatformIO; expected it here: pip install 'boebot[firmware]'")
-        return cls(here if is_here or pio is None else (pio,), _hash(kits), False)
+        return cls(_hash(kits), False)
 
 
 @dataclass
@@ -239,7 +237,7 @@ class _PlatformIO:
             log.open("wb") as words,
             _ended(
                 subprocess.Popen(
-                    [*self.tools.command, *arguments],
+                    [sys.executable, "-m", "platformio", *arguments],
                     cwd=self.work,
                     env=os.environ | environment,
                     stdin=subprocess.DEVNULL,

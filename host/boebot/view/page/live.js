@@ -331,16 +331,17 @@ let sliders = [];
 function makeParameters() {
   const list = (live && live.robots[runs.indexOf(run)]?.parameters) || [];
   hide("parameters", !can.has("parameters") || !list.length);
-  sliders = list.map(makeSlider);
+  const robot = runs.indexOf(run);
+  sliders = list.map(one => makeSlider(one, value => act({ kind: "parameter", name: one.name, value }, robot)));
   const isUtility = ({ parameter }) => parameter.name.includes(".utility."),
     own = sliders.filter(one => !isUtility(one));
   $("ownParameters").replaceChildren(...own.map(({ whole }) => whole));
   $("utilityParameters").replaceChildren(...sliders.filter(isUtility).map(({ whole }) => whole));
 }
-function makeSlider(parameter) {
+function makeSlider(parameter, send) {
   const output = element("span", { className: "value" }),
     input = element("input", { type: "range", min: parameter.least, max: parameter.most, step: "any", disabled: ended !== null });
-  const one = { parameter, input, output, changed: -Infinity, due: null };
+  const one = { parameter, input, output, send, changed: -Infinity, due: null };
   input.value = parameter.value;
   input.ariaLabel = parameter.name;
   input.oninput = () => {
@@ -363,20 +364,19 @@ function tellSlider({ input, output }) {
 }
 // Ten times a second at most, and the last value surely.
 function sendSoon(one) {
-  const robot = runs.indexOf(run);
   one.due ??= setTimeout(() => {
     one.due = null;
-    act({ kind: "parameter", name: one.parameter.name, value: Number(one.input.value) }, robot);
+    one.send(Number(one.input.value));
   }, 100);
 }
 function tellParameters() {
   const values = robotState().parameters || {};
-  for (const one of sliders) {
-    const value = values[one.parameter.name];
-    if (value === undefined || performance.now() - one.changed < 1000 || Number(one.input.value) === value) continue;
-    one.input.value = value;
-    tellSlider(one);
-  }
+  for (const one of sliders) followSlider(one, values[one.parameter.name]);
+}
+function followSlider(one, value) {
+  if (value === undefined || performance.now() - one.changed < 1000 || Number(one.input.value) === value) return;
+  one.input.value = value;
+  tellSlider(one);
 }
 
 // ---- buttons, switches and knobs at its board: each shows how it stands in the newest row ----
@@ -408,28 +408,20 @@ function makeInput({ name, kind }) {
       press(true);
     };
     whole.onkeyup = () => press(false);
-    return { name, whole, tell: i => (whole.ariaPressed = String(run.isOn(name, i))) };
+    return { whole, tell: i => (whole.ariaPressed = String(run.isOn(name, i))) };
   }
-  const isSlider = kind === "slider",
-    input = element("input", isSlider ? { type: "range", min: 0, max: 1, step: 0.01 } : { type: "checkbox" });
-  const one = { name, changed: -Infinity, due: null };
-  input.disabled = ended !== null;
-  input.ariaLabel = title;
-  const value = () => (isSlider ? Number(input.value) : Number(input.checked));
+  if (kind === "slider") {
+    const one = makeSlider({ name: title, least: 0, most: 1, value: 0 }, set);
+    return { whole: one.whole, tell: i => followSlider(one, run.reading(name).values.values[i] / 100) };
+  }
+  const input = element("input", { type: "checkbox", disabled: ended !== null, ariaLabel: title });
+  let changed = -Infinity;
   input.oninput = () => {
-    one.changed = performance.now();
-    one.due ??= setTimeout(() => {
-      one.due = null;
-      set(value());
-    }, 100); // ten times a second at most, and the last value surely
+    changed = performance.now();
+    set(Number(input.checked));
   };
-  one.tell = i => {
-    if (performance.now() - one.changed < 1000) return;
-    if (isSlider) input.value = run.reading(name).values.values[i] / 100;
-    else input.checked = run.isOn(name, i);
-  };
-  one.whole = element("label", { className: isSlider ? "parameter" : "choice" }, element("span", { textContent: title }), input);
-  return one;
+  const whole = element("label", { className: "choice" }, element("span", { textContent: title }), input);
+  return { whole, tell: i => performance.now() - changed < 1000 || (input.checked = run.isOn(name, i)) };
 }
 function tellInputs() {
   if (run.last >= 0) for (const one of inputs) one.tell(run.last);
