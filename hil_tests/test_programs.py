@@ -195,8 +195,8 @@ def test_standard_input_and_a_script_type_beside_each_other(program: Path) -> No
         ("--robots 2 --expect-text x", "--expect-text goes to the one program of a run; there are 2 in this one"),
         ("--type x", "--type 'x' cannot be typed: there is no @; expected TEXT@TIME"),
         (r"--type \x@1", "cannot be typed: 'unicodeescape'"),
-        ("--type x@-1", "cannot be typed at -1 s; expected at most 1000 letters, and a time from 0 s on"),
-        ("--type x@2 --seconds 1", "'x' at 2 s is never: the run ends at 1 s"),
+        ("--type x@-1", "'x' at -1 s is never; expected a time from 0 s on"),
+        ("--type x@2 --seconds 1", "'x' at 2 s is never; expected a time from 0 s on, and before the run's end at 1 s"),
     ],
 )
 def test_what_a_program_cannot_have_is_refused(program: Path, options: str, sentence: str) -> None:

@@ -169,7 +169,7 @@ def test_a_record_its_page_and_a_repetition_have_them(result: RunResult, folder:
         (["--input", "dial=2@1"], "dial cannot be set to 2; expected 0 to 1"),
         (["--input", "start@1"], "--input 'start@1': there is no name, = or @; expected NAME=VALUE@TIME"),
         (["--input", "start=1@late"], "--input 'start=1@late': 'late' is no time"),
-        (["--input", "start=1@-1"], "start cannot be set at -1 s; expected a time from 0 s on"),
+        (["--input", "start=1@-1"], "'start' at -1 s is never; expected a time from 0 s on"),
     ],
 )
 def test_inputs_that_are_none_get_one_sentence(folder: Path, words: list[str], sentence: str) -> None:

@@ -145,20 +145,16 @@ class Request(_NamesFiles):
         for each in self.typed:
             if not isinstance(each, tuple | list) or [type(one) for one in each] not in ([str, float], [str, int]):
                 raise BoebotError(f"typed has {each!r}; expected texts, each with its time in s")
-            if len(each[0]) > TEXT_MAXIMUM or not each[1] >= 0:
-                raise CallError(
-                    f"{each[0][:20]!r}, {len(each[0])} letters, cannot be typed at {each[1]:g} s; expected at most "
-                    f"{TEXT_MAXIMUM} letters, and a time from 0 s on"
-                )
+            if len(each[0]) > TEXT_MAXIMUM:
+                raise CallError(f"{len(each[0])} letters cannot be typed at once; expected {TEXT_MAXIMUM} at most")
         for one in self.inputs:
             kinds = tuple(type(value) for value in one) if isinstance(one, tuple | list) else ()
             if len(kinds) != 3 or kinds[0] is not str or not {float, int}.issuperset(kinds[1:]):
                 raise BoebotError(f"inputs has {one!r}; expected devices, each with a number and its time in s")
-            if not 0 <= one[2] < math.inf:
-                raise CallError(f"{one[0]} cannot be set at {one[2]:g} s; expected a time from 0 s on")
-        for what, time_s in (*self.typed, *((name, time_s) for name, _, time_s in self.inputs)):
-            if time_s >= self.seconds:
-                raise CallError(f"{what!r} at {time_s:g} s is never: the run ends at {self.seconds:g} s")
+        for what, time_s in (*self.typed, *((part, time_s) for part, _, time_s in self.inputs)):
+            if not 0 <= time_s < self.seconds:
+                expected = f"expected a time from 0 s on, and before the run's end at {self.seconds:g} s"
+                raise CallError(f"{what!r} at {time_s:g} s is never; {expected}")
         expect("members", self.members, "a list of boebot.Member", list, tuple)
         if not self.members:
             raise BoebotError("there is no robot to run; expected at least one Member")
