@@ -197,6 +197,7 @@ def test_standard_input_and_a_script_type_beside_each_other(program: Path) -> No
         (r"--type \x@1", "cannot be typed: 'unicodeescape'"),
         ("--type x@-1", "'x' at -1 s is never; expected a time from 0 s on"),
         ("--type x@2 --seconds 1", "'x' at 2 s is never; expected a time from 0 s on, and before the run's end at 1 s"),
+        ("--expect-text=", "--expect-text or --fail-text is empty; expected a text"),
     ],
 )
 def test_what_a_program_cannot_have_is_refused(program: Path, options: str, sentence: str) -> None:

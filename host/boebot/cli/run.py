@@ -119,14 +119,15 @@ def run(
         bool, typer.Option("--pins", help="Record the pins of emulated boards, too; boebot report --as vcd shows them.")
     ] = False,
     expect_text: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="TEXT", help="Of a program: the run ends when this was printed; if it never is, with an error."
         ),
-    ] = "",
+    ] = None,
     fail_text: Annotated[
-        str, typer.Option(metavar="TEXT", help="Of a program: that this was printed is an error, and ends the run.")
-    ] = "",
+        str | None,
+        typer.Option(metavar="TEXT", help="Of a program: that this was printed is an error, and ends the run."),
+    ] = None,
     typed: Annotated[
         list[str] | None,
         typer.Option(
@@ -178,6 +179,8 @@ def run(
     ideal, imperfect = options.names(without), options.magnitudes(imperfection)
     if timeout is not None and seconds != SECONDS:
         raise CallError("--seconds and --timeout both say how long the run is; expected one of them")
+    if "" in (expect_text, fail_text):
+        raise CallError("--expect-text or --fail-text is empty; expected a text")
     kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     assigned = _assigned(parameters or [], count)
@@ -203,8 +206,8 @@ def run(
         step_timeout=step_timeout,
         force_timing=force_timing,
         pins=pins,
-        expect_text=expect_text,
-        fail_text=fail_text,
+        expect_text=expect_text or "",
+        fail_text=fail_text or "",
         typed=[_typed(text) for text in typed or []],
         inputs=[_input(text) for text in inputs or []],
         notes=notes,
