@@ -43,7 +43,7 @@ def flash(
         int, typer.Option("--baud", metavar="RATE", help="Of a program of your own: at which it prints.")
     ] = BAUD,
 ) -> None:
-    """Write a program into an Uno, through its boot loader, and say what answers then."""
+    """Write the kit's firmware or a program of your own into a board, and say what answers."""
     description = load_robot(robot)
     if file is None and not description.takes_brain:
         raise CallError(f"robot {description.name!r} runs programs of your own; expected one: boebot flash FILE")

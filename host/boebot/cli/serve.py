@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -18,6 +19,15 @@ if TYPE_CHECKING:
 
 _WORDS = {"came": "came; the board is reset", "went": "went", "refused": "was refused", "reset": "resets the board"}
 _WORDS["notes"] = "notes"
+
+
+@contextlib.contextmanager
+def _unread() -> Iterator[None]:
+    """What started this may have read where the robot is, and listen no more."""
+    try:
+        yield
+    except OSError:
+        streams.discard()
 
 
 def serve(
@@ -77,23 +87,23 @@ def serve(
         if json:
             output.print_json({"url": url, "board": on, "robot": request.robot.name})
         else:
-            output.line(f"{request.robot.name} on {on} is at {url}")
+            lines = [f"{request.robot.name} on {on} is at {url}"]
             if loader is not None:
-                output.line(f"flash it:  boebot flash FILE --on {url}")
+                lines.append(f"flash it:  boebot flash FILE --on {url}")
             if description.takes_brain:
-                output.line(f"drive it:  boebot run wander --on {url}")
-            output.line("end it:    Ctrl-C")
+                lines.append(f"drive it:  boebot run wander --on {url}")
+            lines.append("end it:    Ctrl-C")
+            with _unread():
+                output.line("\n".join(lines))
 
     def visit(event: Visit) -> None:
         if page is not None:
             page.visit(event)
-        try:
+        with _unread():
             if json:
                 output.print_json({"event": event.what, "client": event.client, "why": event.why}, indent=None)
             else:
                 output.line(f"{event.client} {_WORDS[event.what]}{event.why and f': {event.why}'}")
-        except OSError:  # what started this has read where the robot is, and listens no more
-            streams.discard()
 
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
         if view:
