@@ -85,8 +85,9 @@ def test_what_holds_the_port_is_named_and_a_retry_works() -> None:
 
 
 def test_of_several_ports_none_is_guessed(monkeypatch: pytest.MonkeyPatch) -> None:
-    for there, sentence in (([], "there is no serial port"), (["/dev/a", "/dev/b"], "several ports, /dev/a, /dev/b;")):
-        ports = [type("Port", (), {"device": name}) for name in there]
+    for there, sentence in (([], "no board at a USB port"), (["/dev/a", "/dev/b"], "several USB ports, /dev/a, /dev/b;")):
+        ports = [type("Port", (), {"device": name, "vid": 0x2341}) for name in there]
+        ports.append(type("Port", (), {"device": "/dev/ttyS0", "vid": None}))  # a computer's own
         monkeypatch.setattr(list_ports, "comports", lambda ports=ports: ports)
         with pytest.raises(BoardError if not there else CallError, match=sentence):
             command._only_port()

@@ -39,13 +39,29 @@ int main(void) {
 """
 
 
-@pytest.fixture(scope="module")
-def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("program")
-    (folder / "fights.c").write_text(SOURCE)
-    flags = ["-mmcu=atmega328p", "-Os", "-gdwarf-4"]
+# On a rover: a button from 12 to ground; its pull-up is off.
+BUTTON = """
+#include <avr/io.h>
+#include <util/delay.h>
+int main(void) {
+  for (;;) {
+    _delay_ms(100);
+    if (bit_is_set(PINB, 4)) GPIOR0++;
+  }
+}
+"""
+
+
+def built(folder: Path, source: str) -> Path:
+    (folder / "fights.c").write_text(source)
+    flags = ["-mmcu=atmega328p", "-Os", "-gdwarf-4", "-DF_CPU=16000000UL"]
     subprocess.run(["avr-gcc", *flags, "-o", folder / "fights.elf", folder / "fights.c"], check=True)
     return folder / "fights.elf"
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built(tmp_path_factory.mktemp("program"), SOURCE)
 
 
 NOTES = [
@@ -57,7 +73,7 @@ NOTES = [
 
 
 def run(image: Path, *options: str) -> tuple[int, str]:
-    shown = CliRunner().invoke(app, ["run", str(image), "--seconds", "0.1", *options])
+    shown = CliRunner().invoke(app, ["run", str(image), "--seconds", "0.15", *options])
     return getattr(shown.exception, "exit_code", shown.exit_code), f"{shown.output}\n{shown.exception}"
 
 
@@ -79,7 +95,7 @@ def test_notes_have_cycle_and_line_and_are_in_the_record(image: Path, tmp_path: 
 def test_strict_makes_the_first_one_a_fault(image: Path, tmp_path: Path) -> None:
     code, said = run(image, "--strict")
     assert code == 1
-    fault = r"the program converts the voltage at A5 \(nothing .*\) at address .* in main \(fights.c:11\)"
+    fault = r"was stopped at 0\.000 s: the program converts the voltage at A5 \(nothing .*\) at address .* in main \(fights.c:11\)"
     assert re.search(fault, said)
     with locked(tmp_path) as folder:
         execute(Request.single(brain=str(image), seconds=0.1, strict=True), None, folder)
@@ -91,3 +107,12 @@ def test_strict_makes_the_first_one_a_fault(image: Path, tmp_path: Path) -> None
 def test_nothing_is_noted_unasked(image: Path) -> None:
     result = execute(Request.single(brain=str(image), seconds=0.1), None, None)
     assert isinstance(result, RunResult) and result.notices == []
+
+
+def test_a_button_decides_only_while_it_is_closed(tmp_path: Path) -> None:
+    open_later = built(tmp_path, BUTTON), "--robot", "rover", "--arena", "empty", "--notes"
+    noted = [
+        "decides by pin 12" in run(*open_later, "--input", "button=1@0.02", *more)[1]
+        for more in ([], ["--input", "button=0@0.05"])
+    ]
+    assert noted == [False, True]

@@ -116,7 +116,7 @@ class Gdb:
         """
         sockets = [one for one in (self._listener, self._client) if one is not None]
         ready = select.select(sockets, [], [], seconds)[0]
-        if interrupts.first is not None and seconds:
+        if interrupts.first is not None:
             raise KeyboardInterrupt
         if self._listener in ready:
             newcomer, _ = self._listener.accept()

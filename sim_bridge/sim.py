@@ -310,8 +310,9 @@ class Sim:
             board = self.robot(crashed - 1).board
             board.raise_ended()
             whose = f" of robot {crashed}" if len(self.members) > 1 else ""
+            ended = "was stopped" if board.is_strict else "crashed"
             raise BoardError(
-                f"the {board.description}{whose} crashed at {self.cycle / CLOCK_HZ:.3f} s: {board.fault()}"
+                f"the {board.description}{whose} {ended} at {self.cycle / CLOCK_HZ:.3f} s: {board.fault()}"
             )
 
     @property

@@ -142,9 +142,10 @@ class Report:
         tick = max(range(self.schedule.ticks), key=self.schedule.tick_work)
         slots = self.schedule.slots[tick * self.schedule.slots_per_tick :][: self.schedule.slots_per_tick]
         found = [rows[piece.name] for slot in slots for piece in slot if piece.name in rows and rows[piece.name].bound]
-        if any(row.ratio is None for row in found):
+        measured = sum(row.emulator or 0 for row in found)
+        if not measured or any(row.ratio is None for row in found):
             return None
-        return sum(row.bound for row in found) / sum(row.emulator or 0 for row in found)
+        return sum(row.bound for row in found) / measured
 
     @property
     def edge_age(self) -> int | None:

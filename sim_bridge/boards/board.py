@@ -100,6 +100,7 @@ class EmulatedBoard:
         is_in_use: whether a simulation runs it.
         debugger: what is closed before it.
         ended: why a debugger has ended its run.
+        is_strict: what a bench does not show of a program ends its run.
         stood_still_s: how long the program has stood still in a debugger, by the wall clock.
     """
 
@@ -115,6 +116,7 @@ class EmulatedBoard:
         self.is_in_use: Callable[[], bool] = lambda: False
         self.debugger: Closes | None = None
         self.ended: BaseException | None = None
+        self.is_strict = False
         self.stood_still_s = 0.0
 
     @property

@@ -10,6 +10,6 @@ from sim_bridge.devices.catalogue import At, Part, joined
 @joined(Display)
 def part(device: Display, at: At) -> Part:
     """Controller and glass."""
-    oscillator = max(0.1, 1.0 + at.draw["display_spread"] * at.draw(170 + at.number, 0))
+    oscillator = max(0.1, 1.0 + at.draw["display_spread"] * at.draw(280 + at.number, 0))
     pins = [device.rs_pin, device.enable_pin, device.d4_pin, device.d5_pin, device.d6_pin, device.d7_pin]
     return Part("display_kind", at.number, pins, ffi.new("display_parameters *", [oscillator]))

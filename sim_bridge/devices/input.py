@@ -12,7 +12,7 @@ def contact(device: Contact, at: At) -> Part:
     """A contact."""
     closed = isinstance(device, SlideSwitch) and device.closed
     values = [device.to == "supply", device.resistor, closed, at.draw["contact_bounce_s"]]
-    number = at.number + 5 * isinstance(device, SlideSwitch)  # their noise is another's
+    number = at.number + 20 * isinstance(device, SlideSwitch)  # an Uno has 20 pins; their noise is another's
     return Part("contact_kind", number, [device.pin], ffi.new("contact_parameters *", values))
 
 

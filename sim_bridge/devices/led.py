@@ -12,6 +12,6 @@ FORWARD_V = {"red": 2.0, "yellow": 2.1, "green": 2.2, "blue": 3.2, "white": 3.2}
 @joined(Led)
 def part(device: Led, at: At) -> Part:
     """Diode and resistor."""
-    spread = max(0.1, 1.0 + at.draw["led_spread"] * at.draw(140 + at.number, 0))
+    spread = max(0.1, 1.0 + at.draw["led_spread"] * at.draw(260 + at.number, 0))
     values = [FORWARD_V[device.colour], at.draw["led_resistor_ohm"], spread, device.to == "supply"]
     return Part("led_kind", at.number, [device.pin], ffi.new("led_parameters *", values))

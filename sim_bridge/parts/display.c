@@ -156,4 +156,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-const part_kind display_kind = {.size = sizeof(display), .noise = 150, .pins = DB4 + 4, .init = init};
+const part_kind display_kind = {.size = sizeof(display), .noise = 280, .pins = DB4 + 4, .init = init};

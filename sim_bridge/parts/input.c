@@ -38,13 +38,13 @@ static int init_contact(part *base, const part_place *place, const uint8_t *pins
   contact *self = (contact *)base;
   const contact_parameters *p = parameters;
   self->parameters = *p;
-  const uint8_t resistor = p->to_supply ? PART_WEAK_LOW : PART_PULLED_UP, pulled = p->resistor ? resistor : 0;
+  const uint8_t resistor = p->to_supply ? PART_WEAK_LOW : PART_PULLED_UP, pulled = p->resistor ? resistor : PART_OPENS;
   part_join(base, &CONTACT, place, &(part_pin){pins[0], PART_DRIVES | pulled}, 1);
   part_drive(base, 0, pins[0], level_of(p, p->closed));
   return 0;
 }
 
-const part_kind contact_kind = {.size = sizeof(contact), .noise = 111, .pins = 1, .init = init_contact};
+const part_kind contact_kind = {.size = sizeof(contact), .noise = 200, .pins = 1, .init = init_contact};
 
 /* ---- potentiometer ------------------------------------------------------------------------------------------------- */
 
@@ -84,4 +84,4 @@ static int init_potentiometer(part *base, const part_place *place, const uint8_t
 }
 
 const part_kind potentiometer_kind = {
-    .size = sizeof(potentiometer), .noise = 121, .pins = 1, .init = init_potentiometer};
+    .size = sizeof(potentiometer), .noise = 240, .pins = 1, .init = init_potentiometer};

@@ -59,4 +59,4 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   return 0;
 }
 
-const part_kind led_kind = {.size = sizeof(led), .noise = 140, .pins = 1, .init = init};
+const part_kind led_kind = {.size = sizeof(led), .noise = 260, .pins = 1, .init = init};

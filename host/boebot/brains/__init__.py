@@ -36,6 +36,7 @@ from boebot import arguments, slips
 from boebot.errors import BrainError, CallError, as_utf8, did_you_mean
 from boebot.pausable_thread import leave_copy
 from boebot.robot import Robot
+from boebot.sketches import NAMES as SKETCH_NAMES
 
 if TYPE_CHECKING:  # what a brain of one function does without is imported where it is needed
     from boebot.brain import Brain
@@ -71,7 +72,7 @@ class LoadedBrain:
     @property
     def is_program(self) -> bool:
         """It is a program for the board, and there is no brain."""
-        return self.path is not None and self.path.suffix in PROGRAMS
+        return self.path is not None and self.path.suffix.lower() in PROGRAMS
 
     @property
     def is_over(self) -> bool:
@@ -115,7 +116,7 @@ def names_program(source: object) -> bool:
     The name of a bundled brain means that brain."""
     if not isinstance(source, str | Path) or str(source) in bundled_files():
         return False
-    return Path(source).suffix in (*PROGRAMS, *SKETCHES) or os.path.isdir(source)  # noqa: PTH112 (no error where it is too long)
+    return Path(source).suffix.lower() in (*PROGRAMS, *SKETCHES) or os.path.isdir(source)  # noqa: PTH112 (no error where it is too long)
 
 
 def load_program(source: object, progress: Callable[[float], object] | None = None) -> LoadedBrain | None:
@@ -131,7 +132,7 @@ def load_program(source: object, progress: Callable[[float], object] | None = No
     if not isinstance(source, str | Path) or not names_program(source):
         return None
     path = Path(source)
-    if path.suffix not in PROGRAMS:
+    if path.suffix.lower() not in PROGRAMS:
         from boebot.sketch.build import built
 
         made = built(path, progress)
@@ -253,6 +254,8 @@ def _find(source: str | Path) -> Path:
         return files[str(source)]
     meant = next((f"{path}{suffix}" for suffix in (PYTHON, TOML) if Path(f"{path}{suffix}").is_file()), None)
     hint = f"; did you mean {meant}?" if meant else did_you_mean(str(source), files)
+    if str(source) in SKETCH_NAMES:
+        hint = f"; the bundled sketch of that name is copied by: boebot new {source} --sketch"
     raise BrainError(
         f"there is no brain {str(source)!r}; expected a bundled one ({', '.join(bundled())}) or a Python or TOML "
         f"file{hint}"

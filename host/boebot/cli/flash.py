@@ -62,19 +62,19 @@ def flash(
 
 
 def _only_port() -> str:
-    """Where the board is, if there is one; of several the one that is chosen at the terminal.
+    """The USB port, as an Uno has it, if there is one; of several the one that is chosen at the terminal.
 
     Raises:
         BoardError: there is none.
         CallError: there are several, and nobody to ask.
     """
-    ports: list[str] = sorted(port.device for port in list_ports.comports())
+    ports: list[str] = sorted(port.device for port in list_ports.comports() if port.vid is not None)
     if len(ports) == 1:
         return ports[0]
     if not ports:
-        raise BoardError("there is no serial port: is the board plugged in?")
+        raise BoardError("there is no board at a USB port: is it plugged in? Another port is named by --on")
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        raise CallError(f"there are several ports, {', '.join(ports)}; expected --on with one of them")
+        raise CallError(f"there are several USB ports, {', '.join(ports)}; expected --on with one of them")
     for number, port in enumerate(ports, 1):
         output.line(f"{number}  {port}", sys.stderr)
     chosen: int = typer.prompt("Which one has the board that is to be written", type=int, err=True)
@@ -122,7 +122,10 @@ def _show_first_line(port: str, baud: int) -> None:
         while b"\n" not in said.lstrip() and time.monotonic() < end:
             said += line.read(0.1)
     first = said.strip().partition(b"\n")[0].strip()
-    if first:
-        output.line(f"it prints: {first[:200].decode('utf-8', 'backslashreplace')}")
+    words = first.decode("utf-8", "replace")[:200]
+    if first and "\ufffd" not in words and words.replace("\t", "").isprintable():
+        output.line(f"it prints: {words}")
+    elif first:
+        output.line(f"what it prints is no text at {baud} bit/s; expected --baud with the rate of its Serial.begin()")
     else:
         output.line(f"it has printed nothing in {FIRST_LINE_S:g} s at {baud} bit/s")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import sys
 import threading
@@ -34,8 +35,9 @@ class Typist(Onlooker):
 
     def _read(self) -> None:
         # not by sys.stdin, whose lock a thread that waits there would keep until Python has ended
+        decoder = codecs.getincrementaldecoder("utf-8")("replace")  # a letter may come in two pieces
         try:
             while data := os.read(sys.stdin.fileno(), ROOM):
-                self._typed.put(data.decode("utf-8", "replace"))
+                self._typed.put(decoder.decode(data))
         except (OSError, ValueError, AttributeError):  # there is none, or none to read from
             return

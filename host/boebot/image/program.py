@@ -156,7 +156,7 @@ def hex_program(path: Path, data: bytes) -> Program:
                 case kind, length:
                     wrong = f"there is no record of type {kind} with {length} bytes of data"
         if wrong:
-            raise AnalysisError(f"{what} is no HEX file, or is damaged: line {number}: {wrong}")
+            raise AnalysisError(f"{what} cannot be loaded: line {number}: {wrong}")
     if not is_over and memory.flash_end:
         raise AnalysisError(f"{what} is cut short: its last line is not the record that ends it, :00000001FF")
     assumed = f"{what} does not say which chip it is for: it is taken for an {CHIP}"

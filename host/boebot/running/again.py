@@ -112,7 +112,7 @@ class Recorded:
 
     @property
     def _foreign_brains(self) -> list[str]:
-        return [name for files in self.foreign.values() for name in files if Path(name).suffix not in PROGRAMS]
+        return [name for files in self.foreign.values() for name in files if Path(name).suffix.lower() not in PROGRAMS]
 
     @property
     def seconds(self) -> float:

@@ -59,10 +59,10 @@ def test_bytes_lie_where_a_hex_file_says() -> None:
         (record(8, b"\1" * 8) + record(0, b"\1" * 9), "line 2: some of its 9 bytes at address 0x0 are there twice"),
         (END * 100_000, "it has 1200000 B; expected 1048576 at most"),
         (END, "holds no program"),
-        ("hello\n", "is no HEX file, or is damaged: .*line 1"),
+        ("hello\n", "cannot be loaded: line 1: expected a colon"),
         (record(0x7FFF, b"\x01\x02") + END, "its 2 bytes at address 0x7FFF do not fit into an ATmega328P"),
         (record(0, b"\x00\x01", 4) + record(0, b"\x01") + END, "its 1 bytes at address 0x10000 do not fit"),
-        ("\x80\xff", "is no HEX file, or is damaged"),
+        ("\x80\xff", "cannot be loaded: line 1: expected a colon"),
     ],
 )
 def test_a_wrong_hex_file_is_one_sentence(text: str, sentence: str) -> None:

@@ -89,6 +89,7 @@ class AvrBoard(EmulatedBoard):
         """Notes from now on what a bench does not show (avr_checks.h); `strict`: the first of it is a fault."""
         if not self.lib.avr_board_check(self.handle, strict):
             raise MemoryError("notes of a program")
+        self.is_strict = strict
 
     # ---- recorder ----------------------------------------------------------------------------------------------------
 
