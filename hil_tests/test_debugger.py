@@ -1,4 +1,4 @@
-"""A run under avr-gdb leaves the record of the run without it; and who cannot have a debugger is told so."""
+"""A run under avr-gdb leaves the same record as one without it; a debugger where none can be is refused."""
 
 from __future__ import annotations
 

@@ -85,7 +85,10 @@ def test_what_holds_the_port_is_named_and_a_retry_works() -> None:
 
 
 def test_of_several_ports_none_is_guessed(monkeypatch: pytest.MonkeyPatch) -> None:
-    for there, sentence in (([], "no board at a USB port"), (["/dev/a", "/dev/b"], "several USB ports, /dev/a, /dev/b;")):
+    for there, sentence in (
+        ([], "no board at a USB port"),
+        (["/dev/a", "/dev/b"], "several USB ports, /dev/a, /dev/b;"),
+    ):
         ports = [type("Port", (), {"device": name, "vid": 0x2341}) for name in there]
         ports.append(type("Port", (), {"device": "/dev/ttyS0", "vid": None}))  # a computer's own
         monkeypatch.setattr(list_ports, "comports", lambda ports=ports: ports)

@@ -1,4 +1,4 @@
-"""Any program for the Uno drives the emulated robot: what it prints and is told, how its run ends and is repeated."""
+"""Any program for the Uno drives the emulated robot: what it prints, what is typed, how its run ends and is repeated."""
 
 from __future__ import annotations
 
@@ -289,7 +289,7 @@ def test_csv_has_no_columns_of_what_the_host_does_not_know(program: Path, tmp_pa
 
 
 def test_a_robot_of_programs_is_driven_by_them_alone(program: Path, tmp_path: Path) -> None:
-    """Its left servo is on a pin that the kit's firmware has no servo on, and its uart is nobody's."""
+    """Its left servo is on a pin on which the kit's firmware has none, and nothing is joined to its uart."""
     mine = tmp_path / "mine.toml"
     mine.write_text(
         'extends = "shieldbot"\nname = "mine"\nfirmware = "none"\nremove = ["uart"]\n'

@@ -151,7 +151,7 @@ def test_the_program_measures_the_wall_by_the_echo_as_long_as_sound_takes_there_
 
 def test_a_record_its_page_and_a_repetition_have_them(result: RunResult, folder: Path) -> None:
     again = read_run(folder / "run")
-    assert isinstance(again, RunResult) and again.touched == 0, "nobody has touched it: a script has"
+    assert isinstance(again, RunResult) and again.touched == 0, "a script touched it, not a person"
     assert np.array_equal(again.series.number("lamp", "brightness"), result.series.number("lamp", "brightness"))
     assert {"lamp_brightness", "lamp_lit", "start_pressed", "dial_position"} <= again.series.columns().keys()
     assert '"lamp"' in (folder / "run" / "replay.html").read_text()

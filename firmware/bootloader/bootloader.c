@@ -4,7 +4,7 @@
  * last byte; then, or at once, the program begins.
  *
  * It treats the program as Optiboot 4.4 does, which an Uno comes with: it takes MCUSR and leaves it empty, and uses RAM
- * from 0x100 on and the stack. It writes no page of its own section, as the Uno's lock bits have it.
+ * from 0x100 on and the stack. It does not write into its section, as the Uno's lock bits have it.
  */
 #include <avr/boot.h>
 #include <avr/io.h>

@@ -311,7 +311,7 @@ class LiveSession:
     layout: Mapping[str, slice] = {}
 
     def readings(self) -> tuple[float, ...]:
-        """Nobody sees what is wired to a real board."""
+        """What is wired to a real board is not known."""
         return ()
 
     def texts(self) -> Mapping[str, str]:

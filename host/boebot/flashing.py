@@ -117,4 +117,6 @@ def _why(port: str, said: str) -> str:
         return (
             f"the board at {port} stopped answering after {share} % of the upload: is its cable sound? flash it again"
         )
-    return f"the board at {port} does not answer; expected an Uno with its boot loader, and nobody else at its port"
+    return (
+        f"the board at {port} does not answer; expected an Uno with its boot loader, and no other program at its port"
+    )

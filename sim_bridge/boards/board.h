@@ -100,7 +100,7 @@ typedef struct {
   size_t count;
 } board_notes;
 
-/* What a program is checked by while it runs, off at first: whoever joins something to the board's pins says what, by bits of
+/* What a program is checked by while it runs, off at first: who joins something to the board's pins says what, by bits of
  * Arduino's numbers. */
 typedef struct {
   bool on, strict;
@@ -145,7 +145,7 @@ typedef struct {
   uint8_t unused[6];
 } board_frame;
 
-/* What the outside does to the pins, edge by edge, and what is on the line to the board and from it; while it is on. Whoever
+/* What the outside does to the pins, edge by edge, and what is on the line to the board and from it; while it is on. Who
  * takes what is there sets `first` to `end`. */
 typedef struct {
   bool on;

@@ -33,7 +33,7 @@ int sim_place_shape(sim *self, int shape, double x, double y, double heading) {
   return SIM_OK;
 }
 
-/* Takes a pin from its part. Returns 1 if a resistor pulls it up when nobody drives it. */
+/* Takes a pin from its part. Returns 1 if a resistor pulls it up when nothing drives it. */
 static int take_pin(robot *r, uint8_t pin) {
   int pulled_up = 0;
   for (int i = 0; i < r->part_count; i++) {

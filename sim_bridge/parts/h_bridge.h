@@ -1,7 +1,7 @@
 /* h_bridge.h: one channel of an H-bridge (L298N) with a geared DC motor at its outputs, which turns a wheel.
  *
  * Enable high and the inputs different: it drives. Enable high and the inputs equal: brake. Enable low: coast (L298 data
- * sheet, "Input for ... bidirectional DC motor control"). An input that nobody drives is low, a pulled-up one high: it takes
+ * sheet, "Input for ... bidirectional DC motor control"). An input that is not driven is low, a pulled-up one high: it takes
  * 30 uA. Enable without a pin is the module's jumper: high.
  *
  * Between two edges the current is solved exactly (world/h_bridge), at the speed of the wheel and the voltage of the pack

@@ -28,9 +28,9 @@
 enum {
   PART_HEARS = 1,      /* `edge` is called for what the board does to it */
   PART_DRIVES = 2,     /* the part drives it */
-  PART_PULLED_UP = 4,  /* a resistor pulls it up when nobody drives it */
+  PART_PULLED_UP = 4,  /* a resistor pulls it up when nothing drives it */
   PART_ANALOG = 8,     /* `analog` is asked for the voltage there */
-  PART_WEAK_HIGH = 16, /* as which it drives it is a resistor's, or a charge: whoever drives it too is stronger */
+  PART_WEAK_HIGH = 16, /* high is only a resistor's pull, or a charge: what else drives the pin is stronger */
   PART_WEAK_LOW = 32,
   PART_OPENS = 64 /* nothing at all drives it where the part does not: it floats */
 };

@@ -68,7 +68,7 @@ def opened(image: Path, *, gdb: int | None, realtime: bool = False) -> SimSessio
 
 
 class Run:
-    """A session in a thread of its own, for 30 ms."""
+    """A session in another thread, for 30 ms."""
 
     def __init__(self, session: SimSession, seconds: float = 0.03) -> None:
         self.session, self.seconds = session, seconds

@@ -66,7 +66,7 @@ def _only_port() -> str:
 
     Raises:
         BoardError: there is none.
-        CallError: there are several, and nobody to ask.
+        CallError: there are several, and no terminal to ask at.
     """
     ports: list[str] = sorted(port.device for port in list_ports.comports() if port.vid is not None)
     if len(ports) == 1:

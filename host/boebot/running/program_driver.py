@@ -1,4 +1,4 @@
-"""Drives a robot by the program on its board: nobody speaks the kit's protocol, what the program prints is text.
+"""Drives a robot by the program on its board: it does not speak the kit's protocol, what it prints is text.
 
 The host only lets time pass, keeps what comes with the time of each byte, and sends what a person types
 (`boebot.running.hands`). The run is over when its time is up, or when the program has printed what was looked for.
@@ -27,7 +27,7 @@ class ProgramDriver(Driver):
         """Raises BoardError where the board's line cannot be listened to at its own bit rate."""
         line = session.transport
         if not isinstance(line, Following):
-            raise BoardError(f"{line.name} runs no program of its own; expected the emulated ATmega328P (--on avr)")
+            raise BoardError(f"{line.name} runs only the kit's firmware; expected the emulated ATmega328P (--on avr)")
         line.follow()
         self.session, self.task, self._line = session, task, line
         self.description = task.board.robot

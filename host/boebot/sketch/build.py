@@ -8,7 +8,7 @@ A project may be made of anything; PlatformIO looks each time at what has change
     cache/core-HASH/            a core directory for PlatformIO, without its registry
     cache/libraries/            libraries that were downloaded
     cache/objects-HASH/         compiled files, for all builds
-    cache/work/HASH/            of a user's folder: the copy, and PlatformIO's files; build.log: all that it said
+    cache/builds/HASH/          of a user's folder: the copy, and PlatformIO's files; build.log: all that it said
     cache/programs/HASH/        finished ELF files
 
 One build at a time. What is finished gets its name in one go, so that it is whole or not there.
@@ -309,7 +309,7 @@ def _core(tools: _Tools) -> Path:
 
 def _work(*of: object) -> Path:
     """A folder for what belongs to that."""
-    work = cache() / "work" / _hash(of)
+    work = cache() / "builds" / _hash(of)
     work.mkdir(parents=True, exist_ok=True)
     return work
 

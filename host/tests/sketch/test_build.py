@@ -43,7 +43,7 @@ def test_a_sketch_is_built_once_and_its_lines_are_the_users(tmp_path: Path, monk
     assert "turn.ino:4" in read_image(made.elf).lines.values()
     command = ["avr-objdump", "--dwarf=rawline", str(made.elf)]
     folders = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert str(folder) in folders and str(cache() / "work") not in folders
+    assert str(folder) in folders and str(cache() / "builds") not in folders
 
     with monkeypatch.context() as patched:
         patched.setattr(build, "_PlatformIO", None)
@@ -146,7 +146,7 @@ def test_two_at_once_and_one_that_is_interrupted_leave_nothing_half(tmp_path: Pa
     command = [sys.executable, "-c", BUILD, str(folder)]
     programs = set(cache().glob("programs/*/robot*"))  # other tests build at the same time
     first = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    work = cache() / "work"
+    work = cache() / "builds"
     while not any("Scanning" in log.read_text() for log in work.glob("*/build.log") if _is_of(log, folder)):
         assert first.poll() is None
         time.sleep(0.01)

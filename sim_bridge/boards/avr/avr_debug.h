@@ -15,7 +15,7 @@
 #include "../board.h"
 
 /* python: begin */
-/* Why the program stands still, by the number of the signal that says it; AVR_LOOKS: it runs, and whoever wants to stop it
+/* Why the program stands still, by the number of the signal that says it; AVR_LOOKS: it runs, and the debugger may stop it
  * is asked now and then. */
 typedef enum {
   AVR_LOOKS = 0,
@@ -40,7 +40,7 @@ typedef struct {
   uint32_t pc;          /* byte address of the next instruction */
 } avr_debug;
 
-/* Calls `debugger` from now on; NULL: nobody any more. NULL: no memory. */
+/* Calls `debugger` from now on; NULL: none any more. NULL: no memory. */
 avr_debug *avr_board_debug(board *self, avr_debugger *debugger);
 
 /* A byte at an address as ELF files and gdb have it: flash from 0, data from 0x800000 (registers as a program would read

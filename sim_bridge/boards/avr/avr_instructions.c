@@ -27,7 +27,7 @@ enum { Y = 28, Z = 30 };
 #define H ((opcode >> 4 & 0xFu) + 16u) /* d of an instruction with a constant */
 #define K ((uint8_t)((opcode >> 4 & 0xF0u) | (opcode & 0xFu)))
 
-/* ---- RAM; false: the address is not there, or `written`, where the program is checked, says that nobody wrote there ---- */
+/* ---- RAM; false: the address is not there, or `written`, where the program is checked, says that nothing wrote there ---- */
 
 static inline bool in_ram(uint16_t address) { return (uint16_t)(address - RAM_BEGIN) < BOARD_DATA_SIZE - RAM_BEGIN; }
 

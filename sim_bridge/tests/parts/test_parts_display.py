@@ -17,7 +17,7 @@ SHORT_US, DATA_US, LONG_US, POWER_ON_US = 37, 41, 1520, 10_000
 
 
 class Bus:
-    """A program that writes to the display, as slowly as the data sheet asks for unless it is told."""
+    """A program that writes to the display, as slowly as the data sheet asks for, or faster."""
 
     def __init__(self, *, spread: float = 0.0, begin_us: float = 40_000) -> None:
         robot = msgspec.structs.replace(load_robot("shieldbot"), firmware="none", device={"lcd": DEVICE})
