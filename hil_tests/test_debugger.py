@@ -13,6 +13,7 @@ from boebot.cli.app import app
 from boebot.result import RunResult
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytestmark = pytest.mark.emulated
 
@@ -37,11 +38,7 @@ int main(void) {
 
 @pytest.fixture(scope="module")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("program")
-    (folder / "turn.c").write_text(SOURCE)
-    flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Og", "-gdwarf-4"]
-    subprocess.run(["avr-gcc", *flags, "-o", folder / "turn.elf", folder / "turn.c"], check=True)
-    return folder / "turn.elf"
+    return compiled(SOURCE, tmp_path_factory.mktemp("program") / "turn.elf", "-Og")
 
 
 def free_port() -> int:

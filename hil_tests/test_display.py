@@ -4,7 +4,6 @@ and run.csv."""
 from __future__ import annotations
 
 import csv
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot.view import tables
 from boebot.view.replay import content
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytestmark = pytest.mark.emulated
 
@@ -87,9 +87,7 @@ int main(void) {
 
 def test_text_of_a_display_is_in_all_that_a_run_leaves(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(WIRING)
-    (tmp_path / "lcd.c").write_text(SOURCE)
-    flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-Wall", "-Wno-unused-parameter"]
-    subprocess.run(["avr-gcc", *flags, "-o", tmp_path / "lcd.elf", tmp_path / "lcd.c"], check=True)
+    compiled(SOURCE, tmp_path / "lcd.elf", "-Wno-unused-parameter")
     request = Request.single(brain=tmp_path / "lcd.elf", robot=tmp_path / "mine.toml", seconds=0.2)
     with locked(tmp_path / "run") as kept:
         execute(request, None, kept)

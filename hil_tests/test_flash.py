@@ -3,14 +3,12 @@ sentence in bounded time for what does not, after which another try works."""
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -21,6 +19,7 @@ import copied_process
 from boebot import flashing
 from boebot.cli import flash as command
 from boebot.errors import BoardError, CallError
+from hil_tests.serving import serving
 from hil_tests.test_upload import program, served
 from sim_bridge.sessions.session import SimSession
 
@@ -35,23 +34,9 @@ def boebot(*arguments: str) -> copied_process.Done:
     return copied_process.command(arguments, Path.cwd())
 
 
-@contextmanager
-def uno(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+def uno(*options: str) -> AbstractContextManager[tuple[str, subprocess.Popen[str]]]:
     """The URL of an Uno that another process serves, and that process."""
-    words = [sys.executable, "-m", "boebot", "serve", "--on", "avr", "--bootloader", "--arena", "empty", "--json"]
-    server = subprocess.Popen([*words, *options], stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
-    try:
-        announced = ""
-        for line in server.stdout:
-            announced += line
-            if line == "}\n":
-                break
-        yield json.loads(announced)["url"], server
-    finally:
-        server.send_signal(signal.SIGINT)
-        server.wait(timeout=20)
-        server.stdout.close()
+    return serving("--on", "avr", "--bootloader", "--arena", "empty", *options)
 
 
 def test_the_kits_firmware_is_written_and_shakes_hands() -> None:

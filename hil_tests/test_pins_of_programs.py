@@ -3,7 +3,6 @@ serial line, and what the outside does; a session says what is there now."""
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from boebot.running.hands import Hands, Onlooker
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot.view import save_pins
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytestmark = pytest.mark.emulated
 
@@ -77,11 +77,7 @@ def read_uart(changes: list[tuple[int, str]], bits: tuple[float, ...], after: fl
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("pins")
-    (folder / "pins.c").write_text(SOURCE)
-    flags = ["-mmcu=atmega328p", "-Os", "-Wall"]
-    subprocess.run(["avr-gcc", *flags, "-o", folder / "pins.elf", folder / "pins.c"], check=True)
-    return folder / "pins.elf"
+    return compiled(SOURCE, tmp_path_factory.mktemp("pins") / "pins.elf")
 
 
 @pytest.fixture(scope="module")

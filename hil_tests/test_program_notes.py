@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -15,6 +14,7 @@ from boebot.result import RunResult, read_run
 from boebot.running.again import again, recorded
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytestmark = pytest.mark.emulated
 
@@ -52,16 +52,9 @@ int main(void) {
 """
 
 
-def built(folder: Path, source: str) -> Path:
-    (folder / "fights.c").write_text(source)
-    flags = ["-mmcu=atmega328p", "-Os", "-gdwarf-4", "-DF_CPU=16000000UL"]
-    subprocess.run(["avr-gcc", *flags, "-o", folder / "fights.elf", folder / "fights.c"], check=True)
-    return folder / "fights.elf"
-
-
 @pytest.fixture(scope="module")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built(tmp_path_factory.mktemp("program"), SOURCE)
+    return compiled(SOURCE, tmp_path_factory.mktemp("program") / "fights.elf")
 
 
 NOTES = [
@@ -95,7 +88,7 @@ def test_notes_have_cycle_and_line_and_are_in_the_record(image: Path, tmp_path: 
 def test_strict_makes_the_first_one_a_fault(image: Path, tmp_path: Path) -> None:
     code, said = run(image, "--strict")
     assert code == 1
-    fault = r"was stopped at 0\.000 s: the program converts the voltage at A5 \(nothing .*\) at address .* in main \(fights.c:11\)"
+    fault = r"stopped at 0\.000 s: the program converts the voltage at A5 \(nothing .*\) at .* in main \(fights.c:11\)"
     assert re.search(fault, said)
     with locked(tmp_path) as folder:
         execute(Request.single(brain=str(image), seconds=0.1, strict=True), None, folder)
@@ -110,7 +103,7 @@ def test_nothing_is_noted_unasked(image: Path) -> None:
 
 
 def test_a_button_decides_only_while_it_is_closed(tmp_path: Path) -> None:
-    open_later = built(tmp_path, BUTTON), "--robot", "rover", "--arena", "empty", "--notes"
+    open_later = compiled(BUTTON, tmp_path / "button.elf"), "--robot", "rover", "--arena", "empty", "--notes"
     noted = [
         "decides by pin 12" in run(*open_later, "--input", "button=1@0.02", *more)[1]
         for more in ([], ["--input", "button=0@0.05"])

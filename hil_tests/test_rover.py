@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import pytest
 import boebot
 from boebot.result import RunResult
 from boebot.view import scene
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytestmark = pytest.mark.emulated
 
@@ -110,10 +110,7 @@ int main(void) {
 
 
 def program(folder: Path, source: str) -> Path:
-    (folder / "rover.c").write_text(MOTORS + source)
-    flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-Wall", "-Wno-array-bounds"]
-    subprocess.run(["avr-gcc", *flags, "-o", folder / "rover.elf", folder / "rover.c"], check=True)
-    return folder / "rover.elf"
+    return compiled(MOTORS + source, folder / "rover.elf")
 
 
 def drive(

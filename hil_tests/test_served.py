@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -19,32 +19,16 @@ import serial
 
 import copied_process
 from boebot.result import RunResult, read_run
+from hil_tests.serving import serving
 
 pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
 
 BOEBOT = [sys.executable, "-m", "boebot"]
 
 
-@contextmanager
-def served(board: str, *where: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """The URL of an emulated robot that another process serves, and that process."""
-    server = subprocess.Popen(
-        [*BOEBOT, "serve", "--on", board, *where, "--arena", "room", "--json"],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert server.stdout is not None
-    try:
-        announced = ""
-        for line in server.stdout:
-            announced += line
-            if line == "}\n":
-                break
-        yield json.loads(announced)["url"], server
-    finally:
-        server.send_signal(signal.SIGINT)
-        assert server.wait(timeout=20) in (0, 130, -signal.SIGKILL)
-        server.stdout.close()
+def served(board: str, *where: str) -> AbstractContextManager[tuple[str, subprocess.Popen[str]]]:
+    """As `serving`: a robot in a room."""
+    return serving("--on", board, *where, "--arena", "room")
 
 
 @pytest.fixture(scope="module")

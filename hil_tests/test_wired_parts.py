@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import signal
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import copied_process
 from boebot.result import RunResult, read_run
 from boebot.running.again import again as repeated
 from boebot.running.again import recorded
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytestmark = pytest.mark.emulated
 
@@ -109,11 +109,9 @@ INPUTS = [("start", 1, 0.3), ("dial", 0.75, 0.5), ("start", 0, 0.6)]
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """With the program and the robot's file."""
     made = tmp_path_factory.mktemp("wired")
-    (made / "wired.c").write_text(SOURCE)
     (made / "mine.toml").write_text(WIRING)
     (made / "wall.toml").write_text(ARENA)
-    flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-g", "-Wall"]
-    subprocess.run(["avr-gcc", *flags, "-o", made / "wired.elf", made / "wired.c"], check=True)
+    compiled(SOURCE, made / "wired.elf")
     return made
 
 

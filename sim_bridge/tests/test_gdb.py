@@ -20,6 +20,7 @@ from boebot.errors import BoardError, CallError
 from sim_bridge.gdb import Gdb
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sessions.world import AVR, NATIVE, Pace, open_on
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 SOURCE = """
 #include <avr/io.h>
@@ -53,11 +54,7 @@ int main(void) {
 
 @pytest.fixture(scope="module")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("gdb")
-    (folder / "rounds.c").write_text(SOURCE)
-    flags = ["-mmcu=atmega328p", "-Og", "-gdwarf-4"]
-    subprocess.run(["avr-gcc", *flags, "-o", folder / "rounds.elf", folder / "rounds.c"], check=True)
-    return folder / "rounds.elf"
+    return compiled(SOURCE, tmp_path_factory.mktemp("gdb") / "rounds.elf", "-Og")
 
 
 def opened(image: Path, *, gdb: int | None, realtime: bool = False) -> SimSession:
@@ -292,9 +289,8 @@ def test_a_packet_that_is_damaged_is_asked_for_again(image: Path) -> None:
 
 def test_a_crash_can_be_looked_at(image: Path, tmp_path: Path) -> None:
     """And ends the run when the debugger lets it go on."""
-    (tmp_path / "wild.c").write_text("int main(void) { ((void (*)(void))0x3F00)(); }")
-    subprocess.run(["avr-gcc", "-mmcu=atmega328p", "-o", tmp_path / "wild.elf", tmp_path / "wild.c"], check=True)
-    with running(tmp_path / "wild.elf") as (run, port), connected(port) as client:
+    wild = compiled("int main(void) { ((void (*)(void))0x3F00)(); }", tmp_path / "wild.elf", "-O0")
+    with running(wild) as (run, port), connected(port) as client:
         client.sendall(packet("c"))
         assert hear(client) == "S0B"
         client.sendall(packet("c"))

@@ -1,4 +1,4 @@
-"""Small AVR programs for tests: assembled by avr-gcc when the test runs, and a board that runs them."""
+"""Small AVR programs for tests: made by avr-gcc when the test runs, and a board that runs them."""
 
 from __future__ import annotations
 
@@ -30,6 +30,15 @@ def assemble(source: str) -> bytes:
         result = subprocess.run(command, capture_output=True, text=True, check=False)
         assert result.returncode == 0, result.stderr
         return image.read_bytes()
+
+
+def compiled(source: str, image: Path, *options: str) -> Path:
+    """The ELF file of a C program; its source lies beside it, for lines."""
+    program = image.with_suffix(".c")
+    program.write_text(source, encoding="ascii")
+    flags = ["-mmcu=atmega328p", "-DF_CPU=16000000UL", "-Os", "-Wall", "-Wno-array-bounds", "-gdwarf-4", *options]
+    subprocess.run(["avr-gcc", *flags, "-o", image, program], check=True)
+    return image
 
 
 class Machine:
