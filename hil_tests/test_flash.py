@@ -14,12 +14,12 @@ from pathlib import Path
 import pytest
 import serial
 from serial.tools import list_ports
+from serving import serving
 
 import copied_process
 from boebot import flashing
 from boebot.cli import flash as command
 from boebot.errors import BoardError, CallError
-from hil_tests.serving import serving
 from hil_tests.test_upload import program, served
 from sim_bridge.sessions.session import SimSession
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import pytest
 from vcdvcd import VCDVCD
 
 import boebot
-from boebot.boards import ShowsPins
+from boebot.boards import BoardSession
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
 from boebot.record.run import Run
@@ -93,10 +94,10 @@ class Looking(Onlooker):
     """Looks at the pins of a robot when the run is over."""
 
     def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
-        self.session = robots[0].driver.session
+        self.session = cast(BoardSession, robots[0].driver.session)
 
     def look(self, time_s: float, *, is_over: bool = False) -> None:
-        if is_over and isinstance(self.session, ShowsPins):
+        if is_over:
             self.pins = self.session.pins_now()
 
 

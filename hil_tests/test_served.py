@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 import serial
+from serving import serving
 
 import copied_process
 from boebot.result import RunResult, read_run
-from hil_tests.serving import serving
 
 pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
 

@@ -57,7 +57,6 @@ struct robot {
   buffer received, received_at, truth, looks, tones;
   bool is_stamped;
   double sampled[...];
-  uint8_t has_sampled;
   edge_log edges;
   uint64_t last_byte, listen_from, reset_at, contacts;
   ...;

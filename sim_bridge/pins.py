@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -91,8 +92,8 @@ class BoardPins(BoardMemory):
                 share = float(lengths[whole_ones["level"][:-1] == Level.HIGH].sum() / lengths.sum())
                 rate = float((len(rises) - 1) / lengths.sum() * CLOCK_HZ)
             channel = pin - ANALOG_PINS[0]
-            volts = robot.sampled[channel] if channel >= 0 and robot.has_sampled >> channel & 1 else None
-            found.append(PinNow(int(does), level, share, rate, volts))
+            volts = robot.sampled[channel] if channel >= 0 else math.nan
+            found.append(PinNow(int(does), level, share, rate, None if math.isnan(volts) else volts))
         return found
 
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:

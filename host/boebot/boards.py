@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 
 from boebot.arenas import Arena
 from boebot.arenas.floor_plan import FloorPlan
@@ -116,14 +116,6 @@ class PinNow(NamedTuple):
     """as the program's converter has last sampled it"""
 
 
-@runtime_checkable
-class ShowsPins(Protocol):
-    """A session whose board can be seen into."""
-
-    def pins_now(self) -> Sequence[PinNow]:
-        """Of each pin, by its Arduino number; empty where this one cannot be."""
-
-
 class Session(Protocol):
     """A robot, opened. `close` gives everything back; nothing else is called after it."""
 
@@ -192,6 +184,9 @@ class BoardSession(Session, Protocol):
 
     def texts(self) -> Mapping[str, str]:
         """What displays at a simulated board show now, by names for people; empty of a real one."""
+
+    def pins_now(self) -> Sequence[PinNow]:
+        """Of each pin, by its Arduino number; empty where the board cannot be seen into."""
 
     def watchdog_resets(self) -> Sequence[WatchdogReset]:
         """Those so far, oldest first; empty where nobody sees into the board."""
@@ -317,6 +312,10 @@ class LiveSession:
     def texts(self) -> Mapping[str, str]:
         """Nor that."""
         return {}
+
+    def pins_now(self) -> Sequence[PinNow]:
+        """Nor these."""
+        return ()
 
     def set_part(self, device: str, value: float) -> None:
         """By hand only."""

@@ -21,7 +21,6 @@ double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
   if (channel == BOARD_ANALOG_SUPPLY) return self->chassis.supply * BOARD_NOMINAL_VOLTS;
   if (channel >= BOARD_ANALOG_COUNT) return 0.0;
   part *p = self->analog[channel];
-  self->has_sampled |= (uint8_t)(1u << channel);
   return self->sampled[channel] = p == NULL || p->unplugged ? 0.0 : p->op->analog(p, cycle);
 }
 

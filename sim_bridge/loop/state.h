@@ -31,8 +31,7 @@ struct robot {
   int part_count;
   part *hears[BOARD_PIN_COUNT][HEARING_PARTS + 1]; /* of each pin, up to the first NULL */
   part *analog[BOARD_ANALOG_COUNT];
-  double sampled[BOARD_ANALOG_COUNT]; /* V, the converter's last ones */
-  uint8_t has_sampled;                /* bit by bit: there is one */
+  double sampled[BOARD_ANALOG_COUNT]; /* V, the converter's last ones; NAN: none yet */
   brown_out brown_out;
   battery *battery;   /* NULL: a supply that never sags */
   double held_supply; /* share of the nominal voltage that a test holds, or 0 */

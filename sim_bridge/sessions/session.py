@@ -169,7 +169,7 @@ class SimSession(InWorld):
         return self.robot.texts()
 
     def pins_now(self) -> list[PinNow]:
-        """See `boebot.boards.ShowsPins`."""
+        """See `boebot.boards.BoardSession`."""
         return self.board.now()
 
     def notes(self) -> list[str]:

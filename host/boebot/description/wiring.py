@@ -53,3 +53,18 @@ def free_pins(robot: RobotDescription) -> list[str]:
         return []
     taken = {pin for device in robot.device.values() for pin in device.pins().values()}
     return [pin_name(number) for number in range(PINS) if number not in taken]
+
+
+def users_of_pins(robot: RobotDescription) -> dict[int, list[str]]:
+    """Arduino number of each pin that devices of the robot use, and their names."""
+    users: dict[int, list[str]] = {}
+    for name, device in robot.device.items():
+        for pin in device.pins().values() if device.on else ():
+            users.setdefault(pin, []).append(name)
+    return users
+
+
+def named_pins(robot: RobotDescription) -> list[str]:
+    """Of each pin of an Arduino Uno its name on the board's print, and the devices there."""
+    users = users_of_pins(robot)
+    return [" ".join([pin_name(pin), *users.get(pin, [])]).replace("_", " ") for pin in range(PINS)]

@@ -10,10 +10,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, cast
 
 from boebot.arenas.floor_plan import FloorPlan, floor_plan
-from boebot.boards import PinNow, ShowsPins
+from boebot.boards import BoardSession, PinNow
+from boebot.description.wiring import named_pins
 from boebot.errors import BoebotError
 from boebot.imperfections import switched_off, switches
 from boebot.link.transport import Measures
@@ -29,7 +30,6 @@ from boebot.running import interrupts
 from boebot.running.brain_parameters import bounds, sliders
 from boebot.running.hands import Hands, Onlooker
 from boebot.running.loop import gather_rows
-from boebot.view.page_data import named_pins
 
 EACH_UNSEEN_S = 0.5  # where no page is open
 EACH_AT_MOST_S = 1.0
@@ -190,7 +190,7 @@ class LiveView(Onlooker):
                     "driver": page,
                     "pose": _pose_now(robot),
                     "link": _quality(robot),
-                    "pins": _pins(robot) if self._audience.is_there else [],
+                    "pins": _pins(robot) if self._audience.is_there else (),
                 }
                 for robot, page in zip(self._robots, self._controls.drivers(), strict=True)
             ],
@@ -285,8 +285,8 @@ def _pose_now(robot: Hands) -> tuple[float, float, float] | None:
 
 
 def _pins(robot: Hands) -> Sequence[PinNow]:
-    session = robot.driver.session
-    return session.pins_now() if isinstance(session, ShowsPins) else ()
+    driver = robot.driver
+    return cast(BoardSession, driver.session).pins_now() if driver.description.has_board else ()
 
 
 def _quality(robot: Hands) -> Message:

@@ -34,8 +34,7 @@ import msgspec
 import numpy as np
 
 from boebot.description import robots
-from boebot.description.wiring import PINS
-from boebot.devices.device import pin_name
+from boebot.description.wiring import named_pins
 from boebot.devices.drawing import Item
 from boebot.link.messages import Status
 from boebot.record.interventions import STREAM, in_words
@@ -237,28 +236,11 @@ def pins(block: Block, robot: robots.RobotDescription, begin: float) -> dict[str
     """Output edges of a record, rows of its stream "pins", by the name of the pin: on the run's clock, which begins at
     `begin` (s)."""
     times, rows = block.times, block.table(np.dtype([("pin", "u1"), ("level", "u1")]))
-    users = users_of_pins(robot)
-    found = {}
+    names, found = named_pins(robot), {}
     for pin in np.unique(rows["pin"][times > begin]).tolist():  # pins that do something
         own = rows["pin"] == pin
-        name = " ".join([pin_name(pin), *users.get(pin, [])[:1]]).replace("_", " ")
-        found[name] = times[own] - begin, rows["level"][own]
+        found[names[pin]] = times[own] - begin, rows["level"][own]
     return found
-
-
-def named_pins(robot: robots.RobotDescription) -> list[str]:
-    """Of each pin of an Arduino Uno its name on the board's print, and the devices there."""
-    users = users_of_pins(robot)
-    return [" ".join([pin_name(pin), *users.get(pin, [])]).replace("_", " ") for pin in range(PINS)]
-
-
-def users_of_pins(robot: robots.RobotDescription) -> dict[int, list[str]]:
-    """Arduino number of each pin that devices of the robot use, and their names."""
-    users: dict[int, list[str]] = {}
-    for name, device in robot.device.items():
-        for pin in device.pins().values() if device.on else ():
-            users.setdefault(pin, []).append(name)
-    return users
 
 
 def _rises(flags: Bools) -> NDArray[np.intp]:

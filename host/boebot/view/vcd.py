@@ -19,11 +19,10 @@ import numpy as np
 import vcd
 from numpy.typing import NDArray
 
-from boebot.description.wiring import PINS
+from boebot.description.wiring import PINS, users_of_pins
 from boebot.devices.device import pin_name
 from boebot.errors import BoebotError
 from boebot.record.record import LINE_FRAME
-from boebot.view.page_data import users_of_pins
 
 if TYPE_CHECKING:
     from boebot.record.blocks import Block
