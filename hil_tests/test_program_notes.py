@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import boebot
 from boebot.cli.app import app
 from boebot.record.run_folder import locked
 from boebot.result import RunResult, read_run
@@ -65,6 +66,15 @@ NOTES = [
 ]
 
 
+# Looks at every pin but the serial line's.
+LOOKS = "".join(
+    f"if (PIN{port} & 1 << {bit}) GPIOR0++;"
+    for port, bits in {"D": range(2, 8), "B": range(6), "C": range(6)}.items()
+    for bit in bits
+)
+ALL_PINS = f"#include <avr/io.h>\nint main(void) {{ {LOOKS} for (;;) {{}} }}"
+
+
 def run(image: Path, *options: str) -> tuple[int, str]:
     shown = CliRunner().invoke(app, ["run", str(image), "--seconds", "0.15", *options])
     return getattr(shown.exception, "exit_code", shown.exit_code), f"{shown.output}\n{shown.exception}"
@@ -95,6 +105,14 @@ def test_strict_makes_the_first_one_a_fault(image: Path, tmp_path: Path) -> None
     result = read_run(tmp_path)
     assert isinstance(result, RunResult) and re.search(fault, str(result.error))
     assert again(recorded(tmp_path)).is_equal
+
+
+def test_what_only_hears_decides_nothing(tmp_path: Path) -> None:
+    """Of a rover's pins only what line sensors (2, 4, 10) and echo (A4) drive is no input that floats: servo, bridge,
+    LEDs and trigger hear, the button is open. Asked for by the library's call."""
+    result = boebot.run(compiled(ALL_PINS, tmp_path / "all.elf"), "rover", "empty", seconds=0.01, notes=True)
+    floats = {found[1] for one in result.notices if (found := re.search(r"decides by (?:pin )?(\w+)", one))}
+    assert floats == {"3", "5", "6", "7", "8", "9", "11", "12", "13", "A0", "A1", "A2", "A3", "A5"}
 
 
 def test_nothing_is_noted_unasked(image: Path) -> None:

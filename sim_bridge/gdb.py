@@ -111,24 +111,27 @@ class Gdb:
         """What comes within that time.
 
         Raises:
-            OSError: the client has gone.
+            OSError: the client has gone, or another thread has closed the port.
             KeyboardInterrupt: Ctrl-C.
         """
-        sockets = [one for one in (self._listener, self._client) if one is not None]
-        ready = select.select(sockets, [], [], seconds)[0]
+        client = self._client
+        try:
+            ready = select.select([self._listener, *([client] if client else [])], [], [], seconds)[0]
+        except ValueError:
+            raise ConnectionAbortedError from None  # they have no number any more
         if interrupts.first is not None:
             raise KeyboardInterrupt
         if self._listener in ready:
             newcomer, _ = self._listener.accept()
-            if self._client is None:
+            if client is None:
                 newcomer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 newcomer.settimeout(SEND_S)
                 self._client, self._received, self._debug.interrupted = newcomer, b"", True
             else:
                 newcomer.close()
-        if self._client is None or self._client not in ready:
+        if client is None or client not in ready:
             return b""
-        if not (data := self._client.recv(PACKET_MAXIMUM)):
+        if not (data := client.recv(PACKET_MAXIMUM)):
             raise ConnectionResetError
         return data
 
@@ -148,7 +151,8 @@ class Gdb:
                 self._received += self._receive(LOOK_S)
 
     def _transmit(self, data: bytes) -> None:
-        assert self._client is not None
+        if self._client is None:
+            raise ConnectionAbortedError
         self._client.sendall(data)
 
     def _send(self, text: bytes) -> None:

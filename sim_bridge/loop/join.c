@@ -173,7 +173,7 @@ static int join(robot *r, part *p) {
     if (!is_pin(pin)) continue;
     if (checks != NULL) {
       const uint32_t drives = (uint32_t)((role & PART_DRIVES) != 0) << pin;
-      if (!(role & PART_OPENS)) checks->joined |= 1u << pin;
+      if ((role & (uint8_t)~PART_HEARS) && !(role & PART_OPENS)) checks->joined |= 1u << pin;
       if (!(role & (PART_PULLED_UP | PART_WEAK_HIGH))) checks->pulls_high |= drives;
       if (!(role & PART_WEAK_LOW)) checks->pulls_low |= drives;
     }

@@ -252,6 +252,17 @@ def test_a_client_that_vanishes_leaves_the_program_to_itself(image: Path, alone:
         assert run.traces == alone.traces
 
 
+def test_closed_while_the_program_is_halted(image: Path, alone: Run) -> None:
+    """By another thread: the program goes on."""
+    with running(image) as (run, port), connected(port) as client:
+        assert ask(client, "?") == "S02"
+        debugger = run.session.robot.board.debugger
+        assert debugger is not None
+        debugger.close()
+        run.thread.join(10)
+        assert run.traces == alone.traces
+
+
 def test_a_browser_is_sent_away(image: Path) -> None:
     with running(image) as (run, port):
         with socket.create_connection(("127.0.0.1", port), timeout=5) as client:

@@ -35,6 +35,9 @@ def run(
     force_timing: bool = False,
     record: bool = True,
     pins: bool = False,
+    notes: bool = False,
+    strict: bool = False,
+    gdb: int | None = None,
     view: bool = False,
     parameters: Mapping[str, Any] | None = None,
     expect_text: str = "",
@@ -65,6 +68,9 @@ def run(
             its dead-man stops the motors.
         force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
         pins: what happens at the pins of emulated boards is recorded, too.
+        notes: of a program: `notices` of the result say what a bench does not show, such as an input that floats
+            (docs/reference/link.md); only with on="avr" of the kit's own firmware. strict: the first such is an error.
+        gdb: TCP port for avr-gdb at the one emulated ATmega328P, which waits for it (docs/how-to/debug-a-program.md).
         out: folder for the record, and the files that are made from it (boebot.view).
         record: False: nothing is recorded; a result then has few figures, and `out` is refused.
         view: shows the run in the browser while it goes on, at real time at first; a person may interfere there, or
@@ -99,6 +105,8 @@ def run_together(
     step_timeout: float | None = None,
     force_timing: bool = False,
     pins: bool = False,
+    notes: bool = False,
+    strict: bool = False,
     view: bool = False,
 ) -> TogetherResult:
     """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
@@ -107,7 +115,8 @@ def run_together(
 
     Args:
         members: the robots.
-        arena, seconds, on, seed, realtime, step_timeout, force_timing, pins, view: as of `boebot.run`.
+        arena, seconds, on, seed, realtime, step_timeout, force_timing, pins, notes, strict, view: as of
+            `boebot.run`.
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
         progress: called with the run's time so far (s), about ten times a second.
 

@@ -140,6 +140,9 @@ class Request(_NamesFiles):
             switch = getattr(self, name)
             if not isinstance(switch, bool):
                 raise BoebotError(f"{name} is {switch!r}; expected True or False")
+        expect("gdb", self.gdb, "a TCP port or None", int, type(None))
+        if self.gdb is not None and not 0 <= self.gdb <= 65535:
+            raise BoebotError(f"gdb is {self.gdb}; expected a TCP port, 1 to 65535, or 0: any that is free")
         expect("expect_text", self.expect_text, "a text", str)
         expect("fail_text", self.fail_text, "a text", str)
         for each in self.typed:

@@ -80,6 +80,8 @@ def test_time_to_live_outlasts_the_period(session: InProcess, period_ms: int, ti
         ({"seconds": 0}, "cannot last 0 s"),
         ({"seconds": math.nan}, "cannot last nan s"),
         ({"realtime": "no"}, "realtime is 'no'; expected True or False"),
+        ({"gdb": "4711"}, "gdb is '4711'; expected a TCP port or None"),
+        ({"gdb": 65536}, "gdb is 65536; expected a TCP port, 1 to 65535, or 0: any that is free"),
         ({"progress": 5}, "progress is 5; expected a function of the seconds that have passed, or None"),
         ({"seconds": "5"}, "seconds is '5'; expected a number"),
         ({"seconds": None}, "seconds is None; expected a number"),

@@ -41,7 +41,7 @@ void check_driven(avr_board *b, uint8_t pin, bool high) {
 
 static void check_input(avr_board *b, uint8_t pin, const char *does) {
   if (!pin_floats(b, pin) || is_set(b->checks.joined, pin)) return;
-  found(b, does, PINS[pin], "nothing is joined there and its pull-up is off: it is anything");
+  found(b, does, PINS[pin], "nothing drives it and its pull-up is off: it is anything");
 }
 
 void check_analog(avr_board *b, uint8_t channel) {

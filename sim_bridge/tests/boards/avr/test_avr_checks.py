@@ -190,7 +190,7 @@ def test_the_first_one_is_a_fault() -> None:
         machine.board.run(1000)
     assert machine.board.notes() == []
     machine = checked("main: sbic PIND, 7\n1: rjmp 1b", strict=True)
-    with pytest.raises(BoardError, match=r"the program decides by pin 7 \(nothing is joined there .*\) at address 0x"):
+    with pytest.raises(BoardError, match=r"the program decides by pin 7 \(nothing drives it .*\) at address 0x"):
         machine.board.run(1000)
 
 
