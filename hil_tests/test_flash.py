@@ -62,8 +62,13 @@ def flashed(port: str, data: bytes = SMALL) -> None:
     flashing.write(data, port, silence_s=PATIENCE_S)
 
 
-def test_what_holds_the_port_is_named_and_a_retry_works() -> None:
+def test_what_holds_the_port_is_named_and_a_retry_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor is there any avrdude at first."""
     with served() as (port, _):
+        with monkeypatch.context() as changed:
+            changed.setenv("PATH", str(tmp_path))
+            with pytest.raises(BoardError, match=r"^avrdude, .* is missing"):
+                flashed(port)
         with serial.Serial(port), pytest.raises(BoardError, match=f"^{port} is busy: this program itself"):
             flashed(port)
         flashed(port)
@@ -128,6 +133,8 @@ def test_the_cable_is_pulled_out(mark: int) -> None:
                 LARGE, port, lambda share: server.kill() if share >= mark > 0 else None, silence_s=PATIENCE_S
             )
         assert time.monotonic() - begun < 15
+    with served() as (port, _):  # plugged in again
+        flashed(port)
 
 
 @pytest.mark.soak
