@@ -143,7 +143,7 @@ void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
  * cut at five times that, it flicks back a few times. Without noise, or by a mean of 0: not at all. */
 void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double mean_s);
 
-/* Pulls its plug out (1) or puts it in again (0). */
+/* Pulls its plug out (1) or puts it in again (0): it then hears what the board does by now. */
 void part_unplug(part *self, int unplugged);
 
 /* Pulses at a pin that a part hears. */

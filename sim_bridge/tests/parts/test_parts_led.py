@@ -51,6 +51,13 @@ def test_resistor_supply_plug_and_spread_change_it() -> None:
     robot.robot.readings()
     robot.run(0.01)
     assert robot.robot.readings() == (0.0, 0.0)
+    for level, brightness in ((LOW, 0.0), (HIGH, 4 / 3)):  # it shows what the pin has become meanwhile
+        robot.edge(robot.sim.cycle + MS, GROUNDED, level)
+        robot.run(0.01)
+        robot.pins.plug("a")
+        robot.run(0.01)
+        assert robot.robot.readings()[0] == pytest.approx(brightness / 2, abs=1e-3)  # of half the time
+        robot.pins.unplug("a")
     bright = set()
     for seed in range(3):
         robot = scripted(robot=lamps(), noise=True, seed=seed)
