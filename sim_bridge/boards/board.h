@@ -157,6 +157,8 @@ typedef struct {
     board_frame *items;
     size_t first, end, capacity;
   } to_board, from_board;
+  board_edge_sink *heard; /* not NULL: called at the cycle at which the outside changes what it does to a pin */
+  void *heard_context;
 } board_outside_log;
 
 typedef struct {

@@ -78,4 +78,13 @@ int robot_answer_ping(robot *self, int64_t echo_cycles) {
   return status;
 }
 
-void robot_unplug(robot *self, int number, int unplugged) { part_unplug(self->parts[number], unplugged); }
+void robot_unplug(robot *self, int number, int unplugged) {
+  part *p = self->parts[number];
+  const board_operations *op = self->board->op;
+  for (int i = 0; p->unplugged && !unplugged && i < PART_PINS; i++) { /* it hears what its pins have become */
+    const uint8_t pin = p->pins[i].pin;
+    if (!(p->pins[i].role & PART_HEARS) || pin >= BOARD_PIN_COUNT) continue;
+    p->op->edge(p, op->now(self->board), pin, robot_heard(self, p, pin, op->output(self->board, pin)));
+  }
+  part_unplug(p, unplugged);
+}

@@ -24,6 +24,8 @@ sim *sim_new(arena *where, uint64_t seed, uint32_t step_cycles, uint32_t record_
 static void destroy_robot(robot *r) {
   if (r->board != NULL) {
     r->board->sink = NULL;
+    board_outside_log *log = r->board->op->extension(r->board, BOARD_OUTSIDE_LOG);
+    if (log != NULL) log->heard = NULL;
     r->board->op->analog(r->board, NULL, NULL);
   }
   if (r->vehicle != NULL) vehicles_destroy(r->vehicle);
@@ -126,6 +128,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   b->sink_context = r;
   b->op->analog(b, robot_on_analog, r);
   for (unsigned i = 0; i < BOARD_ANALOG_COUNT; i++) r->sampled[i] = NAN;
+  memset(r->outside, BOARD_RELEASED, sizeof r->outside);
   sim_insert(self, r, x, y, heading);
   return SIM_OK;
 }
@@ -142,18 +145,6 @@ static void *new_part(robot *r, size_t size) {
   return calloc(1, size);
 }
 
-/* Whether one of the robot's parts drives that pin. */
-static int is_driven(const robot *r, uint8_t pin) {
-  int found = 0;
-  for (int i = 0; i < r->part_count; i++) {
-    for (int k = 0; k < PART_PINS; k++) {
-      const part_pin *other = &r->parts[i]->pins[k];
-      found |= other->pin == pin && (other->role & PART_DRIVES) != 0;
-    }
-  }
-  return found;
-}
-
 /* The robot has the part from now on; it hears its pins, beginning with what the board does to them now. A part is
  * refused, and freed, where another one drives one of its pins or gives the voltage there, or as many as can hear it do. */
 static int join(robot *r, part *p) {
@@ -162,12 +153,13 @@ static int join(robot *r, part *p) {
     if (!is_pin(pin)) continue;
     const int full = (p->pins[i].role & PART_HEARS) && r->hears[pin][HEARING_PARTS - 1] != NULL;
     const int given = (p->pins[i].role & PART_ANALOG) && r->analog[pin - BOARD_FIRST_ANALOG_PIN] != NULL;
-    if (!full && !given && !((p->pins[i].role & PART_DRIVES) && is_driven(r, pin))) continue;
+    if (!full && !given && !((p->pins[i].role & PART_DRIVES) && r->drives[pin])) continue;
     free(p);
     return SIM_PIN_TAKEN;
   }
   r->parts[r->part_count++] = p;
   board_checks *checks = r->board->op->extension(r->board, BOARD_CHECKS);
+  board_outside_log *log = r->board->op->extension(r->board, BOARD_OUTSIDE_LOG);
   for (int i = 0; i < PART_PINS; i++) {
     const uint8_t pin = p->pins[i].pin, role = p->pins[i].role;
     if (!is_pin(pin)) continue;
@@ -178,12 +170,19 @@ static int join(robot *r, part *p) {
       if (!(role & PART_WEAK_LOW)) checks->pulls_low |= drives;
     }
     if (p->pins[i].role & PART_ANALOG) r->analog[pin - BOARD_FIRST_ANALOG_PIN] = p;
-    if (!(p->pins[i].role & PART_HEARS)) continue;
-    part **last = r->hears[pin];
-    while (*last != NULL) last++;
-    *last = p;
-    const uint8_t level = r->board->op->output(r->board, pin);
-    if (level != BOARD_LOW) p->op->edge(p, r->board->op->now(r->board), pin, level);
+    if (role & PART_DRIVES) r->drives[pin] = role;
+    if (role & PART_HEARS) {
+      part **last = r->hears[pin];
+      while (*last != NULL) last++;
+      *last = p;
+      const uint8_t level = r->board->op->output(r->board, pin);
+      if (level != BOARD_LOW) p->op->edge(p, r->board->op->now(r->board), pin, level);
+    }
+    part *const *hears = r->hears[pin];
+    if (log == NULL || !r->drives[pin] || hears[0] == NULL) continue;
+    if (hears[1] == NULL && (part_role(hears[0], pin) & PART_DRIVES)) continue; /* only itself */
+    log->heard = robot_on_outside;
+    log->heard_context = r;
   }
   return SIM_OK;
 }

@@ -12,7 +12,26 @@ void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
   if (pin >= BOARD_PIN_COUNT) return;
   edge_log_add(&self->edges, cycle, pin, level);
   for (part **p = self->hears[pin]; *p != NULL; p++) {
-    if (!(*p)->unplugged) (*p)->op->edge(*p, cycle, pin, level);
+    if (!(*p)->unplugged) (*p)->op->edge(*p, cycle, pin, robot_heard(self, *p, pin, level));
+  }
+}
+
+uint8_t robot_heard(const robot *self, const part *by, uint8_t pin, uint8_t level) {
+  const uint8_t outside = self->outside[pin];
+  if (level < BOARD_RELEASED || outside == BOARD_RELEASED || (part_role(by, pin) & PART_DRIVES)) return level;
+  return outside;
+}
+
+void robot_on_outside(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
+  robot *self = context;
+  const uint8_t drives = self->drives[pin];
+  if (level == BOARD_HIGH && (drives & (PART_PULLED_UP | PART_WEAK_HIGH))) level = BOARD_PULLED_UP;
+  if (level == BOARD_LOW && (drives & PART_WEAK_LOW)) level = BOARD_RELEASED;
+  self->outside[pin] = level;
+  const uint8_t output = self->board->op->output(self->board, pin);
+  for (part **p = self->hears[pin]; output >= BOARD_RELEASED && *p != NULL; p++) {
+    if ((*p)->unplugged || (part_role(*p, pin) & PART_DRIVES)) continue;
+    (*p)->op->edge(*p, cycle, pin, robot_heard(self, *p, pin, output));
   }
 }
 

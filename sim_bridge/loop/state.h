@@ -30,6 +30,8 @@ struct robot {
   part **parts;
   int part_count;
   part *hears[BOARD_PIN_COUNT][HEARING_PARTS + 1]; /* of each pin, up to the first NULL */
+  uint8_t outside[BOARD_PIN_COUNT];                /* what parts do to pins, for others that hear them; else RELEASED */
+  uint8_t drives[BOARD_PIN_COUNT];                 /* role of the part that drives the pin, or 0 */
   part *analog[BOARD_ANALOG_COUNT];
   double sampled[BOARD_ANALOG_COUNT]; /* V, the converter's last ones; NAN: none yet */
   brown_out brown_out;
@@ -97,8 +99,13 @@ void sim_record_waits(sim *self, uint64_t begin);
 /* What a robot does in a step of the world, with a board or without. */
 extern const world_robot_operations ROBOT_OPERATIONS;
 
+/* What a part hears of a pin to which the board does `level`: a net has one level, so where the board lets go of it, what
+ * another part does. */
+uint8_t robot_heard(const robot *self, const part *by, uint8_t pin, uint8_t level);
+
 /* Sinks of the board: context is the robot. */
 void robot_on_edge(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
+void robot_on_outside(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
 double robot_on_analog(void *context, uint64_t cycle, uint8_t channel);
 
 /* ---- join.c */

@@ -48,13 +48,7 @@ void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double 
 }
 
 void part_unplug(part *self, int unplugged) {
-  board *b = self->chassis->board;
-  const uint64_t now = b->op->now(b);
-  for (int i = 0; self->unplugged && !unplugged && i < PART_PINS; i++) {
-    const part_pin there = self->pins[i];
-    if (!(there.role & PART_HEARS) || there.pin >= BOARD_PIN_COUNT) continue;
-    self->op->edge(self, now, there.pin, b->op->output(b, there.pin));
-  }
+  const uint64_t now = self->chassis->board->op->now(self->chassis->board);
   self->unplugged = unplugged;
   if (self->overridden) return;
   for (int i = 0; i < PART_PINS; i++) {

@@ -143,7 +143,14 @@ void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
  * cut at five times that, it flicks back a few times. Without noise, or by a mean of 0: not at all. */
 void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double mean_s);
 
-/* Pulls its plug out (1) or puts it in again (0): it then hears what the board does by now. */
+/* All that it does with that pin. */
+static inline unsigned part_role(const part *self, uint8_t pin) {
+  unsigned role = 0;
+  for (int i = 0; i < PART_PINS; i++) role |= self->pins[i].pin == pin ? self->pins[i].role : 0u;
+  return role;
+}
+
+/* Pulls its plug out (1) or puts it in again (0). */
 void part_unplug(part *self, int unplugged);
 
 /* Pulses at a pin that a part hears. */

@@ -188,7 +188,7 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     NEEDS: ClassVar[dict[str, str]] = {}  # unit of the chip -> who may share it ("" = nobody)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # key of the pin -> the pins that the kit's firmware can use
     CHIP_PINS: ClassVar[dict[str, tuple[int, ...]]] = {}  # and those that any program can, such as analog inputs
-    HEARS: ClassVar[frozenset[str]] = frozenset()  # keys of pins that the board alone drives: others may hear them, too
+    HEARS: ClassVar[frozenset[str]] = frozenset()  # keys of pins that it only listens at: others may be there, too
     WIRES: ClassVar[tuple[Wire, ...]] = ()  # of a board's device: between board and device
     CONNECTOR: ClassVar[str] = BREADBOARD  # where they are plugged in
     COLUMNS: ClassVar[tuple[tuple[str, str, int | None], ...]] = ()

@@ -246,6 +246,7 @@ void pins_due_driven(avr_board *b, uint64_t cycle) {
     p->driven_level = (uint8_t)(change.level == BOARD_HIGH ? p->driven_level | mask : p->driven_level & ~mask);
     pins_update(b, port, cycle);
     if (b->outside_log.on) log_driven(b, cycle, change);
+    if (b->outside_log.heard) b->outside_log.heard(b->outside_log.heard_context, cycle, change.pin, change.level);
   }
   set_due(b, DUE_DRIVEN_EDGE, first_due(q));
 }
