@@ -13,7 +13,7 @@ typedef struct {
   int to_supply;   /* 1: closed it joins the pin to 5 V; 0: to ground */
   int resistor;    /* 1: open, a resistor pulls the pin the other way */
   int closed;      /* 1: at first */
-  double bounce_s; /* mean length of a bounce; 0: none */
+  double bounce_s; /* mean, of part_bounce; 0: none */
 } contact_parameters;
 
 /* Set to 0 or 1; shows whether it is closed. Parameters: contact_parameters. Pin: the contact. */

@@ -139,8 +139,9 @@ void part_join(part *self, const part_operations *op, const part_place *place, c
 /* From cycle `at` on the part drives `pin` to LOW, HIGH, or lets go of it. Replaces what was queued from `at` on. */
 void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
 
-/* A contact at its first pin changes that from level `before` to `level`, and bounces: for an exponential length (s, mean),
- * cut at five times that, it flicks back a few times. Without noise, or by a mean of 0: not at all. */
+/* A contact at its first pin changes that from level `before` to `level`, and bounces: it flicks back up to four times, each
+ * number as likely, in steps that are on average an eighth of an exponential length (s, mean), cut at five times that. So
+ * the last edge comes after half of that length on average. Without noise, or by a mean of 0: not at all. */
 void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double mean_s);
 
 /* All that it does with that pin. */

@@ -12,7 +12,7 @@
 typedef struct {
   double root_x, root_y, tip_x, tip_y; /* in the body's frame, m */
   double height;                       /* above the floor, m: what is lower does not bend it */
-  double bounce_s;                     /* mean length of a bounce; 0: none */
+  double bounce_s;                     /* mean, of part_bounce; 0: none */
 } whisker_parameters;
 /* python: end */
 
