@@ -60,9 +60,18 @@ static double volts(part *base, uint64_t cycle) {
   return v < 0.0 ? 0.0 : (v > rail ? rail : v);
 }
 
+/* What a digital input makes of it: low below 2.1 V and high above 2.6 V of 5 V, between them as before (ATmega328P data
+ * sheet, typical thresholds of I/O pins). */
+static void show_level(part *base, uint64_t at) {
+  const double position = ((potentiometer *)base)->position;
+  if (position <= 2.1 / BOARD_NOMINAL_VOLTS) part_drive(base, at, base->pins[0].pin, BOARD_LOW);
+  if (position >= 2.6 / BOARD_NOMINAL_VOLTS) part_drive(base, at, base->pins[0].pin, BOARD_HIGH);
+}
+
 static int turn(part *base, double value) {
   if (!(value >= 0.0 && value <= 1.0)) return -1;
   ((potentiometer *)base)->position = value;
+  show_level(base, now(base) + PART_GUARD);
   return 0;
 }
 
@@ -79,7 +88,10 @@ static int init_potentiometer(part *base, const part_place *place, const uint8_t
   self->position = p[0];
   self->noise_v = p[1];
   if (pins[0] < BOARD_FIRST_ANALOG_PIN || !(p[0] >= 0.0 && p[0] <= 1.0)) return -1;
-  part_join(base, &POTENTIOMETER, place, &(part_pin){pins[0], PART_ANALOG}, 1);
+  const uint8_t role = PART_ANALOG | PART_DRIVES | PART_WEAK_HIGH | PART_WEAK_LOW;
+  part_join(base, &POTENTIOMETER, place, &(part_pin){pins[0], role}, 1);
+  part_drive(base, 0, pins[0], BOARD_LOW);
+  show_level(base, 0);
   return 0;
 }
 

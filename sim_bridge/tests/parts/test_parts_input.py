@@ -77,6 +77,10 @@ def test_a_potentiometer_gives_its_share_of_the_rail() -> None:
     robot.pins.supply(4.5)
     assert scripts.script_board_volts(robot.script, 1) == pytest.approx(0.8 * 4.5)
     assert robot.robot.readings() == (0.8,)
+    for position in (0.5, 0.41, 0.5, 0.53):  # a digital input keeps its level from 2.1 V to 2.6 V
+        robot.robot.set_part("dial", position)
+        robot.run(0.01)
+    assert [level for _, level in robot.inputs(15)] == [LOW, HIGH, LOW, HIGH]
     robot.pins.unplug("dial")
     assert scripts.script_board_volts(robot.script, 1) == 0.0
     noisy = scripted(robot=with_devices(dial=Potentiometer(pin="A1")), noise=True)
