@@ -47,7 +47,7 @@ def test_a_contact_joins_its_pin_to_one_end_and_else_leaves_it_or_pulls_it_the_o
 
 
 def test_contacts_bounce_for_milliseconds_and_each_in_its_own_way() -> None:
-    """0 to 4 flicks fill half of an exponential length of 2 ms on average, at most twice; it is cut at five times that."""
+    """0 to 4 flicks fill half of an exponential length of 2 ms on average, at most twice; it is cut at 10 ms."""
     robot = scripted(robot=with_devices(start=Button(pin=2, resistor=True), mode=SlideSwitch(pin=3)), noise=True)
     for i in range(200):
         for name in ("start", "mode"):
