@@ -4,6 +4,7 @@ serial line, and what the outside does; a session says what is there now."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -14,6 +15,8 @@ import boebot
 from boebot.boards import BoardSession
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
+from boebot.record.blocks import Block
+from boebot.record.record import Record
 from boebot.record.run import Run
 from boebot.record.run_folder import locked
 from boebot.result import read_run
@@ -148,6 +151,18 @@ def test_inputs_are_in_the_record_and_are_repeated(run: Path) -> None:
     (result,) = read_run(run).robots
     assert {"inputs", "line_in", "line_out"} <= result.record.streams()
     assert again(recorded(run)).is_equal
+
+
+def test_times_that_no_board_has_are_refused(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    block = Record.block
+
+    def early(record: Record, stream: str) -> Block:
+        return replace(found := block(record, stream), times=found.times - 1)
+
+    monkeypatch.setattr(Record, "block", early)
+    with pytest.raises(ValueError, match="a pin changes at -"):
+        save_pins(read_run(run).robots, tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_run_without_pins_is_one_sentence(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,11 +21,12 @@ import boebot
 from boebot.boards import BoardRequest, open_board
 from boebot.cli.app import app
 from boebot.description.robots import load_robot
-from boebot.errors import BoardError, CallError
+from boebot.errors import BoardError, BoebotError, CallError
 from boebot.record.interventions import Deed, Typed
 from boebot.record.run_folder import locked
 from boebot.result import RunResult, read_run
-from boebot.running.again import again, recorded
+from boebot.running.again import again as repeat
+from boebot.running.again import recorded
 from boebot.running.hands import Onlooker
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
@@ -158,6 +160,10 @@ def test_what_is_typed_reaches_the_program_and_its_run_is_repeated_bit_by_bit(pr
     assert again.returncode == 0 and "bit-equal" in again.stdout, again.stderr
     read = read_run(tmp_path / "run").robots[0]
     assert (read.program, read.hash) == (result.program, result.hash)
+    kept = recorded(tmp_path / "run")
+    other = {"brain/talk.elf": kept.attached["brain/talk.elf"][:-1] + b"x"}  # in its symbols: it would run the same way
+    with pytest.raises(BoebotError, match=f"brain/talk.elf has SHA-256 .*; expected {result.program}"):
+        repeat(replace(kept, attached=other))
 
 
 def test_a_script_types_and_is_no_person(program: Path, tmp_path: Path) -> None:
@@ -165,7 +171,7 @@ def test_a_script_types_and_is_no_person(program: Path, tmp_path: Path) -> None:
     done = command("run", program, "--out", tmp_path, "--json", *typed, "--seconds", "1")
     assert json.loads(done.stdout)["touched"] == 0 and json.loads(done.stdout)["steps"] is None
     assert re.search(r"0\.00\d\d  ready\n", done.stderr)  # standard output is left to the answer
-    assert again(recorded(tmp_path)).is_equal
+    assert repeat(recorded(tmp_path)).is_equal
     assert CliRunner().invoke(app, ["run", str(program), "-q", "--seconds", "0.1"]).stdout == ""
 
 

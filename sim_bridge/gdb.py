@@ -56,7 +56,9 @@ class Gdb:
         self.port = int(self._listener.getsockname()[1])
         what = "the program waits for a debugger" if waits else "a debugger may come"
         print(
-            f"boebot: {what}: avr-gdb {board.elf or ''} -ex 'target remote :{self.port}'", file=sys.stderr, flush=True
+            f"boebot: {what}: avr-gdb{f' {board.elf}' if board.elf else ''} -ex 'target remote :{self.port}'",
+            file=sys.stderr,
+            flush=True,
         )
 
     # ---- what the board calls ----

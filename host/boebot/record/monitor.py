@@ -47,6 +47,8 @@ class Monitor:
         self._look(data)
 
     def _look(self, data: bytes) -> None:
+        if self.found or self.failed:
+            return  # what came first counts
         text = self._newest + data
         self.found = self.found or (bool(self._expected) and self._expected in text)
         self.failed = self.failed or (bool(self._unwanted) and self._unwanted in text)

@@ -94,9 +94,11 @@ class Recorded:
     def foreign(self) -> dict[int, dict[str, bytes]]:
         """Of robots by their numbers, from 1, whose brain is not the file on this computer: what is run in its place,
         the record's files by name. Raises as `brain_files`."""
-        members, count = enumerate(self.asked["members"], 1), len(self.results)
-        brought = {n: Path(one["brain"]) for n, one in members if one["brain"] is not None}
-        found = {number: brain_files(self.attached, path, number, count) for number, path in brought.items()}
+        brought = {n: Path(one["brain"]) for n, one in enumerate(self.asked["members"], 1) if one["brain"] is not None}
+        found = {
+            number: brain_files(self.attached, path, number, len(self.results), self.results[number - 1].program)
+            for number, path in brought.items()
+        }
         return {number: files for number, files in found.items() if files}
 
     @property

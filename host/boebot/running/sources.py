@@ -9,6 +9,7 @@ Of several robots, names of brain and robot begin with robot-1/, robot-2/ and so
 
 from __future__ import annotations
 
+import hashlib
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,7 +35,9 @@ def sources(request: Request, tasks: Sequence[Task]) -> dict[str, bytes]:
     return found
 
 
-def brain_files(attached: Mapping[str, bytes], path: Path, number: int, count: int) -> dict[str, bytes]:
+def brain_files(
+    attached: Mapping[str, bytes], path: Path, number: int, count: int, program: str | None = None
+) -> dict[str, bytes]:
     """The files of a brain as they were, by their names in its folder; none where it is the kit's, or its file on this
     computer and all that it imported from beside it are still the same.
 
@@ -42,9 +45,10 @@ def brain_files(attached: Mapping[str, bytes], path: Path, number: int, count: i
         attached: to the record of the run.
         path: of the brain's file then.
         number: of the robot, from 1, of `count`.
+        program: SHA-256 of that file, where it is a program for the board.
 
     Raises:
-        BoebotError: the record does not have them, or names one that would land elsewhere.
+        BoebotError: the record does not have them, has another program, or names one that would land elsewhere.
     """
     if str(path) in brains.bundled_files():
         return {}
@@ -55,6 +59,10 @@ def brain_files(attached: Mapping[str, bytes], path: Path, number: int, count: i
             raise BoebotError(f"the record has a file {prefix + name!r}; expected a path below {prefix}")
     if as_utf8(path.name) not in files:
         raise BoebotError(f"the record lacks the file of brain {path}; expected {prefix}{as_utf8(path.name)} in it")
+    if program is not None and program != (found := hashlib.sha256(files[as_utf8(path.name)]).hexdigest()):
+        raise BoebotError(
+            f"the record's {prefix}{as_utf8(path.name)} has SHA-256 {found}; expected {program}, as it ran"
+        )
     return {} if all(_is_same(path.parent / name, data) for name, data in files.items()) else files
 
 

@@ -53,6 +53,7 @@ def write(robots: Sequence[Run], path: Path) -> None:
 
     Raises:
         BoebotError: their pins are not recorded.
+        ValueError: their times make no sense.
     """
     if not any(robot.record.count("pins") for robot in robots):
         raise BoebotError("the run has no pins to write; expected one with --pins (pins=True)")
@@ -64,6 +65,8 @@ def write(robots: Sequence[Run], path: Path) -> None:
             signals = [writer.register_var(scope, name, "wire", size=1, init="z") for name in _names(robot)]
             told.append(_changes(robot.record, signals))
         for tick, signal, value in heapq.merge(*told, key=itemgetter(0)):
+            if tick < 0:  # no cycle of a board, which counts from 0
+                raise ValueError(f"a pin changes at {tick} ticks of 100 ps")
             writer.change(signal, tick, value)
 
 

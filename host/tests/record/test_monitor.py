@@ -45,6 +45,12 @@ def test_a_text_is_found_however_it_comes_in_pieces(pieces: list[bytes], text: s
     assert monitor.found == monitor.failed == (text.encode() in b"".join(pieces))
 
 
+@pytest.mark.parametrize(("text", "found", "failed"), [(b"ok bad", 1, 0), (b"bad ok", 0, 1), (b"no", 0, 0)])
+def test_of_two_texts_the_first_one_counts(text: bytes, found: bool, failed: bool) -> None:
+    monitor, _ = heard(*((0.0, bytes([byte])) for byte in text), expected="ok", unwanted="bad")
+    assert (monitor.found, monitor.failed) == (found, failed)
+
+
 @pytest.mark.parametrize(("expected", "found"), [("", False), ("ready", True), ("Ready", False)])
 def test_nothing_is_found_where_nothing_is_looked_for(expected: str, found: bool) -> None:
     monitor, _ = heard((0.0, b"rea"), (0.5, b"dy"), expected=expected)
