@@ -109,10 +109,15 @@ def test_strict_makes_the_first_one_a_fault(image: Path, tmp_path: Path) -> None
 
 def test_what_only_hears_decides_nothing(tmp_path: Path) -> None:
     """Of a rover's pins only what line sensors (2, 4, 10) and echo (A4) drive is no input that floats: servo, bridge,
-    LEDs and trigger hear, the button is open. Asked for by the library's call."""
-    result = boebot.run(compiled(ALL_PINS, tmp_path / "all.elf"), "rover", "empty", seconds=0.01, notes=True)
-    floats = {found[1] for one in result.notices if (found := re.search(r"decides by (?:pin )?(\w+)", one))}
-    assert floats == {"3", "5", "6", "7", "8", "9", "11", "12", "13", "A0", "A1", "A2", "A3", "A5"}
+    LEDs and trigger hear, the button is open. Asked for by the library's call. A voltage (A0) reads low."""
+    file = tmp_path / "mine.toml"
+    grey = 'type = "line_module"\npin = "A0"\noutput = "analog"\nposition_m = [0.06, 0.03]'
+    file.write_text(f'extends = "rover"\n[device.grey]\n{grey}\n')
+    result = boebot.run(compiled(ALL_PINS, tmp_path / "all.elf"), file, "empty", seconds=0.01, notes=True)
+    found = [re.search(r"decides by (?:pin )?(\w+) .*: (nothing drives|a voltage)", one) for one in result.notices]
+    floats = {one[1]: one[2] for one in found if one}
+    assert floats.keys() == {"3", "5", "6", "7", "8", "9", "11", "12", "13", "A0", "A1", "A2", "A3", "A5"}
+    assert {pin for pin, why in floats.items() if why == "a voltage"} == {"A0"}
 
 
 def test_nothing_is_noted_unasked(image: Path) -> None:

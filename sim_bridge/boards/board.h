@@ -105,6 +105,7 @@ typedef struct {
 typedef struct {
   bool on, strict;
   uint32_t joined;     /* something is there */
+  uint32_t analog;     /* a voltage that only the converter reads */
   uint32_t pulls_low;  /* and pulls it low harder than a resistor does, when it drives it low */
   uint32_t pulls_high; /* the same for high */
 } board_checks;

@@ -166,6 +166,7 @@ static int join(robot *r, part *p) {
     if (checks != NULL) {
       const uint32_t drives = (uint32_t)((role & PART_DRIVES) != 0) << pin;
       if ((role & (uint8_t)~PART_HEARS) && !(role & PART_OPENS)) checks->joined |= 1u << pin;
+      if (role == PART_ANALOG) checks->analog |= 1u << pin;
       if (!(role & (PART_PULLED_UP | PART_WEAK_HIGH))) checks->pulls_high |= drives;
       if (!(role & PART_WEAK_LOW)) checks->pulls_low |= drives;
     }

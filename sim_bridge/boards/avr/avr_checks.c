@@ -40,13 +40,17 @@ void check_driven(avr_board *b, uint8_t pin, bool high) {
 }
 
 static void check_input(avr_board *b, uint8_t pin, const char *does) {
-  if (!pin_floats(b, pin) || is_set(b->checks.joined, pin)) return;
-  found(b, does, PINS[pin], "nothing drives it and its pull-up is off: it is anything");
+  const bool is_analog = is_set(b->checks.analog, pin);
+  if (!pin_floats(b, pin) || (is_set(b->checks.joined, pin) && !is_analog)) return;
+  found(b, does, PINS[pin],
+        is_analog ? "a voltage is there, which is emulated for the ADC only: it reads low"
+                  : "nothing drives it and its pull-up is off: it is anything");
 }
 
 void check_analog(avr_board *b, uint8_t channel) {
-  if (b->checks.on && channel < BOARD_ANALOG_COUNT)
-    check_input(b, (uint8_t)(BOARD_FIRST_ANALOG_PIN + channel), "converts the voltage at");
+  const uint8_t pin = (uint8_t)(BOARD_FIRST_ANALOG_PIN + channel);
+  if (!b->checks.on || channel >= BOARD_ANALOG_COUNT || is_set(b->checks.analog, pin)) return;
+  check_input(b, pin, "converts the voltage at");
 }
 
 void check_watched(avr_board *b, uint8_t port, uint8_t mask) {
