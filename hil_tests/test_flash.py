@@ -74,6 +74,11 @@ def test_what_holds_the_port_is_named_and_a_retry_works(tmp_path: Path, monkeypa
         flashed(port)
 
 
+def test_a_rate_that_no_port_has_is_refused_before_the_board_is_touched() -> None:
+    done = boebot("flash", "--baud", "300", "--on", "/dev/no-board")
+    assert done.returncode == 2 and "Invalid value for '--baud'" in done.stderr
+
+
 def test_of_several_ports_none_is_guessed(monkeypatch: pytest.MonkeyPatch) -> None:
     for there, sentence in (
         ([], "no board at a USB port"),

@@ -22,9 +22,9 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError, CallError
 from boebot.image.program import Program, read_program
 from boebot.link.frame import text
+from boebot.link.ports import BAUD_MAX, BAUD_MIN
 
 FIRST_LINE_S = 6.0  # from the reset; a boot loader waits for one to three of them
-BAUD = 9600  # of most sketches
 
 
 def flash(
@@ -40,8 +40,8 @@ def flash(
     ] = None,
     robot: options.RobotName = "shieldbot",
     baud: Annotated[
-        int, typer.Option("--baud", metavar="RATE", help="Of a program of your own: at which it prints.")
-    ] = BAUD,
+        int, typer.Option("--baud", metavar="RATE", min=BAUD_MIN, max=BAUD_MAX, help="At which a program prints.")
+    ] = 9600,  # of most sketches
 ) -> None:
     """Write the kit's firmware or a program of your own into a board, and say what answers."""
     description = load_robot(robot)
