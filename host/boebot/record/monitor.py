@@ -37,11 +37,13 @@ class Monitor:
     def hear(self, time_s: float, data: bytes) -> None:
         """Bytes have come at that time."""
         for number in data:
+            if len(self._line) >= LINE_MAXIMUM and number != ord("\n"):
+                self.flush()
             if not self._line:
                 self._begin_s = time_s
-            if number == ord("\n") or len(self._line) >= LINE_MAXIMUM:
+            if number == ord("\n"):
                 self.flush()
-            if number != ord("\n"):
+            else:
                 self._line.append(number)
         self._heard_s = time_s
         self._look(data)

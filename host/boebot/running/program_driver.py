@@ -93,4 +93,4 @@ class ProgramDriver(Driver):
 
     def _show(self, time_s: float, line: str) -> None:
         who = f"robot {self.task.number}: " if len(self.task.request.members) > 1 else ""
-        print(f"{time_s:10.4f}  {who}{printable(line)}", flush=True)
+        print(f"{time_s:10.4f}  {who}{printable(line.expandtabs())}", flush=True)

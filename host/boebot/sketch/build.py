@@ -17,6 +17,7 @@ One build at a time. What is finished gets its name in one go, so that it is who
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import hashlib
 import importlib.util
@@ -45,6 +46,7 @@ BOARDS = sorted(path.stem for path in HERE.glob("platforms/atmelavr/boards/*.jso
 CLOCK = "16000000L"  # Hz, of that chip
 SILENCE_S = 30.0  # of PlatformIO, after which it waits for what cannot be reached
 DEBIAN = "avr-gcc and what Debian has in arduino-core-avr and avr-libc"
+FULL = "No space left on device"  # what tools say of a disk, in the language that they are set to here
 FURTHER_ERRORS = 3  # that are shown after the first one
 SKETCH_INI = """\
 [platformio]
@@ -92,6 +94,8 @@ def built(path: Path, progress: Progress | None = None) -> Built:
     found = find(path)
     try:
         return _sketch(found, progress) if isinstance(found, Sketch) else _project(found, progress)
+    except shutil.Error as error:  # of a folder's copy: a list of what went wrong
+        raise BoebotError(f"{found.name} cannot be built: {error.args[0][0][-1]}") from None
     except OSError as error:
         what = f"{error.filename or cache()}: {error.strerror or error}"
         raise BoebotError(f"{found.name} cannot be built: {what}") from None
@@ -101,9 +105,9 @@ def _sketch(sketch: Sketch, progress: Progress | None) -> Built:
     tools = _Tools.found()
     key = _hash(tools.versions, sketch.folder, sketch.name, sorted(sketch.files.items()))
     elf = cache() / "programs" / key / f"{Path(sketch.name).stem}.elf"
-    if not elf.is_file():
+    if not _is_whole(elf):
         with _alone():
-            if not elf.is_file():
+            if not _is_whole(elf):
                 _keep(_build_sketch(tools, sketch, progress), elf)
     own = {name: data for name, data in sketch.files.items() if not name.startswith(f"{LIBRARIES}/")}
     return Built(name=sketch.name, elf=elf, sources=own)
@@ -198,10 +202,13 @@ class _PlatformIO:
         """Builds an environment of the project in `folder`: the ELF file. `base`: what is the user's folder there.
 
         Raises:
+            OSError: the disk is full.
             SketchError: it does not compile, or is too large.
         """
         folders = {base: found.folder, base.relative_to(folder): found.folder}
         code, said = self.run("run", "-d", str(folder), "-e", environment, folders=folders)
+        if code and FULL in said:
+            raise OSError(errno.ENOSPC, FULL, cache())
         made = sorted((self.work / "build" / environment).glob("*.elf"), key=lambda one: one.stat().st_mtime)
         if code or not made or "The data size " in said:
             raise self._fault(found, said, folder, base)
@@ -297,12 +304,14 @@ def _ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]
 
 
 def _core(tools: _Tools) -> Path:
-    """The prepared core directory; made the first time."""
+    """The prepared core directory; made the first time, and where it was deleted while PlatformIO was at work, which
+    makes folders in it anew."""
     core = cache() / f"core-{tools.versions}"
-    if not core.is_dir():
+    if not (core / core_directory.SCONS_FILE).is_file():
         part = core.with_name(".part-core")
         shutil.rmtree(part, ignore_errors=True)
         core_directory.prepare(part)
+        shutil.rmtree(core, ignore_errors=True)
         part.replace(core)
     return core
 
@@ -312,6 +321,11 @@ def _work(*of: object) -> Path:
     work = cache() / "builds" / _hash(of)
     work.mkdir(parents=True, exist_ok=True)
     return work
+
+
+def _is_whole(elf: Path) -> bool:
+    """It is there, and no computer has lost its power before it was on the disk."""
+    return elf.is_file() and elf.stat().st_size > 0
 
 
 def _keep(made: Path, elf: Path) -> None:

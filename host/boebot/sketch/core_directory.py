@@ -18,6 +18,7 @@ ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")  # where Debian has th
 FRAMEWORK = "5.2.0"  # PlatformIO's number of that package, for releases 1.8 of the framework
 
 # PlatformIO starts its builds by running this file with its own Python.
+SCONS_FILE = "packages/tool-scons/scons.py"
 SCONS = """\
 \"\"\"Runs the SCons that is installed beside PlatformIO.\"\"\"
 
@@ -54,8 +55,8 @@ def add_package(core: Path, name: str, package_version: str, description: str, k
 
 def prepare(core: Path, platforms: Iterable[Path] = ()) -> None:
     """Fills a folder: SCons, avrdude, Arduino's framework, the platform for AVRs and others, quiet settings."""
-    scons = add_package(core, "tool-scons", platformio_version_of_scons(), "SCons from PyPI")
-    (scons / "scons.py").write_text(SCONS, encoding="utf-8")
+    add_package(core, "tool-scons", platformio_version_of_scons(), "SCons from PyPI")
+    (core / SCONS_FILE).write_text(SCONS, encoding="utf-8")
     add_package(core, "tool-avrdude", "1.0.0+path", "Whatever avrdude is on PATH")
     framework = add_package(core, "framework-arduino-avr", f"{FRAMEWORK}+distribution", "Debian's arduino-core-avr")
     for part in ("cores", "variants", "libraries"):

@@ -63,5 +63,6 @@ def libraries() -> Path:
                     f"network the first time, or its files {' and '.join(FILES)} in libraries/Servo beside the sketch"
                 )
             shutil.copyfile(path, new / name)
+        shutil.rmtree(folder / "Servo", ignore_errors=True)  # a part of it may be there
         new.replace(folder / "Servo")
     return folder

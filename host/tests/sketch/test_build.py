@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -184,6 +185,25 @@ def test_without_platformio_there_is_a_sentence(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setenv("HOME", str(tmp_path))
     with pytest.raises(BoebotError, match=r"sketches are built by PlatformIO; expected it here: pip install"):
         built(tmp_path / "a.ino")
+
+
+def test_a_core_directory_deleted_under_a_build_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BOEBOT_CACHE", str(tmp_path))
+    tools = build._Tools("0", True)
+    core = build._core(tools)
+    shutil.rmtree(core)
+    write(core, {"appstate.json": "{}"})  # as PlatformIO, still at work, leaves it
+    assert (build._core(tools) / "platforms" / "atmelavr" / "platform.json").is_file()
+
+
+def test_a_full_disk_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BOEBOT_CACHE", str(tmp_path / "cache"))
+    folder = write(tmp_path / "a", {"a.ino": "void setup() {}\nvoid loop() {}"})
+    said = "ar: libFrameworkArduino.a: No space left on device\n*** Error 1"
+    monkeypatch.setattr(build._PlatformIO, "run", lambda *_, **__: (1, said))
+    with pytest.raises(BoebotError, match=r"^a.ino cannot be built: .*cache: No space left on device$"):
+        built(folder)
+    assert not list(tmp_path.rglob("*.elf"))
 
 
 def test_the_cache_is_where_the_user_wants_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
