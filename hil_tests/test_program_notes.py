@@ -120,6 +120,13 @@ def test_what_only_hears_decides_nothing(tmp_path: Path) -> None:
     assert {pin for pin, why in floats.items() if why == "a voltage"} == {"A0"}
 
 
+def test_nothing_to_note_is_said(tmp_path: Path) -> None:
+    quiet = compiled("int main(void) { for (;;) ; }", tmp_path / "quiet.elf")
+    assert boebot.run(quiet, "rover", "empty", seconds=0.01, notes=True).notices == [
+        "--notes: there is nothing to note"
+    ]
+
+
 def test_nothing_is_noted_unasked(image: Path) -> None:
     result = execute(Request.single(brain=str(image), seconds=0.1), None, None)
     assert isinstance(result, RunResult) and result.notices == []

@@ -224,6 +224,8 @@ class _Robot:
             said += notices(task.board.robot, task.board.without)
         elif task.board.arena is not None:
             said.append(f"arena {task.board.arena} changes nothing: the robot at {task.on} is where it stands")
+        if task.request.notes and not status.notices:
+            said.append("--notes: there is nothing to note")
         if task.unrealisable is not None:
             said.append(f"forced: {task.unrealisable}")
         ending: dict[str, Any] = {
