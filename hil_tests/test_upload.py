@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shlex
+import socket
 import subprocess
 import threading
 import time
@@ -18,7 +20,7 @@ from boebot.boards import BoardRequest, open_port
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from boebot.link.ports import open_serial
+from boebot.link.ports import open_serial, pulse_dtr
 from hil_tests.bootloader import KITS, of_chip
 from sim_bridge.serve import carry
 from sim_bridge.served_ports import Port, PtyPort, TcpPort
@@ -164,3 +166,30 @@ def test_platformios_upload_works_as_written() -> None:
                     assert messages.Hello.unpack(payload).robot.rstrip(b"\0") == b"shieldbot"
                     return
     raise AssertionError("the board does not say hello")
+
+
+@pytest.mark.soak
+def test_avrdude_writes_through_an_rfc2217_client_whose_dtr_resets(tmp_path: Path) -> None:
+    """avrdude 7.1 speaks no RFC 2217, so pyserial does for it; the program is heard by the same client."""
+    image = tmp_path / "program.hex"
+    subprocess.run(["avr-objcopy", "-O", "ihex", program(tmp_path), image], check=True)
+    with served(tcp=True) as (url, _), socket.create_server(("127.0.0.1", 0)) as here:
+        line = serial.serial_for_url(url.replace("socket", "rfc2217"), 115_200, timeout=0.005)
+        words = f"-p atmega328p -c arduino -b 115200 -P net:127.0.0.1:{here.getsockname()[1]} -D -U flash:w:{image}:i"
+        with line, subprocess.Popen(["avrdude", *words.split()], stderr=subprocess.DEVNULL) as tool:
+            client, _ = here.accept()
+            client.setblocking(False)
+            assert pulse_dtr(line)
+            while tool.poll() is None:
+                with contextlib.suppress(OSError):
+                    line.write(client.recv(4096))
+                with contextlib.suppress(OSError):
+                    client.sendall(line.read(line.in_waiting or 1))
+            client.close()
+            assert tool.returncode == 0
+            line.baudrate, line.timeout = 9600, PATIENCE_S
+            assert line.read_until(b"hhh").endswith(b"hhh")
+            line.baudrate = 115_200
+            assert pulse_dtr(line)
+            line.write(b"0 ")  # the program would not answer
+            assert line.read_until(b"\x14\x10").endswith(b"\x14\x10")

@@ -69,7 +69,8 @@ def run(
         force_timing: run it even if sensors, period and line are not realisable in time; the record then says so.
         pins: what happens at the pins of emulated boards is recorded, too.
         notes: of a program: `notices` of the result say what a bench does not show, such as an input that floats
-            (docs/reference/link.md); only with on="avr" of the kit's own firmware. strict: the first such is an error.
+            (docs/reference/link.md); only with on="avr" of the kit's own firmware.
+        strict: the first such is an error.
         gdb: TCP port for avr-gdb at the one emulated ATmega328P, which waits for it (docs/how-to/debug-a-program.md).
         out: folder for the record, and the files that are made from it (boebot.view).
         record: False: nothing is recorded; a result then has few figures, and `out` is refused.
