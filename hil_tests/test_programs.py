@@ -175,6 +175,15 @@ def test_a_script_types_and_is_no_person(program: Path, tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["run", str(program), "-q", "--seconds", "0.1"]).stdout == ""
 
 
+def test_a_reader_that_goes_ends_the_run_and_its_record_is_whole(program: Path, tmp_path: Path) -> None:
+    call = f"{sys.executable} -m boebot run {program} --seconds 60 --out {tmp_path} | true"
+    subprocess.run(call, shell=True, check=True)
+    result = read_run(tmp_path).robots[0]
+    assert (
+        str(result.error) == "what the program prints cannot be shown: Broken pipe" and printed(result) == b"ready\r\n"
+    )
+
+
 def test_standard_input_and_a_script_type_beside_each_other(program: Path) -> None:
     done = command("run", program, "--seconds", "0.3", "--type", "on@0.2", typed="go")  # more is lost while it prints
     assert re.search("ready\n.*GOON\n", done.stdout), done.stdout

@@ -47,7 +47,7 @@ class ProgramDriver(Driver):
         """See `boebot.running.driver.Driver`.
 
         Raises:
-            BoardError: the program has crashed, or has printed what it must not.
+            BoardError: the program has crashed, or has printed what it must not or what cannot be shown.
             MissingTextError: it has not printed what was expected.
         """
         request, line, tick = self.task.request, self._line, 0
@@ -93,4 +93,7 @@ class ProgramDriver(Driver):
 
     def _show(self, time_s: float, line: str) -> None:
         who = f"robot {self.task.number}: " if len(self.task.request.members) > 1 else ""
-        print(f"{time_s:10.4f}  {who}{printable(line.expandtabs())}", flush=True)
+        try:
+            print(f"{time_s:10.4f}  {who}{printable(line.expandtabs())}", flush=True)
+        except OSError as error:  # its reader has gone, or the disk is full
+            raise BoardError(f"what the program prints cannot be shown: {error.strerror}") from None
