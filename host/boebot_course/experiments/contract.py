@@ -1,10 +1,10 @@
 """What a brain may see, and that it sees no more: section 3.2.3 of the notes, E66.
 
-Two checks. *Static*: no module that brains are made of imports the simulator, or what opens boards and knows the truth
-of a run. *At run time*: from the robot that a brain is handed no chain of attributes, private ones included, of
-properties, containers, bound methods, closures and defaults leads to anything but sensor values, the robot's lengths
-and the brain's own commands and chance. The walk follows what Python's garbage collector says that an object refers to,
-so that nothing is too private for it, and knows by name the few kinds of objects that may be met.
+From the robot that a brain is handed no chain of attributes, private ones included, of properties, containers, bound
+methods, closures and defaults leads to anything but sensor values, the robot's lengths and the brain's own commands and
+chance. The walk follows what Python's garbage collector says that an object refers to, so that nothing is too private
+for it, and knows by name the few kinds of objects that may be met. What the modules import that brains are made of is
+checked by the kit's tests alone.
 
 What nobody can guarantee in Python: a brain that imports the simulator itself, walks the interpreter's frames or lists
 all objects of the process finds the world. Its source then shows it, and it finds nothing on a robot.
@@ -12,12 +12,10 @@ all objects of the process finds the world. Its source then shows it, and it fin
 
 from __future__ import annotations
 
-import ast
 import functools
 import gc
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
 from typing import NamedTuple
 
@@ -28,26 +26,6 @@ import boebot
 from boebot.robot import Robot
 from boebot_course.experiment import Measured, Outcome, exactly, experiment
 
-ROOMS = ("boebot.brain", "boebot.behaviors", "boebot.cognition", "boebot.navigation", "boebot.brains")
-"""Packages that brains are made of."""
-FORBIDDEN = (
-    "sim_bridge",
-    "boebot.boards",
-    "boebot_course",
-    "boebot_timing",
-    "boebot.record",
-    "boebot.running",
-    "boebot.view",
-    "boebot.link.link",
-    "boebot.link.session",
-    "boebot.link.transport",
-    "boebot.link.delivery",
-    "serial",
-)
-"""Modules of the world, of what opens it, and of what holds a run's truth."""
-ARENAS = "boebot.arenas"
-MAPS = "boebot.navigation.line_map"
-"""The one module of these rooms that imports arenas: it makes a map of the one that a brain's author names."""
 ALLOWED = (
     "builtins",
     "random",
@@ -68,49 +46,6 @@ LIMIT = 200_000  # objects
 def is_within(module: str, names: tuple[str, ...]) -> bool:
     """One of these modules, or within one."""
     return any(module == name or module.startswith(f"{name}.") for name in names)
-
-
-# ---- static ----------------------------------------------------------------------------------------------------------
-
-
-def imported(source: str) -> Iterator[str]:
-    """Full names of what a module imports when it is run: not what only type checkers see."""
-    waiting: list[ast.AST] = [ast.parse(source)]
-    while waiting:
-        node = waiting.pop()
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            waiting += node.orelse
-            continue
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        waiting += ast.iter_child_nodes(node)
-
-
-def imports() -> dict[str, set[str]]:
-    """What each module of these rooms imports."""
-    home = Path(boebot.__file__).parent.parent
-    found = {}
-    for room in ROOMS:
-        for path in sorted((home / room.replace(".", "/")).glob("*.py")):
-            module = f"{room}.{path.stem}".removesuffix(".__init__")
-            found[module] = set(imported(path.read_text(encoding="utf-8")))
-    return found
-
-
-def forbidden(found: Mapping[str, set[str]]) -> list[tuple[str, str]]:
-    """Modules that import what they may not, and what that is."""
-    return [
-        (module, name)
-        for module, names in found.items()
-        for name in names
-        if is_within(name, FORBIDDEN) or (is_within(name, (ARENAS,)) and module != MAPS)
-    ]
-
-
-# ---- at run time -----------------------------------------------------------------------------------------------------
 
 
 class Met(NamedTuple):
@@ -182,12 +117,7 @@ def no_truth(seed: int) -> Outcome:
     Expected: None. The walk must find devices and readings, on arsim of infra-red, odometer and compass, on
     shieldbot of more, or it has not looked.
     """
-    found = imports()
-    guilty = len(forbidden(found))
-    measured = [
-        Measured("modules that brains are made of", len(found), least=len(ROOMS)),
-        exactly("imports of the simulator or of what knows the truth", guilty, 0),
-    ]
+    measured: list[Measured] = []
     counts: dict[str, Counter[str]] = {}
     for robot, on in RUNS:
         met: list[Met] = []
