@@ -37,7 +37,7 @@ from typing import Any
 
 from boebot.errors import BoebotError, CallError, SketchError
 from boebot.sketch import cache, core_directory, servo
-from boebot.sketch.find import LIBRARIES, PROJECT, Project, Sketch, below, find
+from boebot.sketch.find import LIBRARIES, PROJECT, Sketch, below, find
 
 Progress = Callable[[float], object]  # is called with the seconds that a build has taken
 
@@ -93,7 +93,7 @@ def built(path: Path, progress: Progress | None = None) -> Built:
     """
     found = find(path)
     try:
-        return _sketch(found, progress) if isinstance(found, Sketch) else _project(found, progress)
+        return _sketch(found, progress) if found.files else _project(found, progress)
     except shutil.Error as error:  # of a folder's copy: a list of what went wrong
         raise BoebotError(f"{found.name} cannot be built: {error.args[0][0][-1]}") from None
     except OSError as error:
@@ -124,7 +124,7 @@ def _build_sketch(tools: _Tools, sketch: Sketch, progress: Progress | None) -> P
     return _PlatformIO(tools, work, progress, servo.is_needed(sketch.files)).build(sketch, "uno", work, copy)
 
 
-def _project(project: Project, progress: Progress | None) -> Built:
+def _project(project: Sketch, progress: Progress | None) -> Built:
     tools = _Tools.found()
     with _alone():
         process = _PlatformIO(tools, _work(tools.versions, project.folder), progress)
@@ -142,7 +142,7 @@ def _project(project: Project, progress: Progress | None) -> Built:
     return Built(name=project.name, elf=elf)
 
 
-def _environment(project: Project, sections: Mapping[str, Mapping[str, Any]]) -> str:
+def _environment(project: Sketch, sections: Mapping[str, Mapping[str, Any]]) -> str:
     """The one environment of a project that is for a board with the chip that is emulated."""
     environments = {name.removeprefix("env:"): of for name, of in sections.items() if name.startswith("env:")}
     default = sections.get("platformio", {}).get("default_envs") or environments
@@ -198,7 +198,7 @@ class _PlatformIO:
     progress: Progress | None
     needs_servo: bool = False
 
-    def build(self, found: Sketch | Project, environment: str, folder: Path, base: Path) -> Path:
+    def build(self, found: Sketch, environment: str, folder: Path, base: Path) -> Path:
         """Builds an environment of the project in `folder`: the ELF file. `base`: what is the user's folder there.
 
         Raises:
@@ -268,7 +268,7 @@ class _PlatformIO:
                     self.progress(now_s - begin_s)
         return process.returncode, log.read_text("utf-8", "replace")
 
-    def _fault(self, found: Sketch | Project, said: str, folder: Path, base: Path) -> SketchError:
+    def _fault(self, found: Sketch, said: str, folder: Path, base: Path) -> SketchError:
         """What the compiler says, with the user's own paths."""
         too_large = [what for sign, what in _TOO_LARGE.items() if sign.search(said)]
         errors = []
@@ -276,7 +276,7 @@ class _PlatformIO:
             path, what = Path(folder, one["file"]), one["what"]
             place = found.shown / path.relative_to(base) if path.is_relative_to(base) else path
             if header := _MISSING.search(what):
-                there = LIBRARIES if isinstance(found, Sketch) else f"lib, or named by lib_deps in {PROJECT}"
+                there = LIBRARIES if found.files else f"lib, or named by lib_deps in {PROJECT}"
                 what = f"there is no {header[1]}; expected its library in {found.shown / there}"
             errors.append(f"{place}:{one['line']}: {what}")
         errors = list(dict.fromkeys(errors or _NO_PLACE.findall(said))) or ["PlatformIO has failed"]

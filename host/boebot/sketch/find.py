@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from boebot.errors import BoebotError, CallError, as_utf8
@@ -28,37 +28,22 @@ SIZE_MAXIMUM = 4 << 20  # bytes of a file
 
 @dataclass(frozen=True, kw_only=True)
 class Sketch:
-    """A sketch's files.
+    """A sketch, or a PlatformIO project.
 
     Attributes:
-        name: of its main file.
+        name: of the sketch's main file, or of the project's folder.
         folder: where it lies, absolute.
         shown: that folder as the user named it.
-        files: by their paths in the folder.
+        files: the sketch's, by their paths in the folder; none of a project, whose own file says them.
     """
 
     name: str
     folder: Path
     shown: Path
-    files: Mapping[str, bytes]
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Project:
-    """A PlatformIO project.
-
-    Attributes:
-        name: of its folder.
-        folder: absolute.
-        shown: as the user named it.
-    """
-
-    name: str
-    folder: Path
-    shown: Path
-
-
-def find(path: Path) -> Sketch | Project:
+def find(path: Path) -> Sketch:
     """The sketch or project that a path means.
 
     Raises:
@@ -68,22 +53,13 @@ def find(path: Path) -> Sketch | Project:
     try:
         if path.name == PROJECT:
             path = path.parent
-        if not path.is_dir():
-            if path.suffix not in INO or not path.is_file():
-                raise CallError(f"there is no sketch {path}; expected an .ino file, or a folder with one")
-            is_whole = path.stem == path.absolute().parent.name
-            return _sketch(path.parent, path.name, _inos(path.parent) if is_whole else [path.name], with_src=is_whole)
-        folder = path.resolve()
         if (path / PROJECT).is_file():
-            return Project(name=as_utf8(folder.name), folder=folder, shown=path)
-        inos = _inos(path)
-        named = [name for name in inos if Path(name).stem in (folder.name, path.absolute().name)]
-        if not inos:
-            raise CallError(f"{path} is neither a sketch nor a PlatformIO project; expected an .ino file or {PROJECT}")
-        if not named and len(inos) > 1:
-            names = ", ".join(map(as_utf8, inos))
-            raise CallError(f"{path} holds several sketches, {names}; expected one of them, or one named {folder.name}")
-        return _sketch(path, (named or inos)[0], inos, with_src=True)
+            return Sketch(name=as_utf8(path.resolve().name), folder=path.resolve(), shown=path)
+        if path.is_dir():
+            return _sketch(path / _main(path), is_whole=True)
+        if path.suffix not in INO or not path.is_file():
+            raise CallError(f"there is no sketch {path}; expected an .ino file, or a folder with one")
+        return _sketch(path, is_whole=path.stem == path.absolute().parent.name)
     except OSError as error:
         raise BoebotError(f"{error.filename or path} cannot be read: {error.strerror or error}") from None
 
@@ -92,15 +68,28 @@ def _inos(folder: Path) -> list[str]:
     return sorted(one.name for one in folder.iterdir() if one.suffix in INO and one.name[0] != "." and one.is_file())
 
 
-def _sketch(folder: Path, main: str, inos: list[str], *, with_src: bool) -> Sketch:
+def _main(folder: Path) -> str:
+    inos, its = _inos(folder), folder.resolve().name
+    named = [name for name in inos if Path(name).stem in (its, folder.absolute().name)]
+    if not inos:
+        raise CallError(f"{folder} is neither a sketch nor a PlatformIO project; expected an .ino file or {PROJECT}")
+    if not named and len(inos) > 1:
+        names = ", ".join(map(as_utf8, inos))
+        raise CallError(f"{folder} holds several sketches, {names}; expected one of them, or one named {its}")
+    return (named or inos)[0]
+
+
+def _sketch(main: Path, *, is_whole: bool) -> Sketch:
+    """`is_whole`: the folder is one sketch."""
+    folder = main.parent
+    inos = [folder / name for name in _inos(folder)] if is_whole else [main]
     beside = [one for one in folder.iterdir() if one.suffix in CODE and one.is_file()]
-    within = [*below(folder / "src")] if with_src else []
-    libraries = below(folder / LIBRARIES, OF_LIBRARY, NOT_BUILT)
-    files = sorted([*(folder / name for name in inos), *beside, *within, *libraries])
+    within = [*below(folder / "src")] if is_whole else []
+    files = sorted([*inos, *beside, *within, *below(folder / LIBRARIES, OF_LIBRARY, NOT_BUILT)])
     if odd := next((one for one in files if _ODD.search(one.name)), None):
         raise CallError(f"{odd} cannot be built: expected a file name without $, quotes, ; and \\")
     return Sketch(
-        name=as_utf8(main),
+        name=as_utf8(main.name),
         folder=folder.resolve(),
         shown=folder,
         files={one.relative_to(folder).as_posix(): regular(one, SIZE_MAXIMUM).read_bytes() for one in files},

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from boebot.errors import BoebotError
-from boebot.sketch.find import Project, Sketch, find
+from boebot.sketch.find import Sketch, find
 
 
 def write(folder: Path, *names: str) -> Path:
@@ -19,9 +19,7 @@ def write(folder: Path, *names: str) -> Path:
 
 
 def files(path: Path) -> set[str]:
-    found = find(path)
-    assert isinstance(found, Sketch)
-    return set(found.files)
+    return set(find(path).files)
 
 
 def test_a_folder_with_a_file_of_its_name_is_one_sketch(tmp_path: Path) -> None:
@@ -42,7 +40,7 @@ def test_another_file_is_a_sketch_by_itself(tmp_path: Path) -> None:
 
 def test_a_project_is_one(tmp_path: Path) -> None:
     folder = write(tmp_path / "car", "platformio.ini", "car.ino")
-    assert find(folder) == Project(name="car", folder=folder.resolve(), shown=folder) == find(folder / "platformio.ini")
+    assert find(folder) == Sketch(name="car", folder=folder.resolve(), shown=folder) == find(folder / "platformio.ini")
 
 
 @pytest.mark.parametrize(
