@@ -34,7 +34,7 @@ import time as wall
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from struct import Struct
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import zstandard
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     from boebot.record.record_file import RecordWriter
 
 Append = Callable[[str, float, bytes], None]
-Decoded = TypeVar("Decoded")
 
 EACH_S = 1.0  # wall time that a group spans at most
 STEPS_AT_MOST = 5_000  # steps of the brain in a group: a fast run takes no more memory than a slow one
