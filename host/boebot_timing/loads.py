@@ -94,15 +94,19 @@ _THREE_EDGES, _FOUR_EDGES = 33_600, 60_800
 _ECHO = 115 * 16  # the shortest, from rise to fall
 _HALF_PERIOD = 190  # of the carrier's highest frequency
 _BUS_STEP = 160  # the shortest of the two-wire bus, a bit at 100 kHz
-_BURST, _BURST_TO_BURST = 76, 39_000  # edges of the carrier in 1 ms, at its highest; bursts are in slots 2 and 3
-_COMPASS = Stream(_BUS_STEP, ((11, 4 * TICK),))
+# What comes n times in a period P, each up to J late, comes at most n times in any P - J.
+_TASK = TICK  # by which what a task begins is off at most: no task ends in another tick
+_BURST, _BURST_LATE = 76, 4_000  # edges of the carrier in 1 ms; by which its burst begins late. It is in slots 2 and 3
+_ECHOES_DIFFER = 294_160  # echoes of 115 us and of 18.5 ms
+_TURRETS_DIFFER = 28_800  # the turret's pulses of 600 us and of 2,400 us
+_COMPASS = Stream(_BUS_STEP, ((11, 4 * TICK - _TASK),))
 # In a servo frame: two edges of two wheels and of the turret.
 _SLOT_CYCLES, _RISE, _BURST_CYCLES = TICK // 4, 10_000, 16_036  # from a slot's begin to the rise (servo.c); of a burst
 _EARLY, _LATE = 2_000, 4_000  # by which a request is before what it is for, and by which it may wait
 _EDGES_OF = {0: 37_200, 1: 37_200, 4: 48_400}  # slots of the servos, and when the longest pulse ends (tasks.def)
 _SERVO_EDGES = Stream(
     _EDGE_TO_EDGE,
-    ((2, _THREE_EDGES), (3, _FOUR_EDGES), (6, 2 * TICK)),
+    ((2, _THREE_EDGES), (3, _FOUR_EDGES), (6, 2 * TICK - _TURRETS_DIFFER)),
     spells=tuple(
         Spell(slot * _SLOT_CYCLES + _RISE - _EARLY, slot * _SLOT_CYCLES + end + _LATE, 2, _EDGE_TO_EDGE)
         for slot, end in _EDGES_OF.items()
@@ -110,13 +114,13 @@ _SERVO_EDGES = Stream(
 )
 _SWEEP = Stream(
     _HALF_PERIOD,
-    ((_BURST, _BURST_TO_BURST), (2 * _BURST, TICK)),
+    ((_BURST, TICK // 4 - _BURST_LATE), (2 * _BURST, TICK - _BURST_LATE)),
     spells=tuple(
         Spell(slot * _SLOT_CYCLES, slot * _SLOT_CYCLES + _BURST_CYCLES + _LATE, _BURST, _HALF_PERIOD)
         for slot in (2, 3, 6, 7)
     ),
 )
-_ECHOES = Stream(_ECHO, ((2, 4 * TICK),))  # rise and fall; the Ping's shortest period is four ticks
+_ECHOES = Stream(_ECHO, ((2, 4 * TICK - _TASK - _ECHOES_DIFFER),))  # rise and fall; the shortest period is four ticks
 # What leaves while slots keep the main loop from polls: what the send ring held, 127 bytes, the answer of a poll
 # before, and one message of each task that sends in a tick, two of events.
 _EVENT = messages.Event.LENGTH + FRAME_OVERHEAD
@@ -132,25 +136,27 @@ SENT_WHILE_BUSY = (
 _SENDING = Stream(
     BYTE, close=1, parts=((_TELEMETRY, TICK), (_DEVICES, 2 * TICK), (_OWN, 4 * TICK), (_HELLO, 20 * TICK))
 )
-# 100,000 edges/s stop the interrupt after some five, and then the line until the tick ends; two ticks may be close.
-_LIGHT = Stream(2 * TICK)  # the edge of a light sensor, once in a servo frame
-_NOISE = Stream(160, ((16, TICK),))
+# A light sensor's edge, once in a servo frame, after its release and before slot 7, which charges it (light.c).
+_LIGHT = Stream(TICK // 4, ((2, 2 * TICK),))
+_WHEEL = Stream(16_000_000 // 1_510)  # an encoder's line of 1,500 edges/s, a little faster than it should be
+_NOISE = Stream(160, ((16, TICK),))  # 100,000 edges/s mask the line after some five a tick; two ticks may be close
+_SET_POINTS = 159_000  # the host's tick, by a clock that is 0.6 % fast
 _DEVICES_OFF = frozenset({WATCHDOG, STAMP, BUZZER, EEPROM, TWO_WIRE})  # the watchdog's comes when all is lost
 
 LOADS: dict[str, Load] = {
     "figures": Load(
         "figures",
-        "100 Hz tick, both servos, two encoder lines of 1,500 edges/s, IR sweep, Ping at its fastest, telemetry and a "
+        "100 Hz tick, both servos, four encoder lines of 1,500 edges/s, IR sweep, Ping at its fastest, telemetry and a "
         "set-point each tick",
         {
-            RECEIVE: (Stream(BYTE, ((_SET_POINT, TICK),)),),
+            RECEIVE: (Stream(BYTE, ((_SET_POINT, _SET_POINTS),)),),
             SEND: (_SENDING,),
-            ENCODERS: (Stream(16_000_000 // 1_500),) * 2,
+            ENCODERS: (_WHEEL,) * 4,
             EDGE: (_SERVO_EDGES,),
             CARRIER: (_SWEEP,),
             CAPTURE: (_ECHOES,),
         },
-        frame_bursts=((1, TICK),),
+        frame_bursts=((1, _SET_POINTS),),
         frame_least=_SET_POINT,
         off=_DEVICES_OFF,
     ),
@@ -176,9 +182,11 @@ LOADS: dict[str, Load] = {
 LOADS["everything"] = replace(
     LOADS["figures"],
     name="everything",
-    says="the load of the figures with every device built in: light, a tone of 8 kHz, compass, parameters being stored",
+    says="the load of the figures with every device built in: light, a tone of 8 kHz, compass, parameters being "
+    "stored, and answers that fill the line",
     streams={
         **LOADS["figures"].streams,
+        SEND: (Stream(BYTE, close=1),),  # answers may fill the line
         ENCODERS: (*LOADS["figures"].streams[ENCODERS], _LIGHT),
         STAMP: (_LIGHT,),
         BUZZER: (Stream(),),

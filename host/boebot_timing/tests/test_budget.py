@@ -152,7 +152,7 @@ def test_sums_of_a_tick_are_those_counted_by_hand(report: budget.Report) -> None
     """A slot interrupt of 31 in each slot, which wakes the main loop: 4 cycles and a pass. No link, no encoder."""
     assert report.demand == report.schedule.blocking + report.tick_work + 4 * 31
     passes = 4 * (4 + report.costs.loop)
-    assert report.executed == report.demand + passes + 2 * report.frames.cycles
+    assert report.executed == report.demand + passes + 3 * report.frames.cycles  # two come in a tick, one waited
     assert report.costs.frame == report.costs.edges == 0 and report.frames.cycles == 2 * report.costs.loop
 
 
@@ -219,7 +219,7 @@ def test_overload_asks_what_it_says() -> None:
     edges = loads.LOADS["overload"].sources(replace(row, vector=loads.ENCODERS), 113)
     assert sum(one.requests(16_000_000) for one in edges) == 3 * 4_000 + 100 * 16
     (tamed,) = FIGURES.sources(row, 53)
-    assert tamed.requests(16_000_000) == 100 * realisable.COMMAND_BYTES
+    assert tamed.requests(16_000_000) == 101 * realisable.COMMAND_BYTES  # of a host whose clock is 0.6 % fast
     assert FIGURES.sources(replace(row, vector=loads.TWO_WIRE), 99) == []
 
 

@@ -152,10 +152,10 @@ def test_image_without_encoders_has_no_changes(tmp_path: Path) -> None:
 
 
 def test_requests_come_closer_than_in_the_long_run() -> None:
-    """38 periods of 42.1 kHz in a burst, two bursts in a tick, 190 cycles from edge to edge; five changes of the
-    encoders at once where a line is noisy."""
+    """38 periods of 42.1 kHz in a burst, two bursts in a tick, up to 4,000 cycles late, 190 cycles from edge to edge;
+    five changes of the encoders at once where a line is noisy."""
     constants, overload = Constants(**timing_program.CONSTANTS), LOADS["overload"]
     (carrier,) = overload.requests(InterruptRow("carrier", loads.CARRIER, 0, 0, 952), constants)
-    assert [carrier.requests(w) for w in (1, 190, 191, 1900, 160_000)] == [1, 1, 2, 10, 2 * 76]
+    assert [carrier.requests(w) for w in (1, 190, 191, 1900, 156_000)] == [1, 1, 2, 10, 2 * 76]
     (changes,) = overload.requests(InterruptRow("changes", loads.ENCODERS, 0, 0, 1000), constants)
     assert [changes.requests(w) for w in (1, 1000, 1001)] == [5, 5, 6]
