@@ -139,7 +139,7 @@ def of_sensible_rows() -> Iterator[None]:
     cannot be: that is one sentence."""
     try:
         yield
-    except (ValueError, LookupError, TypeError, ArithmeticError, struct.error, MemoryError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, struct.error, MemoryError) as error:
         *_, last = traceback.extract_tb(error.__traceback__)  # in case that the fault is the kit's
         what = f"{type(error).__name__}: {error}; {Path(last.filename).name}, line {last.lineno}"
         raise NoRecordError(f"the record makes no sense ({what}); expected one that a run has written") from error

@@ -505,6 +505,7 @@ def test_stranger_cannot_have_a_port_opened_or_a_file_of_ours_run(
     port, brain = {"on": "/dev/ttyUSB0"}, {"members": [member | {"brain": str(ours)}]}
     refused: list[tuple[dict[str, object], str]] = [
         ({**port}, "is of a real robot"),
+        ({"on": -1}, "the record makes no sense (AttributeError"),
         ({**brain}, "the record lacks the file of brain"),
     ]
     for number, (asked, sentence) in enumerate(refused):
