@@ -146,3 +146,23 @@ def test_silence_of_the_host_ends_the_session(rig: Rig) -> None:
     rig.listen(0.6)
     stopped_after = rig.pulses(LEFT)[-1].sum() / CYCLES_PER_S - silent_from
     assert 0.28 <= stopped_after <= 0.34
+
+
+def test_reset_in_mid_run_stops_the_motors_and_the_link_comes_back(rig: Rig) -> None:
+    for cause in ("external", "brown_out"):
+        rig.drive_for(0.5, 0.5, 0.2)
+        rig.answers.clear()
+        reset_at = rig.board.cycle
+        rig.board.reset(cause)
+        hello = rig.wait_for(
+            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None),
+            1.0,
+            "a hello after the reset",
+        )
+        assert hello.reset_cause == messages.ResetCause[cause.upper()]
+        rig.start()
+        rig.listen(0.3)
+        pulses = rig.pulses(LEFT)
+        assert np.all(pulses[:, 0] <= reset_at), "a pulse after the reset"
+        assert rig.latest().tick < 60
+    assert rig.board.cycle > reset_at, "the board's clock goes on across resets"

@@ -1,4 +1,4 @@
-"""Programs that cannot be written into a board; those that can: hil_tests/test_flash.py."""
+"""Programs that cannot be written into a board; those that can: cli/test_flash.py."""
 
 from __future__ import annotations
 

@@ -64,8 +64,9 @@ class Room(NamedTuple):
     units: bool = False  # of the firmware
 
 
+WHOLE = "hil_tests/test_*.py sim_bridge/tests/circle/test_*.py"  # tests of the whole circle
 ROOMS = {
-    "firmware": Room(20, "firmware/src/", "hil_tests/test_*.py", units=True),
+    "firmware": Room(20, "firmware/src/", f"{WHOLE} sim_bridge/tests/firmware/test_*.py", units=True),
     "timing": Room(
         8,
         "host/avr_timing/|host/boebot_timing/",
@@ -76,7 +77,7 @@ ROOMS = {
     "link": Room(
         6,
         "host/boebot/link/|host/boebot/boards",
-        "host/tests/link/test_*.py host/tests/test_boards.py hil_tests/test_*.py",
+        f"{WHOLE} host/tests/link/test_*.py host/tests/test_boards.py sim_bridge/tests/test_serve*.py",
     ),
     "boebot": Room(
         28,

@@ -12,7 +12,7 @@ from boebot.errors import TimingError
 from boebot.image.elf import read_image
 from boebot.link.messages import Identity
 from boebot_timing.board import check_image
-from hil_tests.test_served import boebot, served
+from sim_bridge.tests.test_served import boebot, served
 
 IMAGE = resources.folder("images") / "shieldbot.elf"
 CHECK = bytes(range(256))

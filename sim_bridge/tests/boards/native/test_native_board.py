@@ -11,10 +11,10 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from hil_tests.device_bench import DeviceRig
 from sim_bridge import _core
 from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
 from sim_bridge.boards.emulated import native_board, native_library
+from sim_bridge.tests.boards.device_bench import DeviceRig
 
 MS = 16_000  # cycles
 TICK = 10 * MS

@@ -14,10 +14,10 @@ from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.link import Link
 from boebot_timing.board import measure
-from hil_tests.device_bench import DeviceRig, power_on
 from hil_tests.rig import CYCLES_PER_US, HOST_NONCE, TICK_S
-from hil_tests.test_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted
 from sim_bridge.boards.board import ResetCause
+from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
+from sim_bridge.tests.firmware.test_planted_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted
 
 pytestmark = pytest.mark.emulated
 

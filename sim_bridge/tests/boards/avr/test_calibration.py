@@ -28,7 +28,7 @@ from tools.tests.calibration.talk import Talk, at_pin
 
 pytestmark = pytest.mark.emulated
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "calibration.md"
+PAGE = Path(__file__).resolve().parents[4] / "docs" / "reference" / "calibration.md"
 
 # The instruction set summary of the manual for AVRe+ with 128 KB at most, aliases left out where BRBS, BRBC, BSET and
 # BCLR stand for them; SPM is not in use.

@@ -20,8 +20,8 @@ import copied_process
 from boebot import flashing
 from boebot.cli import flash as command
 from boebot.errors import BoardError, CallError
-from hil_tests.test_upload import program, served
 from sim_bridge.sessions.session import SimSession
+from sim_bridge.tests.test_upload import program, served
 
 pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
 

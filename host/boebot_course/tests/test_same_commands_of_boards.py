@@ -18,6 +18,7 @@ from boebot_course.experiments.same_commands import (
 pytestmark = pytest.mark.emulated
 
 
+@pytest.mark.parametrize("board_url", ["native", "avr"])
 @pytest.mark.parametrize("name", BRAINS)
 def test_commands_differ_no_sooner_than_telemetry(board_url: str, name: str) -> None:
     native, here = (boebot.run(BRAINS[name](), on=on, seconds=20, seed=1) for on in ("native", board_url))
@@ -31,7 +32,7 @@ def test_commands_differ_no_sooner_than_telemetry(board_url: str, name: str) -> 
     assert max(abs(a[0] - b[0]) for a, b in steps) <= 1
 
 
-@pytest.mark.soak_on_avr
+@pytest.mark.parametrize("board_url", ["native", pytest.param("avr", marks=pytest.mark.soak)])
 def test_whole_runs_along_walls_are_alike(board_url: str) -> None:
     """E68's brain that its readings pull back: 60 s on both boards, step by step."""
     measured = judge_walls([wall.lap(wall.pinger(), on, 1, wall.START, WALLS_SECONDS) for on in ("native", board_url)])

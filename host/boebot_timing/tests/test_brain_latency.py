@@ -24,6 +24,7 @@ PHASE_CYCLES = 61_001  # by which a touch is later in its tick than the one befo
 LIBRARY_CYCLES = 2 * 320 + 16  # the host's end of the line waits for two byte times of silence, and a rounding
 
 
+@pytest.mark.parametrize("board_url", ["native", "avr"])
 @pytest.mark.parametrize("period_ticks", [1, 5])
 def test_a_touch_is_seen_by_the_brain_within_two_ticks_and_its_period(board_url: str, period_ticks: int) -> None:
     """Least and most as latency_limits.py derives them for telemetry; a brain that steps every n-th tick may wait for

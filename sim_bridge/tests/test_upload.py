@@ -21,18 +21,18 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot.link.ports import open_serial, pulse_dtr
-from hil_tests.bootloader import KITS, of_chip
 from sim_bridge.serve import carry
 from sim_bridge.served_ports import Port, PtyPort, TcpPort
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sessions.world import AVR, open_on
 from sim_bridge.tests.boards.avr.avr_program import assemble
+from sim_bridge.tests.boards.avr.bootloader import KITS, of_chip
 from tools.tests.calibration import board
 from tools.tests.calibration.talk import START, Talk
 
 pytestmark = pytest.mark.emulated
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reference" / "robots.md"
 PATIENCE_S = 10.0  # by the wall clock: the bootloader waits one second for a program
 

@@ -9,11 +9,11 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.image.program import read_program
-from hil_tests.bootloader import BEGIN, KITS, optiboot
 from hil_tests.rig import CYCLES_PER_S
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import BoardAccess, Level, ResetCause
 from sim_bridge.tests.boards.avr.avr_program import assemble
+from sim_bridge.tests.boards.avr.bootloader import BEGIN, KITS, optiboot
 
 pytestmark = pytest.mark.emulated
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from boebot import resources
 
 KITS = resources.folder("images") / "bootloader.elf"
-SOURCE = Path(__file__).resolve().parents[1] / "firmware" / "bootloader" / "bootloader.c"
+SOURCE = Path(__file__).resolve().parents[4] / "firmware" / "bootloader" / "bootloader.c"
 OPTIBOOT = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot")
 BEGIN = 0x7E00
 SMALL = ["-Os", "-fno-split-wide-types", "-mrelax", "-fno-tree-scev-cprop", "-fno-move-loop-invariants"]

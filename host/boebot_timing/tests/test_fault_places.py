@@ -20,8 +20,8 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.result import read_run, robots_of
 from boebot_timing.emulated.measure import run
-from hil_tests.test_faults import JUMP_TO_ITSELF, planted
 from sim_bridge.tests.boards.symbols import entry_of, find_symbol
+from sim_bridge.tests.firmware.test_planted_faults import JUMP_TO_ITSELF, planted
 from tools import avr_program
 
 pytestmark = pytest.mark.emulated

@@ -18,9 +18,9 @@ from boebot import resources
 from boebot.link.messages import Devices, DevicesTelemetry, PingStatus, Telemetry
 from boebot_timing.emulated.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, wheels
 from boebot_timing.table import read_table
-from hil_tests.device_bench import SLICE, TwoWireDevice
-from hil_tests.sensor_bench import Ages, Held, LightSensor, RangeFinder, Receiver, Surroundings
+from boebot_timing.tests.sensor_bench import Ages, Held, LightSensor, RangeFinder, Receiver, Surroundings
 from sim_bridge.boards.board import Level
+from sim_bridge.tests.boards.device_bench import SLICE, TwoWireDevice
 
 pytestmark = pytest.mark.emulated
 

@@ -11,9 +11,9 @@ import pytest
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.messages import CompassStatus, Devices
-from hil_tests.device_bench import Capacitor, DeviceRig, Receiver, TwoWireDevice, power_on
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S
 from sim_bridge.boards.board import Level
+from sim_bridge.tests.boards.device_bench import Capacitor, DeviceRig, Receiver, TwoWireDevice, power_on
 
 pytestmark = [pytest.mark.emulated, pytest.mark.soak_on_native]
 

@@ -48,7 +48,7 @@ def test_robot_that_is_well_has_all_its_devices_examined(board: str, robot: str)
 
 
 def test_device_without_its_plug_is_found(tmp_path: Path) -> None:
-    bundled = (Path(__file__).parents[1] / "protocol" / "robots" / "boebot.toml").read_text(encoding="utf-8")
+    bundled = (Path(__file__).parents[3] / "protocol" / "robots" / "boebot.toml").read_text(encoding="utf-8")
     robot = tmp_path / "mine.toml"
     assert "[device.compass]\n" in bundled
     robot.write_text(bundled.replace("[device.compass]\n", "[device.compass]\nplugged = false\n"), encoding="utf-8")

@@ -132,23 +132,3 @@ def test_image_that_is_none_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"this is no ELF file")
     with pytest.raises(BoebotError, match=r"image\.elf"):
         rig_with(str(path))
-
-
-def test_reset_in_mid_run_stops_the_motors_and_the_link_comes_back(rig: Rig) -> None:
-    for cause in ("external", "brown_out"):
-        rig.drive_for(0.5, 0.5, 0.2)
-        rig.answers.clear()
-        reset_at = rig.board.cycle
-        rig.board.reset(cause)
-        hello = rig.wait_for(
-            lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None),
-            1.0,
-            "a hello after the reset",
-        )
-        assert hello.reset_cause == messages.ResetCause[cause.upper()]
-        rig.start()
-        rig.listen(0.3)
-        pulses = rig.pulses(LEFT)
-        assert np.all(pulses[:, 0] <= reset_at), "a pulse after the reset"
-        assert rig.latest().tick < 60
-    assert rig.board.cycle > reset_at, "the board's clock goes on across resets"
