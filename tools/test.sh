@@ -1,7 +1,7 @@
 #!/bin/sh
 # All tests, after `make` has built what they need: tools/test.sh [ARGUMENT OF PYTEST...]
-# Three parts side by side, each into build/test-PART.log: Python's tests of docs and of host without the timing, and the
-# rest of them; the firmware's units. Then, when nothing else computes, the tests that look at the wall clock, four files at
+# Three parts side by side, each into build/test-PART.log: Python's tests of host without the timing, and the rest of
+# them; the firmware's units. Then, when nothing else computes, the tests that look at the wall clock, four files at
 # a time, as they mostly wait.
 set -eu
 cd "$(dirname "$0")/.."

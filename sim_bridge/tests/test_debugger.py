@@ -15,7 +15,7 @@ from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 SOURCE = """
 #include <avr/io.h>

@@ -21,7 +21,7 @@ from serving import serving
 import copied_process
 from boebot.result import RunResult, read_run
 
-pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
+pytestmark = pytest.mark.wall_clock
 
 BOEBOT = [sys.executable, "-m", "boebot"]
 

@@ -18,7 +18,7 @@ import pytest
 
 import copied_process
 
-pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
+pytestmark = pytest.mark.wall_clock
 
 NOISE = random.Random(1).randbytes(1_000_000)
 

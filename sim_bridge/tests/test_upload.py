@@ -30,7 +30,7 @@ from sim_bridge.tests.boards.avr.bootloader import KITS, of_chip
 from tools.tests.calibration import board
 from tools.tests.calibration.talk import START, Talk
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reference" / "robots.md"

@@ -15,8 +15,6 @@ from boebot_course.experiments.same_commands import (
     telemetry_difference,
 )
 
-pytestmark = pytest.mark.emulated
-
 
 @pytest.mark.parametrize("board_url", ["native", "avr"])
 @pytest.mark.parametrize("name", BRAINS)

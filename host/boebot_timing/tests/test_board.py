@@ -19,7 +19,6 @@ CHECK = bytes(range(256))
 CRC = 0x29058C73  # of these 256 bytes, as zlib's documentation and every CRC-32 calculator gives it
 
 
-@pytest.mark.emulated
 @pytest.mark.wall_clock
 @pytest.mark.soak
 def test_board_on_a_port_is_judged_by_its_own_image_only(tmp_path: Path) -> None:

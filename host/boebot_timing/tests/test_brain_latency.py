@@ -16,8 +16,6 @@ from boebot_timing.emulated.loads import TICK_CYCLES
 from boebot_timing.tests.latency_limits import WHISKER
 from hil_tests.rig import CYCLES_PER_S, TICK_S
 
-pytestmark = pytest.mark.emulated
-
 WHISKER_PIN = 5
 TOUCH_EVERY, RELEASE_AFTER = 15, 10  # steps from one touch to the next, and to its end
 PHASE_CYCLES = 61_001  # by which a touch is later in its tick than the one before: shares no factor with the tick

@@ -24,8 +24,6 @@ from sim_bridge.tests.boards.symbols import entry_of, find_symbol
 from sim_bridge.tests.firmware.test_planted_faults import JUMP_TO_ITSELF, planted
 from tools import avr_program
 
-pytestmark = pytest.mark.emulated
-
 DATA_SPACE = 0x800000
 
 FUNCTION = "safety_accept"  # runs when a set-point comes, in the link's poll, which is no task

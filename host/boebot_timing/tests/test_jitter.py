@@ -22,8 +22,6 @@ from boebot_timing.tests.jitter_run import Asking, Run, drive, prepare
 from boebot_timing.tests.latency_limits import SERVO_FRAME_CYCLES, SLOT_CYCLES
 from sim_bridge.boards.board import Edge, Level
 
-pytestmark = pytest.mark.emulated
-
 # Of the board's time, for each load; seeds begin at other phases.
 CASES = [
     *(pytest.param((load, 1, 1.6), id=load) for load in ("figures", "overload")),

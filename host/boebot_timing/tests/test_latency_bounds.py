@@ -14,8 +14,6 @@ from boebot_timing.emulated.measure import run
 from boebot_timing.loads import ENCODERS, LOADS, SEND, TICK
 from boebot_timing.table import read_table
 
-pytestmark = pytest.mark.emulated
-
 IMAGE = resources.folder("images") / "shieldbot-quad.elf"
 
 # A byte is lost when the start bit of the fourth comes while two are kept and the third is in the shift register (data

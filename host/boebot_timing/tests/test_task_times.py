@@ -19,8 +19,6 @@ from sim_bridge.boards.board import ResetCause
 from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
 from sim_bridge.tests.firmware.test_planted_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted
 
-pytestmark = pytest.mark.emulated
-
 FRAME_S = 2 * TICK_S  # of the servos: the turret's task runs once in each
 CALL_CYCLES = 4 + 4 + 2  # call, return, and CLI with SEI
 ROUND_CYCLES = 4  # of delay(), a whole number of them

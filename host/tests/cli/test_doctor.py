@@ -18,8 +18,6 @@ from boebot.cli import doctor
 from boebot.cli.board_link import board_link
 from boebot.description.robots import robot_names
 
-pytestmark = pytest.mark.emulated
-
 
 def examined(*arguments: str) -> tuple[int, dict[str, dict[str, str]]]:
     """The exit code, and each check by its part."""

@@ -23,7 +23,7 @@ from boebot.errors import BoardError, CallError
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.tests.test_upload import program, served
 
-pytestmark = [pytest.mark.emulated, pytest.mark.wall_clock]
+pytestmark = pytest.mark.wall_clock
 
 SMALL = bytes.fromhex("529a5a9affcf") + bytes(range(250)) * 3
 LARGE = SMALL + bytes(range(251)) * 40

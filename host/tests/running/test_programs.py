@@ -33,8 +33,6 @@ from boebot.running.tasks import Request
 from boebot.view.replay import content
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
-pytestmark = pytest.mark.emulated
-
 # Prints "ready", then what it was told in capitals; "!" makes it go wild, "s" turns the left servo for a second.
 SOURCE = """
 #include <avr/io.h>

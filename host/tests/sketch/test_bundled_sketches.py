@@ -18,8 +18,6 @@ from boebot.description.robots import load_robot
 from boebot.result import RunResult
 from boebot.sketches import FOLDER, NAMES, sketch
 
-pytestmark = pytest.mark.emulated
-
 SEEDS = [1, *(pytest.param(seed, marks=pytest.mark.soak) for seed in (2, 3, 4, 5))]
 
 

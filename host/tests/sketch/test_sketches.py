@@ -13,8 +13,6 @@ import boebot
 from boebot.errors import CallError
 from boebot.record.reading import attachments_of
 
-pytestmark = pytest.mark.emulated
-
 # Both wheels forward; after 0.6 s it goes wild.
 SOURCE = """\
 #include <Servo.h>

@@ -10,7 +10,7 @@ from boebot.boards import Truth
 from boebot.navigation import Lattice, LineMap
 from boebot.navigation.lattice import cells_of
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 CELL_M, WINDOW_S = 0.2, 5.0
 

@@ -22,7 +22,7 @@ from reading import read
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.circle.circle import CircleRig, arena_of, block, circle, robot_of, wall_at
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 SUPPLY_V = 5.0  # the boebot's rail while it stands: its pack has 5.3 V
 SHARP_X = 0.06  # before the axle

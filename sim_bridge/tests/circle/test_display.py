@@ -18,7 +18,7 @@ from boebot.view import tables
 from boebot.view.replay import content
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 WIRING = """
 extends = "shieldbot"

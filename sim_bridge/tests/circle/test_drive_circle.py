@@ -20,7 +20,7 @@ from reading import read
 from sim_bridge.robots.imperfections import AS_BUILT
 from sim_bridge.tests.circle.circle import CircleRig, arena_of, circle, robot_of
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 LEFT, RIGHT = 13, 12
 G = 9.81

@@ -27,7 +27,7 @@ from boebot.running.tasks import Request
 from boebot.view import save_pins
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 TICKS_PER_S = 10**10
 

@@ -17,7 +17,7 @@ from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 # On a shieldbot: A2 is the left encoder's, 7 the right whisker's (10 kOhm to 5 V, not pressed); A4 and A5 are free.
 SOURCE = """

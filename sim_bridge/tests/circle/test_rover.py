@@ -14,7 +14,7 @@ from boebot.result import RunResult
 from boebot.view import scene
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 # Motors as ELEGOO's sketches drive them: analogWrite of pins 5 and 6 is Timer0, at 976 Hz.
 MOTORS = """

@@ -18,7 +18,7 @@ from boebot.running.again import again as repeated
 from boebot.running.again import recorded
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 WIRING = """
 extends = "shieldbot"

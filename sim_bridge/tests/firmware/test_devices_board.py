@@ -15,7 +15,7 @@ from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.device_bench import Capacitor, DeviceRig, Receiver, TwoWireDevice, power_on
 
-pytestmark = [pytest.mark.emulated, pytest.mark.soak_on_native]
+pytestmark = [pytest.mark.unsanitized, pytest.mark.soak_on_native]
 
 COMPASS_ADDRESS = 0x1E
 LIGHT_LEFT, LIGHT_RIGHT, TURRET, BUZZER, SDA, SCL = 15, 6, 11, 4, 18, 19

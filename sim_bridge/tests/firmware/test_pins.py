@@ -17,7 +17,7 @@ from sim_bridge.tests.boards.avr.bootloader import KITS
 from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
 from tools.avr_program import IMAGES
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 DRIVEN = {Level.LOW, Level.HIGH}
 SERVOS = (13, 12)

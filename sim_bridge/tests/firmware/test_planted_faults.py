@@ -17,7 +17,7 @@ from boebot.errors import BoebotError
 from boebot.link import messages
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 LEFT, RIGHT = 13, 12
 JUMP_TO_ITSELF = b"\xff\xcf"  # rjmp .-2

@@ -15,7 +15,7 @@ from sim_bridge.boards.board import BoardAccess, Level, ResetCause
 from sim_bridge.tests.boards.avr.avr_program import assemble
 from sim_bridge.tests.boards.avr.bootloader import BEGIN, KITS, optiboot
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 PAGE = 128
 PIN = 2

@@ -26,7 +26,7 @@ from tools.tests.calibration.emulator import Measured
 from tools.tests.calibration.program import ROWS, image, name
 from tools.tests.calibration.talk import Talk, at_pin
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 PAGE = Path(__file__).resolve().parents[4] / "docs" / "reference" / "calibration.md"
 
