@@ -196,7 +196,7 @@ def test_port_that_vanishes_in_mid_run_is_one_sentence_and_a_complete_record(tmp
 def test_suite_runs_on_a_board_behind_a_port(native_pty: str) -> None:
     """Some of what needs no pins, here against a served robot; what needs them is left out."""
     root = Path(__file__).resolve().parents[2]
-    suite = ["-m", "pytest", "-q", "hil_tests/test_link.py", "hil_tests/test_board_protocol.py", "--on", native_pty]
+    suite = ["-m", "pytest", "-q", "hil_tests/test_link.py", "hil_tests/test_motion.py", "--on", native_pty]
     done = subprocess.run(
         [sys.executable, *suite, "-k", "handshake or telemetry_comes"],
         cwd=root,

@@ -18,8 +18,6 @@ import reference_frame
 from sim_bridge.boards.board import BoardAccess, Level
 from sim_bridge.boards.emulated import avr_image, native_board, native_library
 
-pytestmark = pytest.mark.emulated
-
 CYCLES_PER_S = 16_000_000
 MS = CYCLES_PER_S // 1000
 TICK = 10 * MS
@@ -68,6 +66,10 @@ OK, UNKNOWN_PARAMETER, OUT_OF_RANGE, LATCHED_AGAIN = 0, 1, 2, 5  # answer_status
 TASKS = 21
 WHISKERS, LATCH, DEAD_MAN_EVENT = 0, 1, 2  # event_kind
 TIME_TO_LIVE, TRACK_WIDTH = 1, 12  # parameters
+
+
+# The native board has none: there in `make soak` alone.
+ABOUT_TIMING = pytest.mark.parametrize("board_url", [pytest.param("native", marks=pytest.mark.soak), "avr"])
 
 
 @dataclass
@@ -269,6 +271,11 @@ def power_on(kind: str) -> BoardAccess:
         board = native_board(native_library("shieldbot")).access()
     board.drive(WHISKER_LEFT, Level.HIGH)
     return board
+
+
+@pytest.fixture(params=["native", "avr"])
+def board_url(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
 
 
 @pytest.fixture
@@ -573,7 +580,7 @@ def test_clock_probe_is_answered_between_its_sending_and_its_return(host: Host) 
 # ---- load ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.soak_on_native
+@ABOUT_TIMING
 @pytest.mark.parametrize("setpoint", ["signals", "speeds"])
 def test_line_that_is_too_full_drops_whole_frames_and_misses_no_tick(host: Host, setpoint: str) -> None:
     """Set-points and clock probes without a gap, 50,000 bytes/s, with answers and telemetry on the way back."""
@@ -597,7 +604,7 @@ def test_line_that_is_too_full_drops_whole_frames_and_misses_no_tick(host: Host,
     assert host.refused == 0
 
 
-@pytest.mark.soak_on_native
+@ABOUT_TIMING
 @pytest.mark.parametrize("setpoint", ["signals", "speeds"])
 def test_line_full_of_set_points_misses_no_tick(host: Host, setpoint: str) -> None:
     kind = SIGNAL if setpoint == "signals" else SPEED
