@@ -19,7 +19,8 @@ run() {
   case $part in
     host) python host/tests host/boebot_can host/boebot_course "$@" ;;
     others) python docs host/avr_timing host/boebot_timing tools hil_tests sim_bridge protocol "$@" ;;
-    # All units for one pin map, and for two others what only they have. Quadrature encoders: hil_tests, and `make soak`.
+    # All units for one pin map, and for two others what only they have. Quadrature encoders: sim_bridge/tests/firmware,
+    # and `make soak`.
     # A unit that waits for what does not come would do it for ever.
     units) timeout 1200 tools/pio test -e native_sanitized -e native_boebot -e native_line ;;
     # Each of the four reads all files of tests that it is given, so it is given those that have such tests.

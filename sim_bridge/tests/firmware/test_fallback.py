@@ -12,7 +12,7 @@ from boebot.link.messages import EventKind, Status
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
 from sim_bridge.tests.circle.circle import arena_of, circle
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 LEFT, RIGHT = 13, 12
 AFTER_MS = 400

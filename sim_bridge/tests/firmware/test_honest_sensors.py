@@ -13,7 +13,7 @@ from boebot.link import messages
 from boebot.link.messages import PingStatus
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 PING, LED, RECEIVER, ENCODER = 8, 9, 10, 16
 LOOK_S = 0.0002  # how often a test looks at what the board does to a pin: its answer is that late at the soonest

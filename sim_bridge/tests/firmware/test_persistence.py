@@ -18,7 +18,7 @@ from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
 from sim_bridge.tests.boards.symbols import DATA_BASE, entry_of
 from tools.avr_program import IMAGES
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 CYCLES_PER_MS = CYCLES_PER_S // 1000
 CELL_S = 0.0034  # a write

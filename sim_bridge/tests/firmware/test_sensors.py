@@ -11,7 +11,7 @@ import pytest
 from boebot.link import messages
 from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
 
-pytestmark = pytest.mark.emulated
+pytestmark = pytest.mark.unsanitized
 
 
 def test_edges_are_counted_and_timed(rig: Rig) -> None:
