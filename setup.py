@@ -185,9 +185,11 @@ setup(
     license_expression="MIT AND GPL-3.0-or-later" if HAS_SIMAVR else "MIT",
     license_files=["LICENSE", *(["LICENSES/GPL-3.0-or-later.txt"] if HAS_SIMAVR else [])],
     cmdclass={"build_ext": BuildExt, "build_py": BuildPy},
-    package_dir={name: f"host/{name}" for name in ("boebot", *GUESTS)} | {"sim_bridge": "sim_bridge"},
+    package_dir={name: f"host/{name}" for name in ("boebot", *GUESTS)}
+    | {"sim_bridge": "sim_bridge", "boebot_hil": "hil_tests/boebot_hil"},
     packages=[
         *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data*", "boebot.arenas.geometry"]),
+        "boebot_hil",  # the only tests that are installed: of whatever board somebody has
         *find_namespace_packages("host", include=WITH_PARTS, exclude=["*.tests*", "*.generator"]),
         *find_namespace_packages(
             ".",

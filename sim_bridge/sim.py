@@ -85,7 +85,7 @@ def _layout(robot: Any, parts: Mapping[str, int]) -> dict[str, slice]:
     counts = [lib.robot_read_parts(robot, number, room) for number in parts.values()]
     found = {
         name: slice(counts[0] - here, counts[0] - after)
-        for name, here, after in zip(parts, counts, [*counts[1:], 0], strict=True)
+        for name, here, after in zip(parts, counts, [*counts, 0][1:], strict=True)
     }
     return {name: where for name, where in found.items() if where.start < where.stop}
 
@@ -443,9 +443,17 @@ class SimRobot:
         Raises:
             BoardError: the robot has no board.
         """
+        self.stamp_bytes()
+        lib.robot_line_rate(self.handle, 0)
+
+    def stamp_bytes(self) -> None:
+        """From now on `receive_stamped` says when each byte has come.
+
+        Raises:
+            BoardError: the robot has no board.
+        """
         self._need_board("a line")
         self.handle.is_stamped = True
-        lib.robot_line_rate(self.handle, 0)
 
     def receive_stamped(self) -> list[tuple[int, int]]:
         """Bytes that left the board since the last call, each with the cycle at which it had come."""

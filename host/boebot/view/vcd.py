@@ -25,6 +25,7 @@ from boebot.errors import BoebotError
 from boebot.record.record import LINE_FRAME
 
 if TYPE_CHECKING:
+    from boebot.description.robots import RobotDescription
     from boebot.record.blocks import Block
     from boebot.record.record import Record
     from boebot.record.run import Run
@@ -57,13 +58,22 @@ def write(robots: Sequence[Run], path: Path) -> None:
     """
     if not any(robot.record.count("pins") for robot in robots):
         raise BoebotError("the run has no pins to write; expected one with --pins (pins=True)")
+    write_boards([(robot.robot, robot.record) for robot in robots], robots[0].summary(), path)
+
+
+def write_boards(boards: Sequence[tuple[RobotDescription, Record]], comment: str, path: Path) -> None:
+    """Writes the file of these boards, whatever has made the records of their pins.
+
+    Raises:
+        ValueError: their times make no sense.
+    """
     told: list[Iterator[tuple[int, Any, str]]] = []
-    about: dict[str, Any] = {"timescale": f"{TICK_PS} ps", "date": "", "comment": _word(robots[0].summary())}
+    about: dict[str, Any] = {"timescale": f"{TICK_PS} ps", "date": "", "comment": _word(comment)}
     with path.open("w", encoding="ascii") as file, vcd.VCDWriter(file, **about) as writer:
-        for number, robot in enumerate(robots, 1):
-            scope = f"{_word(robot.robot.name)}_{number}"
+        for number, (robot, record) in enumerate(boards, 1):
+            scope = f"{_word(robot.name)}_{number}"
             signals = [writer.register_var(scope, name, "wire", size=1, init="z") for name in _names(robot)]
-            told.append(_changes(robot.record, signals))
+            told.append(_changes(record, signals))
         for tick, signal, value in heapq.merge(*told, key=itemgetter(0)):
             if tick < 0:  # no cycle of a board, which counts from 0
                 raise ValueError(f"a pin changes at {tick} ticks of 100 ps")
@@ -74,9 +84,9 @@ def _changes(record: Record, signals: Sequence[Any]) -> Iterator[tuple[int, Any,
     return ((tick, signals[pin], value) for tick, pin, value in values(record))
 
 
-def _names(robot: Run) -> list[str]:
+def _names(robot: RobotDescription) -> list[str]:
     """Of all pins, with the devices there."""
-    users = {RX: ["rx"], TX: ["tx"]} | users_of_pins(robot.robot)
+    users = {RX: ["rx"], TX: ["tx"]} | users_of_pins(robot)
     prints = [name if name[0] == "A" else f"D{name}" for name in map(pin_name, range(PINS))]
     return ["_".join([name, *map(_word, users.get(pin, []))]) for pin, name in enumerate(prints)]
 

@@ -1,0 +1,1 @@
+"""The kit's own tests of a board: what PROTOCOL.md promises, for any board that speaks the protocol (`boebot test`)."""

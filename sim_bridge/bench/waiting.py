@@ -1,0 +1,13 @@
+"""How what a test asks of a board ends where it does not come: a wait in vain, or a board that cannot do it."""
+
+from __future__ import annotations
+
+from boebot.errors import BoebotError
+
+
+class WaitError(AssertionError):
+    """What a test waited for did not come within its time. The text says what it was, and what came instead."""
+
+
+class Cannot(BoebotError):  # noqa: N818 (no error of anybody's: a test that meets it is skipped)
+    """The board under test cannot be asked that, as its kind has no such thing: a test is skipped, with this reason."""
