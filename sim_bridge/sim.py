@@ -443,17 +443,9 @@ class SimRobot:
         Raises:
             BoardError: the robot has no board.
         """
-        self.stamp_bytes()
-        lib.robot_line_rate(self.handle, 0)
-
-    def stamp_bytes(self) -> None:
-        """From now on `receive_stamped` says when each byte has come.
-
-        Raises:
-            BoardError: the robot has no board.
-        """
         self._need_board("a line")
         self.handle.is_stamped = True
+        lib.robot_line_rate(self.handle, 0)
 
     def receive_stamped(self) -> list[tuple[int, int]]:
         """Bytes that left the board since the last call, each with the cycle at which it had come."""

@@ -11,6 +11,7 @@ import msgspec
 
 from boebot.boards import BoardRequest
 from boebot.description.robots import RobotDescription, load_robot
+from boebot.record.blocks import Group, merged
 from boebot.record.record import Record
 from sim_bridge.sessions.world import AVR, NATIVE, open_on
 
@@ -53,6 +54,7 @@ class Bench:
         )
         self.session = open_on(NATIVE if on == NATIVE.name else AVR, request)
         self.pins, self.robot = self.session.board, self.session.robot
+        self.robot.handle.is_stamped = True
         self.mark = 0
         self._record = Record()
 
@@ -61,15 +63,24 @@ class Bench:
         """Up to where it has run."""
         return self.session.sim.cycle
 
-    @property
-    def record(self) -> Record:
+    def streams(self) -> Group:
         """What its pins and its robot have done so far: "pins", "inputs", "line_in", "line_out", "truth"."""
         self._record.put(self.session.drain())
-        return self._record
+        return merged(list(self._record.groups()))
 
-    def run(self, cycles: int) -> None:
-        """Lets `cycles` pass."""
-        self.session.sim.run(cycles)
+    def run_until(self, cycle: int) -> None:
+        """Lets time pass up to that cycle."""
+        self.session.sim.run(max(0, cycle - self.now))
+
+    def received(self) -> tuple[bytes, list[int]]:
+        """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
+        stamped = self.robot.receive_stamped()
+        return bytes(byte for _, byte in stamped), [cycle for cycle, _ in stamped]
+
+    def send(self, data: bytes, at: int = 0) -> None:
+        """Puts bytes on the line towards the board, back to back, not before cycle `at`."""
+        board = self.robot.board.handle
+        board.op.send(board, at, data, len(data))
 
     def close(self) -> None:
         """Frees board and world. May be called twice."""

@@ -11,7 +11,7 @@ from boebot.errors import CallError
 from boebot.link.transport import Stamping, Transport
 from sim_bridge.bench.waiting import WaitError
 
-SLICE_S = 0.001  # of waiting, between two looks at what has come
+SLICE_S = 0.000_25  # of waiting, between two looks at what has come
 PORTION_S = 0.25  # of time that only passes
 NOTHING_S = 1e-9
 SHOWN = 200  # bytes of what came, in the text of an error

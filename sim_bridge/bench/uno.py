@@ -33,6 +33,7 @@ UCSR0B, RXEN0 = 0xC1, 0x10  # of the data space: the receiver is on (ATmega328P 
 START_S = 2.0  # from a real board's reset to its program, at most: boot loaders wait for 1.4 s and less
 ALLOWANCE_S = 0.1  # of a wait on a port: USB, and a computer that has more to do (chosen)
 LONGEST_S = 86_400.0
+BOARD_GUARD_CYCLES = 64  # that what comes to a board is ahead of it (boards/board.h)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +96,7 @@ class Uno:
         """Lets time pass."""
         seconds = number("run: the time", seconds, CallError, least=0, most=LONGEST_S)
         self.serial.listen(seconds)
+        self.serial.line.waited_for(self.serial.line.transport.now())
 
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""
@@ -142,10 +144,12 @@ class Uno:
         """Writes what all pins did so far, for viewers of logic signals; False: of this board that is not known."""
         if self._bench_or_none is None:
             return False
+        from boebot.record.record import Record
         from boebot.view import vcd
 
         bench = self._bench_or_none
-        vcd.write_boards([(bench.robot.description, bench.record)], str(self._wanted.image or self._wanted.robot), path)
+        record, what = Record.of(bench.streams()), str(self._wanted.image or self._wanted.robot)
+        vcd.write_boards([(bench.robot.description, record)], what, path)
         return True
 
     # ---- its end -----------------------------------------------------------------------------------------------------
@@ -164,6 +168,37 @@ class Uno:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+class BenchLine:
+    """The serial line of a board on a bench, as a transport."""
+
+    name, realtime = "bench", False
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+
+    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
+        """What comes in that time."""
+        return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))
+
+    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
+        """The same, byte by byte with the end of its stop bit (s)."""
+        del quiet_s
+        self._bench.run_until(self._bench.now + round(wait_s * CLOCK_HZ))
+        data, cycles = self._bench.received()
+        return [(cycle / CLOCK_HZ, bytes([byte])) for cycle, byte in zip(cycles, data, strict=True)]
+
+    def write(self, data: bytes) -> None:
+        """Sends bytes from now on."""
+        self._bench.send(data, self._bench.now + BOARD_GUARD_CYCLES)
+
+    def now(self) -> float:
+        """Since power-on (s)."""
+        return self._bench.now / CLOCK_HZ
+
+    def close(self) -> None:
+        """It ends with its bench."""
 
 
 # ---- opening ---------------------------------------------------------------------------------------------------------
@@ -187,13 +222,11 @@ def open_uno(on: str, wanted: Wanted) -> Uno:
     bench = Bench(
         wanted.image, on=on, robot=wanted.robot, arena=wanted.arena, seed=wanted.seed, noise=wanted.noise
     )  # fmt: skip
-    transport = bench.session.transport
     if wanted.baud is not None:
-        transport.set_baud(wanted.baud)
+        bench.robot.line_rate(wanted.baud)
     elif on == AVR:
-        transport.follow()
-    transport.stamp_each()
-    line = Line(transport, waited_for=_marks(bench))
+        bench.robot.follow_line()
+    line = Line(BenchLine(bench), waited_for=_marks(bench))
     if on == AVR:
         line.is_heard = lambda: bool(bench.pins.read_memory(UCSR0B, 1)[0] & RXEN0)
         line.not_heard = "the program has not switched its receiver on (Serial.begin)"

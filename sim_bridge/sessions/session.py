@@ -93,21 +93,21 @@ class SimTransport:
         self._sim = robot.sim
         self._wait = wait
         self._pins = pins
-        self.stamps_each = False
+        self.follows = False
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
         return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))
 
     def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
-        """As `read`, with the instant at which the last byte had come (s); byte by byte after `stamp_each`."""
+        """As `read`, with the instant at which the last byte had come (s); byte by byte where it follows the board."""
         # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
         cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
         quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
         self._wait(self._robot, cycles, quiet)
         if self._pins is not None:
             self._pins.collect()
-        if self.stamps_each:
+        if self.follows:
             return [(cycle / CLOCK_HZ, bytes([byte])) for cycle, byte in self._robot.receive_stamped()]
         data = self._robot.receive()
         return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
@@ -121,12 +121,7 @@ class SimTransport:
     def follow(self) -> None:
         """From now on this side has the board's own bit rate, whatever that is."""
         self._robot.follow_line()
-        self.stamps_each = True
-
-    def stamp_each(self) -> None:
-        """From now on each byte is a piece of `read_stamped`."""
-        self._robot.stamp_bytes()
-        self.stamps_each = True
+        self.follows = True
 
     def write(self, data: bytes) -> None:
         """Sends bytes, back to back from now on."""
