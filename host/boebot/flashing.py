@@ -25,6 +25,7 @@ LIFE = re.compile(rb"#|\navrdude: ")  # what it prints of what went well
 SILENCE_S = 15.0  # of avrdude, which tries for minutes where a byte was lost
 LEAST_S, PER_BYTE_S = 30.0, 0.005  # for all of it; a byte takes 0.25 ms on a computer that does nothing else
 _SIGNATURE = re.compile(r"device signature = 0x([0-9a-f]{6})(?: \(probably (\w+)\))?")
+_DIFFERS = re.compile(r"(?is)verification.*(mismatch|error)|(mismatch|error).*verification")
 _EXPECTED = "1e950f"  # ATmega328P (data sheet 28.3)
 
 
@@ -44,6 +45,27 @@ def write(
         BoardError: the program is too large, avrdude is missing, the port is held or none, the board does not answer,
             is another chip, or did not keep the program. The port is free then, and another try may work.
     """
+    if (said := _avrdude("w", flash, port, progress, silence_s)) is not None:
+        raise BoardError(_why(port, said))
+
+
+def holds(flash: bytes, port: str) -> bool:
+    """Whether the board there has that in its flash from address 0 on, as it says. Nothing is written. Raises as
+    `write`."""
+    said = _avrdude("v", flash, port)
+    if said is not None and not _DIFFERS.search(said):
+        raise BoardError(_why(port, said))
+    return said is None
+
+
+def _avrdude(
+    does: str,
+    flash: bytes,
+    port: str,
+    progress: Callable[[float], object] = lambda _: None,
+    silence_s: float = SILENCE_S,
+) -> str | None:
+    """Has avrdude write (w) the flash, or verify it (v): None, or all that it said where it failed."""
     flash = flash.rstrip(b"\xff")
     if len(flash) > ROOM:
         raise BoardError(f"the program has {len(flash)} bytes; expected {ROOM} at most, before the boot loader")
@@ -56,7 +78,7 @@ def write(
         program = Path(folder, "program.bin")
         program.write_bytes(flash)
         command = ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(UPLOAD_BAUD), "-P", path, "-D"]
-        command += ["-U", f"flash:w:{program}:r"]
+        command += ["-U", f"flash:{does}:{program}:r"]
         with subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         ) as tool:
@@ -67,8 +89,7 @@ def write(
                     tool.wait()
             finally:  # Ctrl-C, too
                 tool.kill()
-    if is_late or tool.returncode:
-        raise BoardError(_why(port, said))
+    return said if is_late or tool.returncode else None
 
 
 def _path(port: str) -> str:
@@ -108,7 +129,7 @@ def _why(port: str, said: str) -> str:
     if signature and signature[1] != _EXPECTED:
         chip = f", as of a {signature[2]}" if signature[2] else ""
         return f"the board at {port} has the signature {signature[1]}{chip}; expected {_EXPECTED}, an ATmega328P"
-    if "verification" in words and ("mismatch" in words or "error" in words):
+    if _DIFFERS.search(said):
         return f"the board at {port} did not keep the program: what was read back differs; flash it again"
     if opening := re.search(r"cannot (?:open port|connect)[^:]*: (.+)|cannot resolve (.+)", said, re.IGNORECASE):
         return f"{port} cannot be opened: {(opening[1] or opening[2]).strip().lower()}"

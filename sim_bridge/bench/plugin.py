@@ -87,7 +87,8 @@ def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
     board = getattr(request, "param", None) or boards(request.config)[0]
     failure = ""
     try:
-        opened = open_uno(board, _wanted(request.node))
+        flash, motors = (request.config.getoption(name) for name in ("--uno-flash", "--uno-motors"))
+        opened = open_uno(board, _wanted(request.node), flash=flash, motors=motors)
     except BoebotError as error:
         if _cannot(error):
             raise
@@ -118,7 +119,6 @@ def _wanted(item: pytest.Item) -> Wanted:
         raise CallError(
             f"{item.name} says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot="
         )
-    asked.pop("motors", None)
     if (image := asked.get("image")) is not None:
         program = load_program(_file(item, image))
         if program is None:

@@ -13,16 +13,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from boebot import flashing
 from boebot.arguments import number
 from boebot.boards import is_live, open_port
 from boebot.description.robots import load_robot
 from boebot.devices.uart import Uart
-from boebot.errors import CallError
+from boebot.errors import BoardError, CallError
+from boebot.image.program import read_program
 from sim_bridge.bench.bench import Bench
 from sim_bridge.bench.measured import Measurement
 from sim_bridge.bench.serial import Line, Serial
 from sim_bridge.bench.waiting import Cannot
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.boards.emulated import avr_image
 
 if TYPE_CHECKING:
     from boebot.boards import TruthNow
@@ -45,6 +48,7 @@ class Wanted:
         robot, arena: what is around the board; no robot: nothing is.
         seed, noise: of that world.
         baud: of this end of the serial line; None: always the board's own rate, at a port the robot's.
+        motors: whether the program may turn motors, of which those of a real robot are kept still.
     """
 
     image: Path | None = None
@@ -53,6 +57,7 @@ class Wanted:
     seed: int = 1
     noise: bool = False
     baud: int | None = None
+    motors: bool = True
 
 
 class Uno:
@@ -73,10 +78,10 @@ class Uno:
         """The bench that the board is on.
 
         Raises:
-            Cannot: the board is behind a port; `what` cannot be had there.
+            Cannot: the board is behind a port, where nobody reaches `what`.
         """
         if self._bench_or_none is None:
-            raise Cannot(f"a board at a port has no {what} that a test can reach")
+            raise Cannot(f"a test cannot reach the {what} of a board at a port")
         return self._bench_or_none
 
     def _memory(self, what: str) -> Bench:
@@ -100,7 +105,7 @@ class Uno:
 
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""
-        self.bench("reset but that at its opening").pins.reset(cause)
+        self.bench("reset line").pins.reset(cause)
 
     # ---- what is at the board ----------------------------------------------------------------------------------------
 
@@ -204,15 +209,21 @@ class BenchLine:
 # ---- opening ---------------------------------------------------------------------------------------------------------
 
 
-def open_uno(on: str, wanted: Wanted) -> Uno:
+def open_uno(on: str, wanted: Wanted, *, flash: bool = False, motors: bool = False) -> Uno:
     """A board, powered on: `on` is avr, native or a port.
+
+    Args:
+        flash: the program may be written into a board at a port; else it has to be there already.
+        motors: those of a board at a port may turn.
 
     Raises:
         Cannot: that kind of board cannot run the image.
         BoebotError: in one sentence: the image is none, the robot or arena is not there, the port is held.
     """
     if is_live(on):
-        return _at_port(on, wanted)
+        if wanted.motors and not motors:
+            raise Cannot("the program may turn motors; expected --uno-motors, or motors=False in the mark")
+        return _at_port(on, wanted, flash)
     if on not in (AVR, NATIVE):
         raise CallError(f"there is no board {on!r}; expected {AVR}, {NATIVE} or a port such as /dev/ttyACM0")
     if on == NATIVE and wanted.image is not None:
@@ -240,14 +251,25 @@ def _marks(bench: Bench) -> Callable[[float], None]:
     return mark
 
 
-def _at_port(url: str, wanted: Wanted) -> Uno:
+_holds: dict[str, bytes] = {}
+"""The flash of each board behind a port, as this process has seen or written it."""
+
+
+def _at_port(url: str, wanted: Wanted, may_flash: bool) -> Uno:
     """A board behind a port, which opening has reset where the port can."""
-    baud = wanted.baud
-    if baud is None and wanted.robot is not None:
-        uart = load_robot(wanted.robot).device.get("uart")
-        baud = uart.baud if isinstance(uart, Uart) else None
+    robot = None if wanted.robot is None else load_robot(wanted.robot)
+    uart = None if robot is None else robot.device.get("uart")
+    baud = uart.baud if wanted.baud is None and isinstance(uart, Uart) else wanted.baud
     if baud is None:
         raise CallError(f"{url} does not know the program's bit rate; expected it in the mark: baud=9600")
+    image = wanted.image or avr_image(robot.pin_map if robot else "")
+    flash = read_program(image).flash
+    if _holds.get(url) != flash:
+        if may_flash:
+            flashing.write(flash, url)
+        elif not flashing.holds(flash, url):
+            raise BoardError(f"the board at {url} has another program than {image.name}; expected it, or --uno-flash")
+        _holds[url] = flash
     transport = open_port(url, baud)
     opened_s = transport.now()
     line = Line(transport, allowance_s=ALLOWANCE_S)
