@@ -12,6 +12,7 @@ import pytest
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.description.robots import load_robot
 from boebot.link import messages
+from boebot.link.bad_line import BOTH, TO_BOARD
 from boebot.link.link import Link
 
 pytestmark = pytest.mark.emulated
@@ -20,61 +21,13 @@ TICK_S = 0.010
 PING = messages.PARAMETERS["ping_period"]
 
 
-class BadLine:
-    """A transport that damages what it carries, both ways, and may hold back what goes to the board."""
-
-    realtime = False
-
-    def __init__(self, session: BoardSession, bit_errors: float = 0.0, copies: float = 0.0, seed: int = 1) -> None:
-        self._inner = session.transport
-        self.name = self._inner.name
-        self.bit_errors, self.copies = bit_errors, copies
-        self.stalled = False
-        self.held = bytearray()
-        self.flipped = 0
-        self._draw = random.Random(f"bad line {seed}")
-        self._next = self._gap()
-
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        return self._damage(self._inner.read(wait_s, quiet_s))
-
-    def write(self, data: bytes) -> None:
-        data = self._damage(data)
-        if self.copies and self._draw.random() < self.copies:
-            data += data
-        if self.stalled:
-            self.held += data
-        else:
-            self._inner.write(data)
-
-    def release(self) -> None:
-        """Lets all go that was held back."""
-        self.stalled = False
-        self._inner.write(bytes(self.held))
-        self.held.clear()
-
-    def now(self) -> float:
-        return self._inner.now()
-
-    def close(self) -> None:
-        self._inner.close()
-
-    def _gap(self) -> int:
-        """Bits until the next wrong one."""
-        return int(self._draw.expovariate(self.bit_errors)) if self.bit_errors else 1 << 62
-
-    def _damage(self, data: bytes) -> bytes:
-        bits = 8 * len(data)
-        if self._next >= bits:
-            self._next -= bits
-            return data
-        damaged = bytearray(data)
-        while self._next < bits:
-            damaged[self._next // 8] ^= 1 << self._next % 8
-            self.flipped += 1
-            self._next += 1 + self._gap()
-        self._next -= bits
-        return bytes(damaged)
+def linked(board: BoardSession, **shares: float) -> Link:
+    """A link over a line with these faults, "serial" of each name, from now on."""
+    link = Link(board.transport)
+    for name, share in shares.items():
+        link.line.make_bad(1).add(f"serial.{name}", share, 0.0, ways=[TO_BOARD] if name == "repeated" else BOTH)
+    link.open()
+    return link
 
 
 @pytest.fixture
@@ -100,9 +53,8 @@ def pulses(board: BoardSession) -> int:
 def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float, copies: float) -> None:
     """Each sets another value and reads it back: nothing lost, nothing twice, nothing swapped. At 1e-4, 99 of 100
     commands are answered within three ticks."""
-    line = BadLine(board, bit_errors, copies)
-    link = Link(line)
-    link.open()
+    link = linked(board, flipped=bit_errors, repeated=copies)
+    line = link.transport
     latencies = []
     draw = random.Random(5)
     for index in range(900):
@@ -115,7 +67,6 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
             assert link.parameters.get("ping_period") == value
     latencies.sort()
     assert link.counts.sessions == 1
-    assert line.flipped > (10 if bit_errors < 1e-3 else 100), "the line was bad"
     if bit_errors <= 1e-4:
         assert latencies[round(0.99 * len(latencies))] <= 3 * TICK_S, latencies[-10:]
     listen(link, 1.5)
@@ -127,9 +78,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
 @pytest.mark.parametrize("bit_errors", [1e-4, 1e-3])
 def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float) -> None:
     """A whisker is pressed and let go: every change comes, once."""
-    line = BadLine(board, bit_errors, seed=2)
-    link = Link(line)
-    link.open()
+    link = linked(board, flipped=bit_errors)
     listen(link, 0.2)
     link.events.fetch()
     pressed = []
@@ -149,16 +98,15 @@ def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float)
 def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: float) -> None:
     """The line to the board stalls with motion commands queued, and lets them go: whether the board has ended the
     session meanwhile (2 s) or not, no pulse comes of them."""
-    line = BadLine(board)
-    link = Link(line)
-    link.open()
+    link = linked(board)
+    line = link.transport
     link.parameters.set("session_time_out", 1.0)
     link.arm()
     listen(link, 0.05)
     assert link.telemetry.latest is not None
-    line.stalled = True
     sessions = link.counts.sessions
     end = line.now() + held_s - 0.3
+    held = link.line.make_bad(1).add("serial.stalled", 0.0, line.now(), line.now() + held_s, [TO_BOARD])
     tick = 0
     while line.now() < end:
         listen(link, TICK_S)
@@ -166,8 +114,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
             tick = messages.Telemetry.unpack(link.telemetry.latest).tick
         link.send_signal(1.0, 1.0, 250, tick)
     listen(link, 0.3)  # the last of them has outlived itself
-    assert len(line.held) > 500
-    line.release()
+    assert held() > 500
     listen(link, 0.5)
     assert pulses(board) == 0
     assert (link.counts.sessions == sessions) is (held_s < 1.0)
@@ -180,9 +127,8 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
 
 @pytest.mark.parametrize("at_s", [0.0, 0.011, 0.137, 0.5])
 def test_traffic_resumes_within_a_second_of_any_reset(board: BoardSession, at_s: float) -> None:
-    line = BadLine(board)
-    link = Link(line)
-    link.open()
+    link = linked(board)
+    line = link.transport
     link.arm()
     listen(link, at_s)
     for cause in ("external", "brown_out", "watchdog"):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 BOARDS_GROUP = "boebot.boards"  # kind, or "direct" -> WorldFactory
 DIRECT = "direct"  # what a robot without a board runs on
+RESET_CAUSES = ("external", "watchdog")  # that a fault can have
 SERVERS_GROUP = "boebot.servers"  # any name -> Server
 
 
@@ -165,6 +166,15 @@ class Session(Protocol):
 
         Raises:
             BoebotError: the robot has no such device, or it cannot be set so.
+        """
+
+    def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
+        """What is called `owner` (a device of the robot, or "board", "eeprom", ...) fails in that way (see
+        boebot.running.faults) from `begin_s` to `end_s` on the clock of the session's transport (infinite: for good).
+        Returns what says how often that has changed something so far.
+
+        Raises:
+            BoebotError: it cannot.
         """
 
     def counters(self) -> Mapping[str, float]:
@@ -320,6 +330,10 @@ class LiveSession:
     def set_part(self, device: str, value: float) -> None:
         """By hand only."""
         raise BoardError(f"what is wired to the {self.description} is worked by hand: expected a simulated robot")
+
+    def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
+        """A real one fails by itself."""
+        raise BoardError(f"{owner}.{kind} is of a simulated robot; expected a fault of serial line, cable or host")
 
     def counters(self) -> Mapping[str, float]:
         """A port counts nothing."""

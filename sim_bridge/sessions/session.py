@@ -6,17 +6,21 @@ somebody reads or writes.
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Mapping
 
 from boebot.boards import PinNow, TruthNow, WatchdogReset
 from boebot.description import robots
 from boebot.devices.uart import Uart
+from boebot.errors import BoardError
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.pins import BoardPins, PinRecorder
+from sim_bridge.sessions.board_faults import KINDS
 from sim_bridge.sim import SimRobot
 from sim_bridge.vehicles import STEP_S
 
+NEVER_S = 1e9
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 
 Wait = Callable[[SimRobot, int, int], None]
@@ -50,6 +54,10 @@ class InWorld:
     def set_part(self, device: str, value: float) -> None:
         """Works a device: see `SimRobot.set_part`."""
         self.robot.set_part(device, value)
+
+    def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
+        """See `boebot.boards.Session`."""
+        raise BoardError(f"the simulated robot {self.robot.description.name!r} has no fault {owner}.{kind}")
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Lifts the robot and puts it there, at rest."""
@@ -94,6 +102,11 @@ class SimTransport:
         self._wait = wait
         self._pins = pins
         self.follows = False
+        self._due: list[tuple[int, int, Callable[[], object]]] = []  # cycle, number, what is done then
+
+    def at(self, time_s: float, do: Callable[[], object]) -> None:
+        """What is done at that time (s), or now where it is past."""
+        heapq.heappush(self._due, (round(time_s * CLOCK_HZ), len(self._due), do))
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
@@ -104,13 +117,28 @@ class SimTransport:
         # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
         cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
         quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
-        self._wait(self._robot, cycles, quiet)
+        if not self._due or not self._wait_for_due(self._sim.cycle + cycles, self._sim.cycle + quiet):
+            self._wait(self._robot, cycles, quiet)
         if self._pins is not None:
             self._pins.collect()
         if self.follows:
             return [(cycle / CLOCK_HZ, bytes([byte])) for cycle, byte in self._robot.receive_stamped()]
         data = self._robot.receive()
         return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
+
+    def _wait_for_due(self, end: int, listen: int) -> bool:
+        """As `read_stamped` waits, and does what is due. False: nothing is until `end`, and no time has passed."""
+        if self._due[0][0] > end:
+            return False
+        while (now := self._sim.cycle) < end or (self._due and self._due[0][0] <= now):
+            until = min(end, self._due[0][0]) if self._due else end
+            if until > now:
+                self._wait(self._robot, until - now, min(max(listen - now, 0), until - now))
+                if self._sim.cycle < until:  # bytes have come
+                    break
+            while self._due and self._due[0][0] <= self._sim.cycle:
+                heapq.heappop(self._due)[2]()
+        return True
 
     def set_baud(self, rate: int) -> None:
         """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
@@ -163,6 +191,15 @@ class SimSession(InWorld):
             "load": board["executed_cycles"] / cycle if cycle else 0.0,
             "true_supply_v": self.robot.supply_voltage,
         }
+
+    def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
+        """See `boebot.boards.Session`."""
+        if (name := f"{owner}.{kind}") in KINDS:
+            fault = KINDS[name](self.board, self.transport.baud, value)
+            self.transport.at(begin_s, fault.begin)
+            self.transport.at(min(end_s, NEVER_S), fault.end)
+            return lambda: fault.fired
+        return super().fault(owner, kind, value, begin_s, end_s)
 
     def texts(self) -> dict[str, str]:
         """See `boebot.boards.BoardSession`."""

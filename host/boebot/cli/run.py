@@ -145,6 +145,15 @@ def run(
             "in dial=30%@2; again for each further one.",
         ),
     ] = None,
+    faults: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="NAME[=VALUE]@START[..END]",
+            help="Something fails from START to END of the run, as in ping.missing@3s..5s; again for each further one. "
+            "boebot faults lists them. If it changes nothing, the exit code is 3.",
+        ),
+    ] = None,
     timeout: Annotated[
         int | None, typer.Option(metavar="MS", min=1, help="Length of the run in simulated ms, in place of --seconds.")
     ] = None,
@@ -210,6 +219,7 @@ def run(
         fail_text=fail_text or "",
         typed=[_typed(text) for text in typed or []],
         inputs=[_input(text) for text in inputs or []],
+        faults=faults or [],
         notes=notes,
         strict=strict,
         gdb=gdb,

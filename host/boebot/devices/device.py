@@ -146,6 +146,25 @@ class Checkup(NamedTuple):
     """What may be wrong, and what to look at; empty: the readings are as expected."""
 
 
+class FaultKind(NamedTuple):
+    """A way in which a simulated device can fail, as `boebot run --fault NAME[=VALUE]@START[..END]` has it."""
+
+    does: str
+    """What happens then, in a few words, as in "the contact is stuck"."""
+    unit: str = ""
+    """Of VALUE: "s", "us", "Hz", "V"; empty: a share or a number."""
+    default: float | None = None
+    """VALUE where none is said; None, and no `words`: it takes none."""
+    least: float = 0.0
+    """VALUE at least."""
+    most: float = 1.0
+    """And at most."""
+    words: tuple[str, ...] = ()
+    """VALUE by name, the first one the default; the simulator gets its index."""
+    lasts: bool = True
+    """From START to END; False: it happens at START."""
+
+
 class Run(Protocol):
     """A run after its end, as devices make their columns of it (`boebot.record`)."""
 
@@ -200,6 +219,9 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
 
     CONTROL: ClassVar[Literal["", "button", "switch", "slider"]] = ""
     """How a person works it, and a page offers that; a slider from 0 to 1, the others 0 or 1."""
+
+    FAULTS: ClassVar[Mapping[str, FaultKind]] = {}
+    """How it can fail where it is simulated, by name."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

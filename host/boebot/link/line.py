@@ -7,8 +7,9 @@ from collections.abc import Callable
 from functools import partial
 
 from boebot.link import messages
+from boebot.link.bad_line import BadLine
 from boebot.link.frame import NO_SESSION, Decoder, encode
-from boebot.link.transport import BaudSelectable, Stamping, Transport
+from boebot.link.transport import BaudSelectable, Stamping, Transport, stamp_now
 
 NEVER = math.inf
 AT_ONCE = -math.inf
@@ -31,6 +32,7 @@ class Line:
         listener: also gets all bytes as they come; None: nobody does.
         byte_s: time that a byte needs on the line (s).
         known_byte_s: the same where the transport knows it for certain, else 0.
+        bad: what damages it; None: nothing does.
     """
 
     def __init__(self, transport: Transport, record: Append | None = None) -> None:
@@ -39,11 +41,20 @@ class Line:
         self.now = transport.now
         self.decoder = Decoder(NO_SESSION)
         self.listener: Callable[[bytes], None] | None = None
+        self.bad: BadLine | None = None
         self._record = record
         self._sequence = 0
         self._session = 0  # seed of the frames that are sent
-        self._read = transport.read_stamped if isinstance(transport, Stamping) else partial(_stamp_now, transport)
+        self._read = transport.read_stamped if isinstance(transport, Stamping) else partial(stamp_now, transport)
+        self._write = transport.write
         self._learn_baud()
+
+    def make_bad(self, seed: int) -> BadLine:
+        """What damages it from now on, once it has faults. What `record` gets is what the host sends and hears."""
+        if self.bad is None:
+            self.bad = BadLine(self.transport, seed)
+            self._read, self._write = self.bad.read_stamped, self.bad.write
+        return self.bad
 
     def use_session(self, session: int) -> None:
         """Sends and accepts frames of that session from now on; 0: only those of the handshake."""
@@ -58,7 +69,7 @@ class Line:
         """As `send`, without an object for the message: set-points are sent at every step."""
         frame = encode(kind.ID, self._sequence, kind.STRUCT.pack(*fields), self._session)
         self._sequence = (self._sequence + 1) & 0xFF
-        self.transport.write(frame)
+        self._write(frame)
         if self._record is not None:
             self._record("to_board", self.now(), frame)
 
@@ -84,9 +95,3 @@ class Line:
         baud = self.transport.baud if isinstance(self.transport, BaudSelectable) else 0
         self.byte_s = _BITS_PER_BYTE / (baud or _BAUD)
         self.known_byte_s = _BITS_PER_BYTE / baud if baud else 0.0
-
-
-def _stamp_now(transport: Transport, wait_s: float, quiet_s: float) -> list[tuple[float, bytes]]:
-    """Reads from a transport that does not stamp what comes."""
-    data = transport.read(wait_s, quiet_s)
-    return [(transport.now(), data)] if data else []

@@ -97,3 +97,9 @@ class Measures(Protocol):
 
     def figures(self) -> Mapping[str, float | None]:
         """By name, a unit in it; None: not yet known."""
+
+
+def stamp_now(transport: Transport, wait_s: float, quiet_s: float) -> list[tuple[float, bytes]]:
+    """Reads from a transport that does not stamp what comes."""
+    data = transport.read(wait_s, quiet_s)
+    return [(transport.now(), data)] if data else []

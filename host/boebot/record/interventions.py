@@ -1,5 +1,5 @@
 """What a person does to a run between two steps of its brain, as its record has it: drives by hand, lifts the robot,
-changes a parameter, types, presses a button (boebot.running.hands carries it out)."""
+changes a parameter, types, presses a button (boebot.running.hands carries it out); and what is made to fail."""
 
 from __future__ import annotations
 
@@ -80,7 +80,23 @@ class Set(Intervention, frozen=True, omit_defaults=True):
     scripted: bool = False
 
 
-Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter | Typed | Set
+class Fault(Intervention, frozen=True, omit_defaults=True):
+    """Something fails, from `begin_s` to `end_s` of the run (None: to its end; or what happens once). `name` and
+    `value`: see boebot.running.faults."""
+
+    name: str
+    value: float | str | None = None
+    begin_s: float = 0.0
+    end_s: float | None = None
+
+    def __str__(self) -> str:
+        """As at the command line."""
+        value = self.value if isinstance(self.value, str | None) else f"{self.value:.10g}"
+        end = "" if self.end_s is None else f"..{self.end_s:.10g}s"
+        return f"{self.name}{'' if value is None else f'={value}'}@{self.begin_s:.10g}s{end}"
+
+
+Deed = Hand | Release | Stop | Arm | Place | Shape | Parameter | Typed | Set | Fault
 _DECODER: msgspec.json.Decoder[Deed] = msgspec.json.Decoder(Deed)
 
 
@@ -89,9 +105,9 @@ def interventions(record: Record) -> list[tuple[float, Deed]]:
     return [(time_s, _DECODER.decode(data)) for time_s, data in record.rows(STREAM)]
 
 
-def in_words(data: bytes) -> str:
-    """An intervention as it stands in a record."""
-    match _DECODER.decode(data):
+def in_words(deed: Deed) -> str:
+    """An intervention, for people."""
+    match deed:
         case Hand(left, right):
             return f"driven by hand: {left:+.2f}, {right:+.2f}"
         case Release():
@@ -110,6 +126,16 @@ def in_words(data: bytes) -> str:
             return f"typed {text!r}"
         case Set(part, value):
             return f"{part} set to {value:g}"
+        case Fault() as fault:
+            return f"fault {fault}"
+
+
+def happenings(record: Record) -> list[tuple[float, str]]:
+    """Those of a stretch of a robot's run in words, with the times (s) at which they show: a fault when it begins."""
+    return [
+        (max(time_s, deed.begin_s) if isinstance(deed, Fault) else time_s, in_words(deed))
+        for time_s, deed in interventions(record)
+    ]
 
 
 def touched(record: Record) -> int:
@@ -135,7 +161,7 @@ class Tally:
 
     def add(self, time_s: float, one: Deed) -> None:
         """It has been carried out before the step at that time of the run."""
-        if isinstance(one, Typed | Set) and one.scripted:
+        if isinstance(one, Fault) or (isinstance(one, Typed | Set) and one.scripted):
             return
         name, last_s = self._slid
         slides = one.name if isinstance(one, Parameter) else one.part if isinstance(one, Set) else ""

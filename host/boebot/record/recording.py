@@ -122,7 +122,14 @@ _SAME = [
     one.name for one in fields(Run) if one.name not in ("record", "world", "error", "identity", "layout", "brain_names")
 ]
 _HINTS = get_type_hints(Run)
-Facts = msgspec.defstruct("Facts", [(name, _HINTS[name]) for name in _SAME], bases=(_Facts,), frozen=True, kw_only=True)
+_SINCE: Mapping[str, Any] = {"faults": msgspec.field(default_factory=dict)}  # records of before do not have them
+Facts = msgspec.defstruct(
+    "Facts",
+    [(name, _HINTS[name], *([_SINCE[name]] if name in _SINCE else [])) for name in _SAME],
+    bases=(_Facts,),
+    frozen=True,
+    kw_only=True,
+)
 
 
 def facts_of(result: Run) -> msgspec.Struct:

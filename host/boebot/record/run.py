@@ -73,6 +73,7 @@ class Run:
         parameters: of the brain that were set for this run, by name, as "avoid.turn".
         program: SHA-256 of the file of the program that drove the robot in place of firmware and brain, in hexadecimal
             digits; None: a brain did.
+        faults: what was made to fail, as in "ping.missing@3s..5s", and how often each has changed something.
         made_of: of a brain of processes: classes and parameters of its processes, their utilities, and state variables,
             as the run began (docs/reference/run-files.md).
     """
@@ -113,6 +114,7 @@ class Run:
     longest_step: float | None = None
     unrealisable: str | None = None
     program: str | None = None
+    faults: Mapping[str, int] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line; the figures are in `table()`, everything else in the attributes."""
@@ -326,6 +328,7 @@ class Run:
             "sessions_lost": self.sessions_lost,
             "touched": self.touched,
             "hung_at": figures.hang_places(self.watchdog_resets),
+            "faults": self.faults or None,
             "firmware": None if identity is None else text(identity.firmware_version),
             "compiler": None if identity is None else text(identity.compiler),
             "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",

@@ -25,6 +25,7 @@ from boebot.devices.latest import NO_MESSAGES, Latest
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError, BoebotError, ProtocolError
 from boebot.link import finding, messages
+from boebot.link.bad_line import BadLine
 from boebot.link.delivery import StampedTelemetry as Received
 from boebot.link.errors import LatchedAgainError, SessionLostError
 from boebot.link.frame import FRAME_OVERHEAD, reader, text
@@ -262,7 +263,6 @@ class BoardDriver(Driver):
         last = due = -1
         time_s = time_zero = 0.0  # run time, and that at tick 0 of the board's present count
         end_s = seconds - tick_s / 2
-        silence_s = SILENCE_S if transport.realtime else SILENCE_SIMULATED_S
         on_time = not transport.realtime and link.line.known_byte_s > 0
         early_s = _LOOK_EARLY_BYTES * link.line.known_byte_s if on_time else _LOOK_EARLY * tick_s
         awaited = -1  # the tick that was looked for
@@ -282,6 +282,8 @@ class BoardDriver(Driver):
                     f"{(_NAPS - 1) * nap_s:g} s at most: the board at {transport.name} had no host, its motors are off"
                 )
             now_s, took_s = link.polled_s, 0.0
+            if (bad := link.line.bad) is not None and bad.is_killed:
+                break
             if link.counts.sessions != self._session:
                 received = self._in_new_session(received)
                 equipment = self.equipment
@@ -289,6 +291,7 @@ class BoardDriver(Driver):
             awake_s = _host_clock()
             restarted = link.counts.board_resets != self.resets
             if not received:
+                silence_s = SILENCE_S if transport.realtime or bad is not None else SILENCE_SIMULATED_S
                 if now_s - received_s > silence_s + period * tick_s:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
                 look_s, wait_until_s = now_s, now_s + (period + 1) * tick_s
@@ -332,8 +335,10 @@ class BoardDriver(Driver):
                 shown = wall.perf_counter()
                 yield time_s
                 took_s = wall.perf_counter() - shown  # if more than the limit, this program stood still, too
-                if paced and took_s > self.period_s:
-                    meanwhile = poll(received_s + took_s, received_s + took_s)
+                slow_s = 0.0 if bad is None else bad.slow_s()
+                if slow_s or (paced and took_s > self.period_s):
+                    late_s = received_s + slow_s + (took_s if paced else 0.0)
+                    meanwhile = poll(late_s, late_s)
                 if robot.latched or self._halted:
                     self._apply_emergency_stop()
                 if robot.slow_command is not None:
@@ -375,6 +380,10 @@ class BoardDriver(Driver):
         """The run's time of a tick that began then: whole ticks; the board's outage by the transport's clock."""
         passed_s = round((host_s - self.clock_offset_s) / self.tick_s) * self.tick_s
         return max(passed_s, self._last_s + self.tick_s) if self._last_s >= 0.0 else 0.0
+
+    def bad_line(self, seed: int) -> BadLine:
+        """See `boebot.running.driver.Driver`."""
+        return self.link.line.make_bad(seed)
 
     def end(self) -> None:
         """Stops the board, waits until it confirms, and leaves it to others; one that has gone stops by its

@@ -14,7 +14,8 @@ from boebot.arguments import duration
 from boebot.boards import BoardSession, VehicleSession, WatchdogReset
 from boebot.description.robots import RobotDescription
 from boebot.devices.readings import Layout
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, CallError
+from boebot.link.bad_line import BadLine
 from boebot.link.link import Link
 from boebot.link.messages import Identity
 from boebot.robot import Robot
@@ -89,6 +90,14 @@ class Driver(Protocol):
             BoebotError: a brain does.
         """
         raise BoebotError(f"a brain drives robot {self.description.name!r}; only a program takes what is typed")
+
+    def bad_line(self, seed: int) -> BadLine:
+        """What damages the line to its board from now on; `seed`: of its draws.
+
+        Raises:
+            CallError: there is none.
+        """
+        raise CallError(f"robot {self.description.name!r} has no board, and so no line that could fail")
 
     def end(self) -> None:
         """Stops the motors and lets go of the robot, whatever happened before."""

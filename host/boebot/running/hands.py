@@ -1,4 +1,5 @@
-"""What a person does to a run between two steps of its brain: drives by hand, lifts the robot, changes a parameter.
+"""What a person does to a run between two steps of its brain: drives by hand, lifts the robot, changes a parameter; and
+the faults that it was asked for with.
 
 Whoever watches a run (boebot.live) hands interventions over; they are carried out here, before a step of the brain, and
 each goes into the record with its time. A simulated run with the same interventions at the same steps is the same run
@@ -19,6 +20,7 @@ from boebot.record.interventions import (
     STREAM,
     Arm,
     Deed,
+    Fault,
     Hand,
     Parameter,
     Place,
@@ -33,6 +35,7 @@ from boebot.record.run import Run
 from boebot.robot import Robot
 from boebot.running.brain_parameters import set_parameters
 from boebot.running.driver import Driver
+from boebot.running.faults import Fired, inject
 from boebot.running.tasks import Request, Task
 
 
@@ -89,11 +92,12 @@ class Together(Onlooker):
 
 
 def script(request: Request, tasks: Sequence[Task]) -> Repeated:
-    """What a run was asked for with, at the one robot that a program drives."""
+    """What a run was asked for with: faults, and what is done at the one robot that a program drives."""
     deeds: list[tuple[float, Deed]] = [(time_s, Typed(text, scripted=True)) for text, time_s in request.typed]
     deeds += [(time_s, Set(part, float(value), scripted=True)) for part, value, time_s in request.inputs]
     deeds.sort(key=itemgetter(0))
-    return Repeated([deeds if task.brain.is_program else [] for task in tasks])
+    faults: list[list[tuple[float, Deed]]] = [[(0.0, one) for one in task.faults] for task in tasks]
+    return Repeated([one + deeds * task.brain.is_program for one, task in zip(faults, tasks, strict=True)])
 
 
 class Hands:
@@ -104,6 +108,7 @@ class Hands:
         onlooker: who does it.
         held: the motor signals that it is driven by; None: its brain drives it.
         count: of interventions so far, as a result counts them (`touched`).
+        faults: those that were begun, and what says how often each has fired.
     """
 
     def __init__(self, driver: Driver, task: Task, number: int, onlooker: Onlooker) -> None:
@@ -111,6 +116,7 @@ class Hands:
         self.driver, self.task = driver, task
         self.held: Hand | None = None
         self._tally = Tally()
+        self.faults: list[tuple[Fault, Fired]] = []
         self.onlooker, self._number = onlooker, number
 
     @property
@@ -118,12 +124,18 @@ class Hands:
         """See above."""
         return self._tally.count
 
+    def fired(self) -> dict[str, int]:
+        """Of each fault how often it has fired."""
+        return {str(fault): fired() for fault, fired in self.faults}
+
     def before_step(self, time_s: float) -> None:
         """What is due."""
         for one in self.onlooker.before_step(self._number, time_s):
             try:
                 self._carry_out(one)
             except BoebotError as error:
+                if isinstance(one, Fault):
+                    raise
                 self.onlooker.refuse(self._number, error)
             else:
                 self._tally.add(time_s, one)
@@ -145,6 +157,8 @@ class Hands:
             case Set(part, value):
                 check_setting(self.driver.description, part, value)
                 self.driver.session.set_part(part, value)
+            case Fault():
+                self.faults.append((one, inject(one, self.driver, self.task.seed)))
             case _ if self.driver.is_program:
                 raise BoebotError("a program drives this robot, no brain: it takes what is typed, and buttons")
             case _:

@@ -29,6 +29,7 @@ from boebot.record.run_folder import RunFolder
 from boebot.result import Result, RunResult, TogetherResult
 from boebot.running import interrupts
 from boebot.running.driver import Driver
+from boebot.running.faults import unfired
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import Request, Task, check_progress, of_robot
 
@@ -73,7 +74,7 @@ def execute(
             task.record = record
         on = next((task.on for task in tasks if task.board.robot.has_board), request.on or DIRECT)
         world = open_world(on, [task.board for task in tasks])
-        if request.typed or request.inputs:
+        if request.typed or request.inputs or any(task.faults for task in tasks):
             from boebot.running.hands import Onlooker, Together, script
 
             onlooker = Together(script(request, tasks), onlooker or Onlooker())
@@ -234,6 +235,7 @@ class _Robot:
             "steps": task.record.count("command"),
             "counters": dict(driver.session.counters()),
             "odometry_source": brain.odometry,
+            "faults": {} if self.hands is None else self.hands.fired(),
             "longest_step": self._times.longest,
             "long_steps": self._times.long,
         }
@@ -418,6 +420,9 @@ class _Loop:
             if (result := robot.result) is None:
                 raise error if error is not None else BoebotError(f"robot {robot.number} did not begin")
             result.error = error if isinstance(error, KeyboardInterrupt) else robot.failure
+            if result.error is None and (quiet := unfired(result.faults)) is not None:
+                result.error = quiet
+                error = error or of_robot(quiet, robot.number, len(self._robots))
             result.wall_time = elapsed_s
             results.append(result)
         if not self._is_recorded:

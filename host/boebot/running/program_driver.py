@@ -12,6 +12,7 @@ from typing import Any
 from boebot.boards import BoardSession
 from boebot.devices.readings import Readings
 from boebot.errors import BoardError, MissingTextError, printable
+from boebot.link.bad_line import BadLine
 from boebot.link.messages import Status as StatusBits
 from boebot.link.transport import Following
 from boebot.record.monitor import Monitor
@@ -29,7 +30,8 @@ class ProgramDriver(Driver):
         if not isinstance(line, Following):
             raise BoardError(f"{line.name} runs only the kit's firmware; expected the emulated ATmega328P (--on avr)")
         line.follow()
-        self.session, self.task, self._line = session, task, line
+        self.session, self.task = session, task
+        self._line: Following | BadLine = line
         self.description = task.board.robot
         self.robot = Robot(self.description.name, TICK_S, task.seed)
         self.step_limit = step_limit(task.request.step_timeout)
@@ -80,6 +82,12 @@ class ProgramDriver(Driver):
         """See `boebot.running.driver.Driver`."""
         self.task.record.append("to_board", self._line.now(), text.encode())
         self._line.write(text.encode())
+
+    def bad_line(self, seed: int) -> BadLine:
+        """See `boebot.running.driver.Driver`."""
+        if not isinstance(self._line, BadLine):
+            self._line = BadLine(self._line, seed)
+        return self._line
 
     def end(self) -> None:
         """What is still on the line; the program goes on while others do."""

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError
+from boebot.record.interventions import Fault
 from boebot.record.run_folder import RunFolder, locked
 from boebot.result import Result, RunResult, TogetherResult
 from boebot.running.loop import Progress, execute
@@ -44,6 +45,7 @@ def run(
     fail_text: str = "",
     typed: Sequence[tuple[str, float]] = (),
     inputs: Sequence[tuple[str, float, float]] = (),
+    faults: Sequence[str | Fault] = (),
 ) -> RunResult:
     """Runs a brain and returns what happened.
 
@@ -83,6 +85,8 @@ def run(
         typed: to a program, by its board's serial line: texts, each with its time (s), as in [("go\\n", 0.5)].
         inputs: of the robot of a program: its buttons, switches and knobs, each with a value and its time (s), as in
             [("start", 1, 0.5), ("start", 0, 0.7), ("dial", 0.3, 2.0)].
+        faults: what fails, by name, time of the run and value, as in ["ping.missing@3s..5s", "serial.flipped=1e-3@2"]
+            (docs/reference/faults.md). One that changes nothing is an error.
         progress: called with the run's time so far (s), about ten times a second.
 
     Raises:
@@ -109,6 +113,7 @@ def run_together(
     notes: bool = False,
     strict: bool = False,
     view: bool = False,
+    faults: Sequence[str | Fault] = (),
 ) -> TogetherResult:
     """Runs several robots, each with its own brain, and with its own board if it has one, in one simulated world.
 
@@ -118,6 +123,7 @@ def run_together(
         members: the robots.
         arena, seconds, on, seed, realtime, step_timeout, force_timing, pins, notes, strict, view: as of
             `boebot.run`.
+        faults: as of `boebot.run`, of all robots, or of one: ["2:cable.out@3s..3.5s"].
         out: folder for a picture and a page of all robots, and for a folder of files per robot.
         progress: called with the run's time so far (s), about ten times a second.
 

@@ -20,9 +20,10 @@ from boebot.errors import BoebotError, BrainError, CallError, NotRealisableError
 from boebot.guests import CHECKS, guests
 from boebot.imperfections import checked
 from boebot.record.brain_record import MadeOf
-from boebot.record.interventions import TEXT_MAXIMUM
+from boebot.record.interventions import TEXT_MAXIMUM, Fault
 from boebot.record.record import Record
 from boebot.running.driver import check_time_to_live
+from boebot.running.faults import HOST, faults_of
 
 DEFAULT_PERIOD = 0.05  # s
 PROGRAM_BOARD = "avr"  # the only emulated one that runs any program
@@ -90,7 +91,7 @@ class Request(_NamesFiles):
     Attributes:
         members: the robots; several share one simulated world.
         arena, on, seconds, seed, realtime, step_timeout, force_timing, pins, expect_text, fail_text, typed,
-            inputs: as of `boebot.run`.
+            inputs, faults: as of `boebot.run`.
         record: what happens is recorded.
         notes, strict: of a program's board, as of `BoardRequest`.
         gdb: TCP port for avr-gdb at the one emulated ATmega328P, which waits for it; no record says of it.
@@ -113,6 +114,7 @@ class Request(_NamesFiles):
     fail_text: str = ""
     typed: Sequence[tuple[str, float]] = ()
     inputs: Sequence[tuple[str, float, float]] = ()
+    faults: Sequence[str | Fault] = ()
 
     @classmethod
     def single(
@@ -158,6 +160,9 @@ class Request(_NamesFiles):
             if not 0 <= time_s < self.seconds:
                 expected = f"expected a time from 0 s on, and before the run's end at {self.seconds:g} s"
                 raise CallError(f"{what!r} at {time_s:g} s is never; {expected}")
+        expect("faults", self.faults, 'a list, as in ["ping.missing@3s..5s"]', list, tuple)
+        for fault in self.faults:
+            expect("faults", fault, "faults, as in 'ping.missing@3s..5s'", str, Fault)
         expect("members", self.members, "a list of boebot.Member", list, tuple)
         if not self.members:
             raise BoebotError("there is no robot to run; expected at least one Member")
@@ -221,6 +226,7 @@ class Request(_NamesFiles):
             raise CallError(f"--gdb is of one robot on the emulated ATmega328P (--on {PROGRAM_BOARD}); got {got}")
         for task in tasks:
             task.on = kind if len(tasks) == 1 or task.board.robot.has_board else DIRECT
+            task.faults = _faults(self, task)
         return tasks
 
 
@@ -246,6 +252,7 @@ class Task:
     """of the robot"""
     program: str | None = None
     """SHA-256 of the program's file, if one drives the robot, in hexadecimal digits"""
+    faults: Sequence[Fault] = ()
     unrealisable: str | None = None
     """why sensors, period and line do not go together in time, where the run was forced all the same"""
 
@@ -276,6 +283,18 @@ def _check_options(request: Request, programs: int) -> None:
     for name in ("step_timeout", "force_timing"):
         if getattr(request, name) and programs == len(request.members):
             raise CallError(f"{_option(name)} is of a brain; expected none where a program drives")
+
+
+def _faults(request: Request, task: Task) -> list[Fault]:
+    """Raises CallError where there is one that the robot, or the board, cannot have."""
+    found = faults_of(request.faults, task.board.robot, task.number, len(request.members), request.seconds)
+    for fault in found:
+        owner = fault.name.partition(".")[0]
+        if owner == "host" and task.brain.is_program:
+            raise CallError(f"fault {fault}: {task.brain.name} is a program, which has no host")
+        if is_live(task.on) and (owner not in HOST or fault.name == "serial.rate"):
+            raise CallError(f"fault {fault} is of a simulated robot; {task.on!r} is a port")
+    return found
 
 
 def _option(name: str) -> str:

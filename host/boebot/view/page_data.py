@@ -37,7 +37,7 @@ from boebot.description import robots
 from boebot.description.wiring import named_pins
 from boebot.devices.drawing import Item
 from boebot.link.messages import Status
-from boebot.record.interventions import STREAM, in_words
+from boebot.record.interventions import happenings
 from boebot.record.monitor import Monitor
 from boebot.record.truth import touch_indices
 from boebot.view import scene, style
@@ -167,7 +167,7 @@ def rows_data(
         sweeps_room: how many numbers of two bytes the sweeps of each sensor may take; None: all of them.
     """
     series = view.columns
-    deeds = [(time_s, "intervention", in_words(data)) for time_s, data in record.rows(STREAM)]
+    deeds = [(time_s, "intervention", words) for time_s, words in happenings(record)]
     happened = sorted(events(ticks, result.whiskers) + deeds, key=itemgetter(0))
     edges = pins(record.block("pins"), result.robot, result.clock_offset)
     return {
