@@ -38,12 +38,12 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
     from boebot.boards import is_live
     from boebot.sketch import cache
 
-    options = [f"--uno-on={board}" for board in boards] + ["--uno-motors"] * motors
+    options = ["-m", "not soak", "-rs", *(f"--uno-on={board}" for board in boards), *["--uno-motors"] * motors]
     if find_spec("xdist") is not None and not any(map(is_live, boards)):
         options.append("--numprocesses=auto")
     with tempfile.TemporaryDirectory() as folder:
         settings = Path(folder, "pytest.ini")
-        settings.write_text(f"[pytest]\ncache_dir = {cache() / 'tests'}\naddopts = --strict-markers\n", "utf-8")
+        settings.write_text(f"[pytest]\ncache_dir = {cache() / 'tests'}\n", "utf-8")
         command = [sys.executable, "-P", "-m", "pytest", "--pyargs", SUITE, "-c", str(settings), *options, *arguments]
         with subprocess.Popen(command) as process:
             interrupted = False

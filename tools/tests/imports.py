@@ -64,7 +64,7 @@ def python_modules(root: Path) -> dict[str, Path]:
     """Modules but tests and what only builds: full name -> file."""
     packages = [path.parent for path in (root / "host").glob("*/__init__.py")]
     found = {}
-    for folder in (*packages, *(root / name for name in ("sim_bridge", "tools", "hil_tests"))):
+    for folder in (*packages, *(root / name for name in ("sim_bridge", "tools", "hil_tests/boebot_hil"))):
         for source in folder.rglob("*.py"):
             if "tests" not in source.relative_to(root).parts and not source.name.startswith("build_"):
                 parts = source.relative_to(folder.parent).with_suffix("").parts

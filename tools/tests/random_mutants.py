@@ -64,7 +64,7 @@ class Room(NamedTuple):
     units: bool = False  # of the firmware
 
 
-WHOLE = "hil_tests/test_*.py protocol/tests/test_board_protocol.py sim_bridge/tests/circle/test_*.py"
+WHOLE = "hil_tests/boebot_hil/test_*.py protocol/tests/test_board_protocol.py sim_bridge/tests/circle/test_*.py"
 ROOMS = {
     "firmware": Room(20, "firmware/src/", f"{WHOLE} sim_bridge/tests/firmware/test_*.py", units=True),
     "timing": Room(

@@ -12,9 +12,9 @@ from boebot.description.robots import load_robot
 from boebot.robot import Robot
 from boebot.running.board_driver import BoardDriver
 from boebot.running.tasks import Request, Task
+from boebot_hil.rig import CYCLES_PER_S, TICK_S
 from boebot_timing.emulated.loads import TICK_CYCLES
 from boebot_timing.tests.latency_limits import WHISKER
-from hil_tests.rig import CYCLES_PER_S, TICK_S
 
 WHISKER_PIN = 5
 TOUCH_EVERY, RELEASE_AFTER = 15, 10  # steps from one touch to the next, and to its end

@@ -13,8 +13,8 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.link import Link
+from boebot_hil.rig import CYCLES_PER_US, HOST_NONCE, TICK_S
 from boebot_timing.board import measure
-from hil_tests.rig import CYCLES_PER_US, HOST_NONCE, TICK_S
 from sim_bridge.boards.board import ResetCause
 from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
 from sim_bridge.tests.firmware.test_planted_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import BoardAccess, Level
 from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library

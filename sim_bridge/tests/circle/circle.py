@@ -13,7 +13,7 @@ import msgspec
 
 from boebot.arenas import Arena, ArenaDescription, Disc, Light, Patch, Polygon
 from boebot.description.robots import RobotDescription, load_robot
-from hil_tests.rig import Rig
+from boebot_hil.rig import Rig
 from sim_bridge.boards import avr
 from sim_bridge.boards.emulated import avr_image, native_board, native_library
 from sim_bridge.sessions.session import SimSession

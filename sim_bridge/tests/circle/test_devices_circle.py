@@ -17,7 +17,7 @@ from boebot.devices.analog_infrared import SharpSensor
 from boebot.devices.compass import MagneticCompass
 from boebot.link import messages
 from boebot.link.messages import CompassStatus
-from hil_tests.rig import CYCLES_PER_S, TICK_S
+from boebot_hil.rig import CYCLES_PER_S, TICK_S
 from reading import read
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.circle.circle import CircleRig, arena_of, block, circle, robot_of, wall_at

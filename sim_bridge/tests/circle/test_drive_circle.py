@@ -15,7 +15,7 @@ from boebot.arenas import Patch
 from boebot.description.robots import RobotDescription, Supply, load_robot
 from boebot.devices.battery import BatteryDivider
 from boebot.link import messages
-from hil_tests.rig import CYCLES_PER_S, TICK_S
+from boebot_hil.rig import CYCLES_PER_S, TICK_S
 from reading import read
 from sim_bridge.robots.imperfections import AS_BUILT
 from sim_bridge.tests.circle.circle import CircleRig, arena_of, circle, robot_of

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from hil_tests.rig import Rig
+from boebot_hil.rig import Rig
 
 
 @pytest.fixture

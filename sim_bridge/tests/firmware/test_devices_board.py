@@ -11,7 +11,7 @@ import pytest
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.messages import CompassStatus, Devices
-from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.device_bench import Capacitor, DeviceRig, Receiver, TwoWireDevice, power_on
 

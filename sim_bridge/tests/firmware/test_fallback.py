@@ -9,7 +9,7 @@ from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.messages import EventKind, Status
-from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
 from sim_bridge.tests.circle.circle import arena_of, circle
 
 pytestmark = pytest.mark.unsanitized

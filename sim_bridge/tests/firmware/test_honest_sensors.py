@@ -11,7 +11,7 @@ import pytest
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.link.messages import PingStatus
-from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 pytestmark = pytest.mark.unsanitized
 

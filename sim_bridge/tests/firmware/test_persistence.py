@@ -11,7 +11,7 @@ from elftools.elf.elffile import ELFFile
 
 from boebot import resources
 from boebot.link import messages
-from hil_tests.rig import CYCLES_PER_S, TICK_S
+from boebot_hil.rig import CYCLES_PER_S, TICK_S
 from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
 from sim_bridge.tests.boards.avr.bootloader import KITS
 from sim_bridge.tests.boards.device_bench import DeviceRig, power_on

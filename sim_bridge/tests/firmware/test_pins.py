@@ -11,7 +11,7 @@ from boebot.description.robots import load_robot
 from boebot.devices.servo import ContinuousServo
 from boebot.devices.uart import Uart
 from boebot.link import messages
-from hil_tests.rig import CYCLES_PER_S
+from boebot_hil.rig import CYCLES_PER_S
 from sim_bridge.boards.board import Level, ResetCause
 from sim_bridge.tests.boards.avr.bootloader import KITS
 from sim_bridge.tests.boards.device_bench import DeviceRig, power_on

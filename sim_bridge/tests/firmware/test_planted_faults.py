@@ -15,7 +15,7 @@ from boebot.boards import BoardRequest, open_board
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
 from boebot.link import messages
-from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 
 pytestmark = pytest.mark.unsanitized
 

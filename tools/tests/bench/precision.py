@@ -6,7 +6,7 @@ import numpy as np
 
 from boebot.link import messages
 from boebot.running.tasks import Request
-from hil_tests.rig import CYCLES_PER_US, Rig
+from boebot_hil.rig import CYCLES_PER_US, Rig
 from tools.tests.bench.figures import figure, ran
 
 SERVO_LEFT, SERVO_RIGHT = 13, 12

@@ -9,7 +9,7 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.image.program import read_program
-from hil_tests.rig import CYCLES_PER_S
+from boebot_hil.rig import CYCLES_PER_S
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import BoardAccess, Level, ResetCause
 from sim_bridge.tests.boards.avr.avr_program import assemble

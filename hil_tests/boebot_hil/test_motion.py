@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boebot.link import messages
-from hil_tests.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
 
 pytestmark = pytest.mark.emulated
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import frame, messages
+from sim_bridge.bench.waiting import Cannot
 
 _M = TypeVar("_M")  # a message
 
@@ -24,6 +25,8 @@ TICK_S = 0.010
 FRAME_CYCLES = 320_000  # 20 ms servo frame
 
 
+MOVING = (messages.Arm, messages.SetpointSignal, messages.SetpointSpeed, messages.Turret)
+KEPT = (messages.SaveParameters, messages.ResetParameters)
 LINE_BYTES_PER_TICK = 500  # at 500,000 baud
 PROBE_S = 0.15  # a session lives as long as it hears of us; the least patience of a board is 0.2 s
 HOST_NONCE = 0x0A5A5A
@@ -32,6 +35,9 @@ HOST_NONCE = 0x0A5A5A
 class Rig:
     """Exchanges frames with the board, one message at a time, without the kit's session layer: a lost frame is not sent
     again. While `alive` it keeps the session open, and while `acknowledges` it acknowledges events."""
+
+    may_move: ClassVar[bool] = False
+    """Whether the motors of a board behind a port may turn."""
 
     def __init__(self, session: BoardSession) -> None:
         self.session = session
@@ -45,6 +51,7 @@ class Rig:
         self.hello: messages.Hello | None = None
         self.seed = 0
         self.alive = self.acknowledges = True
+        self._may_move = self.may_move or not self.transport.realtime
         self._sequence = 0
         self._number = 0
         self._probed = 0.0
@@ -84,7 +91,15 @@ class Rig:
         return sequence
 
     def encode(self, message: Any) -> bytes:
-        """The message's frame, with the next sequence number and the session's seed."""
+        """The message's frame, with the next sequence number and the session's seed.
+
+        Raises:
+            Cannot: it would move a real robot that has to stand still, or change the parameters that it keeps.
+        """
+        if self.transport.realtime and isinstance(message, KEPT):
+            raise Cannot("it changes what a real robot keeps in its EEPROM; expected an emulated board")
+        if not self._may_move and isinstance(message, MOVING):
+            raise Cannot("it may move the robot; expected --motors, with the robot on blocks")
         wire = frame.encode(message.ID, self._sequence, message.pack(), self.seed)
         self._sequence = (self._sequence + 1) & 0xFF
         return wire
@@ -228,10 +243,10 @@ class Rig:
         self.transport.write(bytes(wire))
 
     def start(self, arm: bool = True) -> messages.Hello:
-        """Waits for the board to be up, opens a session and arms the motors."""
+        """Waits for the board to be up, opens a session and arms the motors, where they may move."""
         self.alive = True
         self.open_session()
-        if arm:
+        if arm and self._may_move:
             self.arm()
         assert self.hello is not None
         return self.hello

@@ -10,7 +10,7 @@ import pytest
 
 from boebot.description.robots import load_robot
 from boebot.link import frame, messages
-from hil_tests.rig import Rig
+from boebot_hil.rig import Rig
 
 
 def type_name(value: Any) -> str:

@@ -1,0 +1,59 @@
+"""One suite for every board: `boebot test --on native --on avr` (the default: both), or `--on /dev/ttyACM0`; in a
+checkout also `pytest hil_tests --uno-on native`.
+
+Tests that reach for the board's pins, its reset or its EEPROM carry the mark `emulated`; on a board behind a port they
+are skipped, and so is whatever would move its motors, unless `--motors` (`--uno-motors`) allows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from boebot.boards import is_live
+from boebot_hil.rig import Rig
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    for mark in (
+        "emulated: reaches for what only an emulated board gives: its pins, its reset, its EEPROM",
+        "soak: takes long",
+        "soak_on_avr: takes long there",
+        "soak_on_native: takes long there",
+        "unsanitized: of the kit's makers",
+    ):
+        config.addinivalue_line("markers", mark)
+    Rig.may_move = config.getoption("--uno-motors")
+
+
+def boards(config: pytest.Config) -> list[str]:
+    return config.getoption("--uno-on") or ["native", "avr"]
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "board_url" in metafunc.fixturenames:
+        urls = [
+            pytest.param(
+                url, marks=pytest.mark.soak if metafunc.definition.get_closest_marker(f"soak_on_{url}") else ()
+            )
+            for url in boards(metafunc.config)
+        ]
+        metafunc.parametrize("board_url", urls, scope="session")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skips what only an emulated board can be asked, where the board under test is behind a port."""
+    for item in items:
+        spec = getattr(item, "callspec", None)
+        under_test = [spec.params["board_url"]] if spec and "board_url" in spec.params else boards(config)
+        if all(map(is_live, under_test)) and item.get_closest_marker("emulated") is not None:
+            item.add_marker(pytest.mark.skip(reason="only an emulated board gives its pins, its reset, its EEPROM"))
+
+
+@pytest.fixture
+def rig(board_url: str) -> Iterator[Rig]:
+    """The board, greeted."""
+    with Rig.open(board_url) as rig:
+        rig.start()
+        yield rig
