@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -305,8 +305,15 @@ class Sim:
         return any(robot.speaks for robot in self.robots)
 
     def check(self, crashed: int) -> None:
-        """Raises BoardError where a run has ended since the board of robot `crashed` - 1 crashed."""
-        if crashed:
+        """Raises BoardError where a run has ended since the board of robot `crashed` - 1 crashed, or has not begun; and
+        what a reaction to an edge has raised."""
+        if crashed == lib.SIM_RUNS:
+            raise BoardError("a reaction to an edge cannot let time pass; expected that of who runs the board")
+        if crashed == lib.SIM_PAUSED:
+            for member in self.members.values():
+                if member.board is not None:
+                    member.board.raise_ended()
+        elif crashed:
             board = self.robot(crashed - 1).board
             board.raise_ended()
             whose = f" of robot {crashed}" if len(self.members) > 1 else ""
@@ -558,6 +565,30 @@ class SimRobot:
             now = sim.cycle
             self.listen(now + quiet)
             sim.run_until(now + cycles)
+
+    def run_to_edge(self, cycle: int, pins: Collection[int]) -> bool:
+        """Runs until that cycle, also past bytes from robots that are listened to, or to an edge of one of its board's
+        pins (board.h, `stops`): then time stands behind the instruction that it meets, and the result is True.
+
+        Raises:
+            BoardError: a board's program crashed, or others would be ahead of the edge.
+        """
+        sim, board = self.sim, self.board
+        cycle = whole("run_to_edge: the cycle", cycle, BoardError, least=0, most=NEVER)
+        if (count := sum(member.board is not None for member in sim.members.values())) > 1:
+            raise BoardError(
+                f"a run cannot end at an edge of one of {count} boards; expected the only one of its world"
+            )
+        board.stop_at(pins)
+        try:
+            while sim.cycle < cycle:
+                ended = lib.sim_run_until(sim.handle, min(cycle, sim.cycle + PORTION_CYCLES))
+                sim.check(ended)
+                if ended == lib.SIM_PAUSED:
+                    return True
+            return False
+        finally:
+            board.stop_at(())
 
     @property
     def speaks(self) -> bool:

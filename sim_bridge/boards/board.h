@@ -17,7 +17,7 @@
 #define BOARD_PIN_COUNT 20u /* Arduino numbers: 0..13, then A0..A5 as 14..19 */
 #define BOARD_FIRST_ANALOG_PIN 14u
 #define BOARD_ANALOG_COUNT 6u
-#define BOARD_INTERFACE_VERSION 2u
+#define BOARD_INTERFACE_VERSION 3u
 #define BOARD_GUARD_CYCLES 64u
 
 #define BOARD_NOMINAL_VOLTS 5.0
@@ -34,6 +34,7 @@ typedef enum {
   BOARD_RUNNING = 0,
   BOARD_CRASHED = 1, /* the program cannot go on; see `fault` */
   BOARD_STOPPED = 2, /* a debugger has ended the run */
+  BOARD_PAUSED = 3   /* an edge has; the next `advance` goes on from there */
 } board_state;
 
 typedef struct {
@@ -52,6 +53,10 @@ typedef struct board board;
 /* Called from inside `advance` at the very cycle at which the firmware changes what it does to a pin (LOW, HIGH, RELEASED,
  * PULLED_UP); at a reset for each pin that changes. Whoever owns the board owns the sink and hands edges on. */
 typedef void board_edge_sink(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
+
+/* Called behind the sink, for the pins that it was asked for (`reacts`). It may do all that a sink may: drive pins, send bytes,
+ * ask for a reset. Not 0: the run ends here. */
+typedef int board_reaction(void *context, uint64_t cycle, uint8_t pin, uint8_t level);
 
 /* The voltage at analog channel 0..5, or at BOARD_ANALOG_SUPPLY; 0 for what the source does not know. */
 typedef double board_analog_source(void *context, uint64_t cycle, uint8_t channel);
@@ -172,8 +177,8 @@ typedef struct {
   /* The cycle up to which the board has run. */
   uint64_t (*now)(const board *self);
 
-  /* Runs until `now` >= `until` (an instruction is never split). Returns BOARD_RUNNING,
-   * BOARD_CRASHED or BOARD_STOPPED. */
+  /* Runs until `now` >= `until` (an instruction is never split), or behind the instruction, of a native board the event,
+   * in which an edge ends the run (`stops`, a reaction). */
   board_state (*advance)(board *self, uint64_t until);
 
   /* From cycle `at` on the outside drives `pin` to LOW, HIGH, or RELEASED. Replaces what was queued for that pin at or
@@ -221,8 +226,32 @@ struct board {
   const board_operations *op;
   board_edge_sink *sink; /* NULL: nobody listens */
   void *sink_context;
+  uint32_t reacts; /* pins, by bits of Arduino's numbers, whose edges call `react`; */
+  uint32_t stops;  /* whose edges end the run, those that the outside drives too where it is seen (BOARD_OUTSIDE_LOG) */
+  board_reaction *react;
+  void *react_context;
+  bool paused; /* an edge ends the run, which does not know it yet */
 };
 /* python: end */
+
+static inline bool board_stops_at(board *b, uint8_t pin) {
+  if (b->stops >> pin & 1u) b->paused = true;
+  return b->paused;
+}
+
+/* What each kind of board calls at each edge. True: its run is to end behind the instruction at hand. */
+static inline bool board_show_edge(board *b, uint64_t cycle, uint8_t pin, uint8_t level) {
+  if (b->sink) b->sink(b->sink_context, cycle, pin, level);
+  if (__builtin_expect(!((b->reacts | b->stops) >> pin & 1u), true)) return false;
+  if ((b->reacts >> pin & 1u) && b->react(b->react_context, cycle, pin, level)) b->paused = true;
+  return board_stops_at(b, pin);
+}
+
+static inline bool board_takes_pause(board *b) {
+  const bool paused = b->paused;
+  b->paused = false;
+  return paused;
+}
 
 /* The supply as a source gives it. */
 static inline double board_supply_volts(board_analog_source *source, void *context, uint64_t cycle) {

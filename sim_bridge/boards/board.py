@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import weakref
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from enum import IntEnum
 from pathlib import Path
+from types import TracebackType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -89,6 +90,10 @@ class Closes(Protocol):
         """May be called twice."""
 
 
+Reaction = Callable[[int, Level], object]
+"""To an edge: its cycle, and what the firmware does to the pin from then on."""
+
+
 class EmulatedBoard:
     """A board in C (boards/board.h). It is freed when nobody holds it any more, or by `close`.
 
@@ -99,7 +104,8 @@ class EmulatedBoard:
         assumed: what that file does not say and was assumed.
         is_in_use: whether a simulation runs it.
         debugger: what is closed before it.
-        ended: why a debugger has ended its run.
+        ended: why a debugger or a reaction has ended its run.
+        reacts_at: cycle of the edge to which something reacts just now.
         is_strict: what a bench does not show of a program ends its run.
         stood_still_s: how long the program has stood still in a debugger, by the wall clock.
     """
@@ -116,6 +122,9 @@ class EmulatedBoard:
         self.is_in_use: Callable[[], bool] = lambda: False
         self.debugger: Closes | None = None
         self.ended: BaseException | None = None
+        self.reacts_at: int | None = None
+        self._reactions: dict[int, list[Reaction]] = {}
+        self._in_c: Any = None  # what C calls at an edge
         self.is_strict = False
         self.stood_still_s = 0.0
 
@@ -155,8 +164,37 @@ class EmulatedBoard:
         z = 0 if data is None else data[30] | data[31] << 8
         return with_place(self.ffi.string(text).decode(), self.elf, -1 if at is None else at[0], z)
 
+    # ---- at its edges ------------------------------------------------------------------------------------------------
+
+    def on_edge(self, pin: int, react: Reaction) -> None:
+        """From now on `react(cycle, level)` is called at each edge of what the firmware does to a pin, within the run
+        and at its cycle: what it drives or sends comes when it says, however the run is cut. It cannot let time pass.
+        What it raises ends the run, and is raised by who lets the board run."""
+        board = self.handle
+        self._reactions.setdefault(checked_pin("on_edge", pin), []).append(react)
+        if self._in_c is None:
+            self._in_c = self.ffi.callback("board_reaction", self._react, error=1, onerror=self._failed)
+            board.react = self._in_c
+        board.reacts |= 1 << pin
+
+    def _react(self, _: Any, cycle: int, pin: int, level: int) -> int:
+        if self.ended is not None:
+            return 1
+        self.reacts_at = cycle
+        for react in self._reactions[pin]:
+            react(cycle, LEVELS[level])
+        self.reacts_at = None
+        return 0
+
+    def _failed(self, _: object, error: BaseException, trace: TracebackType) -> None:
+        self.reacts_at, self.ended = None, error.with_traceback(trace)
+
+    def stop_at(self, pins: Collection[int]) -> None:
+        """From now on an edge of one of these pins ends a run, behind the instruction in which it happens."""
+        self.handle.stops = sum(1 << checked_pin("stop_at", pin) for pin in set(pins))
+
     def raise_ended(self) -> None:
-        """Raises why a debugger has ended its run, if one has: once."""
+        """Raises why a debugger or a reaction has ended its run, if one has: once."""
         ended, self.ended = self.ended, None
         if ended is not None:
             raise ended
@@ -333,9 +371,12 @@ class BoardAccess(BoardMemory):
         return int(self._call("now"))
 
     def advance(self, until: int) -> None:
-        """Runs until `until`, or up to an instruction's length beyond. A crash raises BoardError."""
-        if self._call("advance", until):
+        """Runs until `until`, or up to an instruction's length beyond, or to an edge that ends the run. A crash raises
+        BoardError."""
+        if state := self._call("advance", until):
             self.board.raise_ended()
+            if state == self.board.lib.BOARD_PAUSED:
+                return
             raise BoardError(f"The board stopped: {self.fault}.")
 
     def run(self, cycles: int) -> None:
@@ -395,12 +436,6 @@ class BoardAccess(BoardMemory):
     def supply(self, volts: float) -> None:
         """Sets the voltage at VCC and AVCC; 5 V if nobody does."""
         self._access.supply = volts
-
-    def answer(self, pin: int, on: int, delay: int) -> None:
-        """Answers each output edge of `pin` by driving pin `on` to the same level `delay` cycles later."""
-        self._access.echo_pin = pin
-        self._access.echo_to = on
-        self._access.echo_delay = delay
 
     @property
     def fault(self) -> str | None:

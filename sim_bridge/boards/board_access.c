@@ -12,9 +12,6 @@ static void sink(void *context, uint64_t cycle, uint8_t pin, uint8_t level) {
   board_log *log = &self->log;
   log->edges = board_room_for(log->edges, sizeof *log->edges, &log->first, &log->end, &log->capacity, 1);
   log->edges[log->end++] = (board_edge){.cycle = cycle, .pin = pin, .level = level};
-  if (pin == self->echo_pin && level <= BOARD_RELEASED) {
-    self->board->op->drive(self->board, cycle + self->echo_delay, (uint8_t)self->echo_to, level);
-  }
 }
 
 static double volts(void *context, uint64_t cycle, uint8_t channel) {
@@ -28,7 +25,6 @@ board_access *board_access_open(board *target) {
   board_access *self = calloc(1, sizeof *self);
   if (!self) return NULL;
   self->board = target;
-  self->echo_pin = -1;
   target->sink = sink;
   target->sink_context = self;
   target->op->analog(target, volts, self);

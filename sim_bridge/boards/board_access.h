@@ -20,9 +20,6 @@ typedef struct {
   board_log log;
   double volts[6]; /* at analog channels 0..5 */
   double supply;   /* V; 0: the nominal one */
-  int echo_pin;    /* pin whose every output edge is answered on `echo_to`, or -1; tests of answers from the sink */
-  int echo_to;
-  uint64_t echo_delay;
 } board_access;
 
 /* Becomes the board's sink and analog source. NULL if there is no memory or the board's interface is of another

@@ -34,6 +34,8 @@ enum {
   SIM_BAD_ARGUMENT = -3,
   SIM_NOT_FREE = -4,  /* something is in that place: arena, obstacle on its way, robot */
   SIM_PIN_TAKEN = -5, /* another device drives that pin, or too many hear it */
+  SIM_PAUSED = -6,    /* an edge has ended the run */
+  SIM_RUNS = -7,      /* it runs already: a reaction to an edge cannot let time pass */
 };
 
 /* One row of the truth. */
@@ -86,7 +88,8 @@ int robot_mount(robot *self, uint8_t turret_pin, uint8_t pin);
 int robot_add_battery(robot *self, uint8_t channel, const battery_parameters *parameters);
 
 /* Runs until a cycle, or until bytes have come from a robot that is listened to and its line has been idle for two byte
- * times. Returns 0, or 1 + the number of a robot whose board crashed. */
+ * times, or until an edge of a board ends the run (board.h): up to where all boards have run then. Returns 0, SIM_PAUSED,
+ * SIM_RUNS, or 1 + the number of a robot whose board crashed. */
 int sim_run_until(sim *self, uint64_t deadline);
 
 /* Bytes have come from a robot since its `listen_from`, and its line has been idle since. When a robot is heard does not

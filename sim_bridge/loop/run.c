@@ -174,20 +174,41 @@ static uint64_t next_target(const sim *self, uint64_t deadline) {
   return target;
 }
 
-int sim_run_until(sim *self, uint64_t deadline) {
+/* Up to where all boards have run, `target` at most. */
+static uint64_t all_have_run(const sim *self, uint64_t target) {
+  for (int i = 0; i < self->robot_count; i++) {
+    const board *b = self->robots[i]->board;
+    if (b != NULL && b->op->now(b) < target) target = b->op->now(b);
+  }
+  return target;
+}
+
+static int run(sim *self, uint64_t deadline) {
   while (self->now < deadline) {
     if (self->world_at <= self->now) step_world(self);
     const uint64_t target = next_target(self, deadline);
     for (int i = 0; i < self->robot_count; i++) {
       robot *r = self->robots[i];
       if (r->board == NULL) continue;
-      if (r->board->op->advance(r->board, target) != BOARD_RUNNING) return 1 + r->number;
+      const board_state state = r->board->op->advance(r->board, target);
+      if (state == BOARD_CRASHED || state == BOARD_STOPPED) return 1 + r->number;
       take_bytes(r);
+      if (state != BOARD_PAUSED) continue;
+      self->now = all_have_run(self, target);
+      return SIM_PAUSED;
     }
     self->now = target;
     if (is_look(self) && somebody_speaks(self)) return 0;
   }
   return 0;
+}
+
+int sim_run_until(sim *self, uint64_t deadline) {
+  if (self->runs) return SIM_RUNS;
+  self->runs = true;
+  const int ended = run(self, deadline);
+  self->runs = false;
+  return ended;
 }
 
 int robot_wait(robot *self, uint64_t cycles, uint64_t quiet) {

@@ -64,6 +64,7 @@ struct sim {
   int noise;
   uint64_t now;      /* boards have run up to here */
   uint64_t world_at; /* world and parts have run up to here */
+  bool runs;         /* somebody lets time pass */
   uint64_t next_record;
   robot **robots; /* by increasing number */
   int robot_count;

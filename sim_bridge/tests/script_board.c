@@ -66,8 +66,9 @@ static board_state advance(board *b, uint64_t until) {
     if (edge.cycle > self->now) self->now = edge.cycle;
     if (self->held) continue; /* a board in reset does nothing */
     self->output[edge.pin] = edge.value;
-    if (b->sink != NULL) b->sink(b->sink_context, edge.cycle, edge.pin, edge.value);
+    if (board_show_edge(b, edge.cycle, edge.pin, edge.value)) break;
   }
+  if (board_takes_pause(b)) return BOARD_PAUSED;
   if (until > self->now) self->now = until;
   return BOARD_RUNNING;
 }

@@ -19,6 +19,7 @@ from boebot.errors import AnalysisError, BoardError
 from boebot.image.program import Program, behind_bootloader, read_program
 from sim_bridge.boards.board import EmulatedBoard
 
+FLASH_WORDS = 0x4000
 FUNCTION_IDS = 64  # id of the first watched function; below are vectors
 
 SPAN = np.dtype(  # avr_span of avr_spans.h; cycles
@@ -75,6 +76,13 @@ class AvrBoard(EmulatedBoard):
     def one_by_one(self) -> None:
         """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""
         self.lib.avr_board_one_by_one(self.handle)
+
+    def cover(self) -> NDArray[np.uint8]:
+        """What was executed of each word of flash since the first call, which begins to keep it (avr_board.h): bit 0,
+        and it went straight on; bit 1, and it went elsewhere."""
+        if not (covered := self.lib.avr_board_cover(self.handle)):
+            raise MemoryError("coverage of a program")
+        return np.frombuffer(self.ffi.buffer(covered, FLASH_WORDS), dtype=np.uint8).copy()
 
     def debug(self, debugger: Callable[[int], int]) -> Any:
         """Has a debugger called from now on, within the board's run, with a number of avr_halt (avr_debug.h).

@@ -82,6 +82,7 @@ static void destroy(board *self) {
   spans_free(b);
   debug_free(b);
   free(b->written);
+  free(b->covered);
   free(b);
 }
 
@@ -162,6 +163,12 @@ static const board_operations OPERATIONS = {
     .fault = fault,
     .extension = extension,
 };
+
+uint8_t *avr_board_cover(board *self) {
+  avr_board *b = (avr_board *)self;
+  if (!b->covered) b->covered = calloc(1, AVR_BOARD_FLASH_SIZE / 2u);
+  return b->covered;
+}
 
 void avr_board_one_by_one(board *self) { ((avr_board *)self)->one_by_one = true; }
 

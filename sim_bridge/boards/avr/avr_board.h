@@ -25,6 +25,10 @@ board *avr_board_create(const avr_program *program);
 
 /* For tests of what else is faster: from now on each instruction is executed by itself, and by simavr's core. */
 void avr_board_one_by_one(board *self);
+
+/* From now on keeps what was executed of each word of flash: bit 0, and it went straight on; bit 1, and it went elsewhere, by a
+ * jump, a skip or over a second word. AVR_BOARD_FLASH_SIZE / 2 bytes, the board's; NULL: no memory. */
+uint8_t *avr_board_cover(board *self);
 /* python: end */
 
 #define AVR_BOARD_FLASH_SIZE 0x8000u /* bytes */

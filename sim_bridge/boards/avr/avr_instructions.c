@@ -230,7 +230,7 @@ data_access next_access(const avr_board *b) {
 /* ---- many ---- */
 
 static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t until, const instruction_stops *stops,
-                                                          uint8_t *written) {
+                                                          uint8_t *written, uint8_t *covered) {
   avr_t *avr = b->avr;
   uint8_t *const data = avr->data, *const f = avr->sreg;
   const uint8_t *const flash = avr->flash;
@@ -465,6 +465,7 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
     }
     if (jumps && !is_code(b, pc)) until = 0;
     cycle += takes;
+    if (covered && at < AVR_BOARD_FLASH_SIZE) covered[at / 2u] |= (uint8_t)(pc == at + 2u ? 1u : 2u);
     if (stops) {
       if (moves_stack) {
         uint16_t above = (uint16_t)(word_at(data, SP) - stops->lowest);
@@ -480,14 +481,20 @@ static inline __attribute__((always_inline)) uint32_t run(avr_board *b, uint64_t
 
 /* By itself: the others are as fast as they were. */
 static __attribute__((noinline)) uint32_t run_checked(avr_board *b, uint64_t until, const instruction_stops *stops) {
-  return stops ? run(b, until, stops, b->written) : run(b, until, NULL, b->written);
+  return stops ? run(b, until, stops, b->written, NULL) : run(b, until, NULL, b->written, NULL);
 }
 
 static __attribute__((noinline)) uint32_t run_stopping(avr_board *b, uint64_t until, const instruction_stops *stops) {
-  return run(b, until, stops, NULL);
+  return run(b, until, stops, NULL, NULL);
+}
+
+static __attribute__((noinline)) uint32_t run_covered(avr_board *b, uint64_t until, const instruction_stops *stops) {
+  if (stops || b->written) return run(b, until, stops, b->written, b->covered);
+  return run(b, until, NULL, NULL, b->covered);
 }
 
 uint32_t execute_instructions(avr_board *b, uint64_t until, const instruction_stops *stops) {
+  if (b->covered) return run_covered(b, until, stops);
   if (b->written) return run_checked(b, until, stops);
-  return stops ? run_stopping(b, until, stops) : run(b, until, NULL, NULL);
+  return stops ? run_stopping(b, until, stops) : run(b, until, NULL, NULL, NULL);
 }

@@ -379,6 +379,7 @@ typedef struct avr_board {
   uint32_t code_end;      /* no instruction of the image stands from here on */
   uint16_t variables_end; /* in data memory */
   uint16_t lowest_stack;  /* that the stack may write: variables_end, or RAM_BEGIN while it lies among the variables */
+  uint8_t *covered;       /* by word of flash, see avr_board_cover; NULL: that is not kept */
   bool one_by_one;        /* each instruction by itself, and by simavr's core */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   struct avr_debugging *debug;   /* NULL: no debugger */
@@ -410,6 +411,7 @@ typedef struct avr_board {
 
 /* avr_run.c */
 board_state run_until(avr_board *b, uint64_t until);
+void stop_core(avr_board *b);              /* after the instruction that it executes */
 bool core_stopped(avr_board *b);           /* because it sleeps, or not; false: it cannot go on */
 uint64_t next_of_simavr(const avr_t *avr); /* when the next of simavr's own timers is due, or NEVER */
 void restart(avr_board *b);                /* for the causes in `reset_wanted` */

@@ -105,7 +105,7 @@ void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
     uint8_t pin = pin_of(port, bit);
     if (!(changes & 1) || pin == NO_PIN) continue;
     b->counters.edges_out++;
-    if (b->base.sink) b->base.sink(b->base.sink_context, cycle, pin, shown(p, bit));
+    if (board_show_edge(&b->base, cycle, pin, shown(p, bit))) stop_core(b);
   }
   if (port == PORT_B) spi_pins_moved(b, cycle);
   if (__builtin_expect(!b->checks.on, true)) return;
@@ -245,6 +245,7 @@ void pins_due_driven(avr_board *b, uint64_t cycle) {
     p->driven = (uint8_t)(change.level == BOARD_RELEASED ? p->driven & ~mask : p->driven | mask);
     p->driven_level = (uint8_t)(change.level == BOARD_HIGH ? p->driven_level | mask : p->driven_level & ~mask);
     pins_update(b, port, cycle);
+    if (board_stops_at(&b->base, change.pin)) stop_core(b);
     if (b->outside_log.on) log_driven(b, cycle, change);
     if (b->outside_log.heard) b->outside_log.heard(b->outside_log.heard_context, cycle, change.pin, change.level);
   }

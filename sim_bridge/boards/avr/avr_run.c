@@ -24,8 +24,7 @@ enum { RESET_FLAG_POWER = 1, RESET_FLAG_EXTERNAL = 2, RESET_FLAG_BROWN_OUT = 4, 
 
 /* ---- what is due ---- */
 
-/* Lets the core stop after the instruction that it executes. */
-static void stop_core(avr_board *b) { b->avr->run_cycle_count = 0; }
+void stop_core(avr_board *b) { b->avr->run_cycle_count = 0; }
 
 void set_due(avr_board *b, due_source source, uint64_t cycle) {
   uint64_t before = b->due[source];
@@ -316,6 +315,7 @@ board_state run_until(avr_board *b, uint64_t until) {
   while (avr->cycle < until) {
     catch_up(b, avr->cycle);
     if (b->reset_wanted) restart(b);
+    if (board_takes_pause(&b->base)) return BOARD_PAUSED;
     if (b->held) {
       avr->cycle = earlier(until, b->next_due);
       continue;
@@ -334,6 +334,7 @@ board_state run_until(avr_board *b, uint64_t until) {
     }
   }
   catch_up(b, avr->cycle); /* from here on "now" is what `now` says */
+  if (board_takes_pause(&b->base)) return BOARD_PAUSED;
   return b->crashed ? BOARD_CRASHED : BOARD_RUNNING;
 }
 

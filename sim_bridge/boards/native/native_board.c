@@ -63,8 +63,8 @@ static void push_byte(native_byte_queue *queue, native_byte byte) {
 static void on_edge(native_machine *machine, uint64_t cycle, uint8_t pin, uint8_t level) {
   native_board *self = of_machine(machine);
   self->edges_out++;
-  if (self->face.sink != NULL) {
-    self->face.sink(self->face.sink_context, cycle, pin, level);
+  if (board_show_edge(&self->face, cycle, pin, level)) {
+    machine->stop = 1;
   }
 }
 
@@ -216,8 +216,16 @@ static void board_destroy(board *face) {
 
 static uint64_t board_now(const board *face) { return of_const_board(face)->machine.now; }
 
+/* An edge ends the run: once. A reset that was asked for comes with the next one. */
+static bool is_paused(native_board *self) {
+  if (!board_takes_pause(&self->face)) return false;
+  self->machine.stop = self->reset_asked;
+  return true;
+}
+
 static board_state board_advance(board *face, uint64_t until) {
   native_board *self = of_board(face);
+  if (is_paused(self)) return BOARD_PAUSED;
   if (self->held) { /* nobody hears what comes meanwhile */
     if (until > self->machine.now) self->machine.now = until;
     while (self->machine.next_byte <= self->machine.now) (void)native_take_byte(&self->machine);
@@ -231,6 +239,7 @@ static board_state board_advance(board *face, uint64_t until) {
       return BOARD_CRASHED;
     }
     self->api->advance(until);
+    if (is_paused(self)) return BOARD_PAUSED;
   } while (self->reset_asked);
   return BOARD_RUNNING;
 }

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -346,3 +347,69 @@ def test_board_of_another_version_is_refused() -> None:
     with pytest.raises(BoardError, match="old board cannot be joined to the simulation: it was built for another"):
         Sim(arena_of()).add(old, load_robot("shieldbot"))
     old.close()
+
+
+# ---- edges that end a run, and reactions -------------------------------------------------------------------
+
+
+def test_a_run_ends_at_an_edge() -> None:
+    whole, cut = lively(), lively()
+    cut.robot.board.stop_at([13])
+    whole.run(0.5)
+    stops = 0
+    while cut.sim.cycle < whole.sim.cycle:
+        stops += cut.robot.run_to_edge(whole.sim.cycle, [13])
+        if cut.sim.cycle < whole.sim.cycle:
+            assert int(cut.pins.pin_log(1)["cycle"][0]) == cut.sim.cycle
+    assert stops == 50
+    assert cut.sim.hash() == whole.sim.hash()
+    assert np.array_equal(cut.pins.pin_log(), whole.pins.pin_log())
+    assert not cut.robot.run_to_edge(cut.sim.cycle, [13])
+
+
+def test_a_run_of_two_boards_cannot_end_at_an_edge() -> None:
+    robot = scripted()
+    add_scripted(robot.sim, pose=(1.0, 0.0, 0.0))
+    with pytest.raises(BoardError, match=r"cannot end at an edge of one of 2 boards; expected the only one"):
+        robot.robot.run_to_edge(1000, [13])
+    with pytest.raises(BoardError, match="pin"):
+        scripted().robot.run_to_edge(1000, [20])
+
+
+@pytest.mark.parametrize("boards", [1, 2])
+def test_what_a_reaction_raises_ends_the_run_which_can_go_on(boards: int) -> None:
+    robot, other = scripted(), scripted()
+    for one in (robot, other):
+        if boards == 2:
+            add_scripted(one.sim, pose=(1.0, 0.0, 0.0))
+        one.pulses(0.1, {13: 1500, 12: 1400})
+    calls = []
+
+    def react(cycle: int, level: int) -> None:
+        calls.append(cycle)
+        if len(calls) == 2:
+            raise ZeroDivisionError
+
+    robot.robot.board.on_edge(13, react)
+    with pytest.raises(ZeroDivisionError):
+        SimTransport(robot.robot, "script").read(0.2)
+    assert robot.sim.cycle <= calls[1] <= robot.sim.cycle + 16_000
+    robot.sim.run(CLOCK_HZ // 10 - robot.sim.cycle)
+    other.run(0.1)
+    assert len(calls) == 10 and robot.sim.hash() == other.sim.hash()
+
+
+def test_a_reaction_cannot_let_time_pass() -> None:
+    robot = scripted()
+    robot.pulses(0.1, {13: 1500})
+    robot.robot.board.on_edge(13, lambda cycle, level: robot.run(0.1))
+    with pytest.raises(BoardError, match="a reaction to an edge cannot let time pass"):
+        robot.run(0.1)
+
+
+def test_a_robot_without_devices() -> None:
+    bare = msgspec.structs.replace(load_robot("shieldbot"), device={}, supply=None)
+    robot = scripted(robot=bare)
+    robot.run(0.1)
+    assert robot.robot.layout == {} and robot.robot.readings() == () and robot.robot.texts() == {}
+    assert robot.robot.supply_voltage == 5.0

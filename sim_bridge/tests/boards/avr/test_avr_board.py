@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from boebot.errors import BoardError
-from sim_bridge.boards.avr import create
+from sim_bridge.boards.avr import Watch, create
 from sim_bridge.boards.board import Edge, Level, ResetCause, SentByte
 from sim_bridge.tests.boards.avr.avr_program import Machine, assemble, edges_of, gaps
 from sim_bridge.tests.boards.symbols import entry_of
@@ -435,7 +435,7 @@ def busy_run(step: int) -> tuple[list[Edge], list[SentByte], dict[str, int]]:
         (rng.randrange(500, LENGTH), rng.choice((8, 14, 15, 16)), Level(rng.randrange(3))) for _ in range(400)
     )
     sends = sorted((rng.randrange(500, LENGTH), rng.randrange(256)) for _ in range(200))
-    board.answer(13, on=17, delay=40)
+    board.board.on_edge(13, lambda cycle, level: board.drive(17, level, cycle + 40))
     edges: list[Edge] = []
     sent: list[SentByte] = []
     while board.now < LENGTH:
@@ -518,3 +518,151 @@ def test_a_reset_in_the_watchdogs_name_is_not_logged() -> None:
     machine.board.run(1000)
     assert machine.board.counters()["resets"] == 1
     assert machine.board.watchdog_log() == []
+
+
+# ---- runs that end at edges, and what reacts to them ----
+
+# Pins 13 and 12 by OUT, every 5 cycles; pin 9 by timer 1 every {top} cycles, in mid-instruction now and then.
+EDGES = """
+main:
+  sbi DDRB, 1
+  ldi r24, {top} - 1
+  sts OCR1AL, r24
+  ldi r24, 1 << COM1A0
+  sts TCCR1A, r24
+  ldi r24, 1 << WGM12 | 1 << CS10
+  sts TCCR1B, r24
+  ldi r24, 0x32
+  out DDRB, r24
+  ldi r25, 0x30
+1: out PINB, r25
+  nop
+  nop
+  rjmp 1b
+"""
+
+
+def test_a_run_ends_at_the_very_edge_that_the_program_makes() -> None:
+    machine, whole = Machine(EDGES.format(top=97)), Machine(EDGES.format(top=97))
+    machine.avr.stop_at([13])
+    found = []
+    while machine.board.now < 5000:
+        machine.board.advance(5000)
+        if (edges := edges_of(machine.board.log(), 13)) and machine.board.now < 5000:
+            assert edges == [machine.board.now]
+        found += edges
+    whole.board.advance(5000)
+    assert found == edges_of(whole.board.log(), 13) and len(found) > 900
+    machine.avr.stop_at([])
+    machine.board.advance(10_000)
+    assert machine.board.now >= 10_000
+
+
+@pytest.mark.parametrize("top", [96, 97])
+def test_a_timers_edge_ends_the_run_behind_the_instruction_that_it_meets(top: int) -> None:
+    machine = Machine(EDGES.format(top=top))
+    machine.avr.stop_at({9})
+    edges, late = [], set()
+    while machine.board.now < 20_000:
+        machine.board.advance(20_000)
+        if new := edges_of(machine.board.log(), 9):
+            edges += new
+            late.add(machine.board.now - new[-1])
+    assert set(gaps(edges)[1:]) == {top} and late <= {0, 1}
+
+
+def test_an_edge_that_a_reset_or_the_outside_makes_ends_the_run() -> None:
+    machine = Machine(EDGES.format(top=97))
+    machine.board.advance(1000)
+    machine.avr.stop_at([12, 7])
+    machine.board.reset()
+    at = machine.board.now
+    machine.board.advance(2000)
+    assert machine.board.now == at and machine.board.output(12) == Level.RELEASED
+    machine.board.advance(1_000_000)
+    assert machine.board.output(12) != Level.RELEASED  # its direction, then its level
+    machine.avr.stop_at([7])
+    machine.board.drive(7, Level.HIGH, 5000)
+    machine.board.advance(1_000_000)
+    assert 5000 <= machine.board.now <= 5001
+
+
+@pytest.mark.parametrize("delay", [1, 40])
+@pytest.mark.parametrize("step", [7, 4000, 100_000])
+def test_what_reacts_to_an_edge_drives_at_its_cycle_however_a_run_is_cut(step: int, delay: int) -> None:
+    machine = Machine(EDGES.format(top=97))
+    machine.board.log_outside()
+    seen = []
+
+    def react(cycle: int, level: Level) -> None:
+        assert machine.avr.reacts_at == cycle
+        seen.append(cycle)
+        machine.board.drive(7, level, cycle + delay)
+
+    machine.avr.on_edge(9, react)
+    while machine.board.now < 20_000:
+        machine.board.run(step)
+    driven = machine.board.outside_log()["driven"]["cycle"].tolist()
+    answered = [cycle for cycle in seen if cycle + delay <= driven[-1]]
+    assert driven == [cycle + delay for cycle in answered] and len(answered) > 190
+    assert machine.avr.reacts_at is None
+
+
+@pytest.mark.parametrize("error", [KeyError("x"), KeyboardInterrupt()])
+def test_what_a_reaction_raises_ends_the_run_there_and_is_raised(error: BaseException) -> None:
+    machine = Machine(EDGES.format(top=97))
+    calls = []
+
+    def react(cycle: int, level: Level) -> None:
+        calls.append(cycle)
+        if len(calls) == 3:
+            raise error
+
+    for pin in (12, 13):  # both move in one instruction: the other is not called any more
+        machine.avr.on_edge(pin, react)
+    with pytest.raises(type(error)) as raised:
+        machine.board.advance(1_000_000)
+    assert raised.value is error and len(calls) == 3 and machine.board.now == calls[-1]
+    error.__traceback__ = None
+    machine.board.advance(machine.board.now + 5)
+    assert len(calls) == 5
+
+
+# ---- coverage ----
+
+
+def test_coverage_is_what_was_executed_and_where_it_went_on() -> None:
+    source = """
+    main:
+      ldi r24, 3
+    1: dec r24
+      brne 1b              ; both ways
+      sbic PIND, 7         ; low: skips
+      rjmp 2f
+      sbrs r24, 0          ; does not skip
+      lds r24, 0x0200      ; two words
+      breq 3f              ; the flag is still set: jumps
+    2: nop                 ; never
+    3: rjmp 3b
+    """
+    machine, off = Machine(source), Machine(source)
+    first = entry_of(assemble(source), "main") // 2
+    for board in (machine, off):
+        board.board.drive(7, Level.LOW)
+    assert not machine.avr.cover().any()
+    for board in (machine, off):
+        board.board.advance(1000)
+    covered = machine.avr.cover()
+    assert covered[first : first + 11].tolist() == [1, 1, 3, 2, 0, 1, 2, 0, 2, 0, 2]
+    assert machine.board.counters() == off.board.counters() and machine.board.now == off.board.now
+
+
+def test_coverage_beside_the_recorder_and_the_notes_is_the_same() -> None:
+    found = []
+    for prepare in (lambda one: None, lambda one: one.record(Watch()), lambda one: one.check(strict=False)):
+        machine = Machine(EDGES.format(top=97))
+        prepare(machine.avr)
+        machine.avr.cover()
+        machine.board.advance(2000)
+        found.append(bytes(machine.avr.cover()))
+    assert found[0] == found[1] == found[2] and any(found[0])

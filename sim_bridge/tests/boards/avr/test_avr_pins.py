@@ -223,7 +223,7 @@ def test_answer_from_inside_the_run() -> None:
         2: rjmp 2b
         """
     )
-    machine.board.answer(13, on=7, delay=10)
+    machine.avr.on_edge(13, lambda cycle, level: machine.board.drive(7, level, cycle + 10))
     machine.board.run(200)
     log = machine.board.log()
     asked = edges_of(log, 13)[1]

@@ -69,7 +69,7 @@ def test_modes_and_order(mode: int, order: int) -> None:
     """Table 19-2: who listens at the sampling edges gets the byte; so does the board, from a wire from MOSI to MISO."""
     control = SPE | MSTR | mode | order
     machine = program(f"setup {control}\n send 0xA6\n send 0x35")
-    machine.board.answer(pin=MOSI, on=MISO, delay=1)
+    machine.avr.on_edge(MOSI, lambda cycle, level: machine.board.drive(MISO, level, cycle + 1))
     machine.board.run(400)
     log = machine.board.log()
     clock = [edge for edge in log if edge.pin == SCK][-32:]  # before them it becomes an output, and comes to rest
@@ -147,7 +147,7 @@ def test_flags_and_how_they_are_cleared() -> None:
         send 0x3C
         keep SPSR"""
     )
-    machine.board.answer(pin=MOSI, on=MISO, delay=1)
+    machine.avr.on_edge(MOSI, lambda cycle, level: machine.board.drive(MISO, level, cycle + 1))
     machine.board.run(400)
     assert results(machine, 5) == [SPIF | WCOL, SPIF | WCOL, 0, 0x3C, 0]
     ((_, _, does, why),) = machine.board.notes()

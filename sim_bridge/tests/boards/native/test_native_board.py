@@ -185,7 +185,9 @@ def run_in_pieces(board: BoardAccess, seed: int | None) -> tuple[list[Edge], lis
     start = board.now
     for number in range(300):
         board.drive(ENCODER_LEFT, Level(number % 2), at=start + TICK + number * 9001)
-    board.answer(pin=9, on=10, delay=100)  # the left IR receiver follows its LED
+    board.board.on_edge(
+        9, lambda cycle, level: board.drive(10, level, cycle + 100)
+    )  # the left IR receiver follows its LED
     rng = random.Random(seed)
     end = start + 30 * TICK
     while board.now < end:
@@ -211,3 +213,48 @@ def test_files_that_are_no_firmware(tmp_path: Path) -> None:
         native_board(tmp_path / "empty.so")
     with pytest.raises(BoardError, match="not a boebot firmware"):
         native_board(Path(str(_core.__file__)))
+
+
+def test_a_run_ends_at_an_edge_and_goes_on_as_if_it_had_not(make: Maker) -> None:
+    whole, cut = make(), make()
+    for board in (whole, cut):
+        drive(board, 5000, 2000)
+        board.log()
+    end = whole.now + 5 * TICK
+    whole.advance(end)
+    cut.board.stop_at([SERVO_LEFT, SERVO_RIGHT])
+    found: list[Edge] = []
+    stops = 0
+    while cut.now < end:
+        cut.advance(end)
+        found += (edges := cut.log())
+        if cut.now < end:
+            stops += 1
+            assert edges[-1].cycle == cut.now
+    assert found == whole.log() and stops >= 8
+    assert cut.receive() == whole.receive() and cut.counters() == whole.counters()
+
+
+def test_an_edge_that_a_reset_makes_ends_the_run(make: Maker) -> None:
+    board = make()
+    board.advance(TICK)
+    board.board.stop_at([SERVO_LEFT])
+    board.reset()
+    board.log()
+    board.advance(2 * TICK)
+    assert board.now == TICK and Edge(TICK, SERVO_LEFT, Level.RELEASED) in board.log()
+    board.board.stop_at([])
+    board.advance(2 * TICK)
+    assert board.now == 2 * TICK and board.counters()["resets"] == 1
+
+
+def test_what_a_reaction_raises_ends_the_run_and_is_raised(make: Maker) -> None:
+    board = make()
+
+    def react(cycle: int, level: Level) -> None:
+        raise KeyError(cycle)
+
+    board.board.on_edge(WHISKER_LEFT, react)
+    with pytest.raises(KeyError) as raised:
+        board.advance(TICK)
+    assert raised.value.args == (board.now,)
