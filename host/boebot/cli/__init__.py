@@ -1,7 +1,7 @@
 """The `boebot` command: one file per sub-command.
 
-Exit codes: 0 done; 1 something the user can mend, said in one sentence; 2 wrong usage; 130 interrupted by Ctrl-C, 143
-by SIGTERM, 129 by SIGHUP.
+Exit codes: 0 done; 1 something the user can mend, said in one sentence; 2 wrong usage; 3 a fault of the run changed
+nothing; 130 interrupted by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP.
 """
 
 from __future__ import annotations

@@ -33,6 +33,10 @@ COMMANDS = {
         "Show an arena or a robot: a picture, its measures, what stands there or how it is wired.",
         "boebot.cli.show:app",
     ),
+    "faults": Command(
+        "List what can fail in a run of a robot: boebot run --fault NAME[=VALUE]@START[..END].",
+        "boebot.cli.faults:faults",
+    ),
     "serve": Command("Offer the emulated robot to other programs, until Ctrl-C.", "boebot.cli.serve:serve"),
     "flash": Command(
         "Write the kit's firmware or a program of your own into a board, and say what answers.",

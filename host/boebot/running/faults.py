@@ -11,21 +11,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING
 
-from boebot.boards import RESET_CAUSES
+from boebot.boards import RESET_CAUSES, BoardSession, VehicleSession
 from boebot.description.robots import RobotDescription
 from boebot.devices.device import FaultKind
 from boebot.errors import BoebotError, CallError, did_you_mean
+from boebot.link.bad_line import BadLine
 from boebot.quantity import parse
 from boebot.record.interventions import Fault
-
-if TYPE_CHECKING:
-    from boebot.running.driver import Driver
 
 EXPECTED = "expected NAME[=VALUE]@START[..END], as in ping.missing@3s..5s"
 HOST = ("serial", "cable", "host")
 """Owners on the host's side of the line: of any board, also a real one."""
+
+NEED_END = ("serial.stalled", "host.stopped")
+"""What holds something back until then."""
 
 Fired = Callable[[], int]
 """How often a fault has changed something so far."""
@@ -37,12 +37,12 @@ OWNERS: Mapping[str, Mapping[str, FaultKind]] = {
         "repeated": FaultKind("whole frames come twice, this share of them", default=0.1),
         "flipped": FaultKind("bits are wrong, this share of them", default=1e-4),
         "delayed": FaultKind("bytes come later by this", "s", default=0.1, most=10.0),
-        "stalled": FaultKind("bytes are held back, and come all at once at END"),
+        "stalled": FaultKind("bytes are held back until END, and come all at once"),
         "rate": FaultKind("the host's bit rate is off by this share", default=0.03, least=-0.1, most=0.1),
     },
     "cable": {"out": FaultKind("the serial cable is out: nothing passes")},
     "host": {
-        "stopped": FaultKind("the host's program stands still, and goes on at END"),
+        "stopped": FaultKind("the host's program stands still until END"),
         "killed": FaultKind("the host's program ends, and leaves the board to itself", lasts=False),
         "slow": FaultKind("each step of the brain takes longer by this", "s", default=0.1, most=10.0),
     },
@@ -113,6 +113,8 @@ def checked(fault: Fault, robot: RobotDescription) -> Fault:
         raise CallError(f"fault {fault}: its value is {value}; {expected}")
     if not (fault.begin_s >= 0.0 and math.isfinite(fault.begin_s)):
         raise CallError(f"fault {fault} begins at {fault.begin_s:g} s; expected a time of the run, from 0 s on")
+    if fault.end_s is None and fault.name in NEED_END:
+        raise CallError(f"fault {fault} never ends; expected an END, as in {fault.name}@3s..4s")
     if fault.end_s is not None and not kind.lasts:
         raise CallError(f"fault {fault}: {fault.name} happens at one time; expected no END")
     if fault.end_s is not None and not fault.begin_s < fault.end_s:
@@ -159,23 +161,34 @@ def faults_of(
     return found
 
 
-def inject(fault: Fault, driver: Driver, seed: int) -> Fired:
-    """Hands a fault over to who carries it out. `seed`: of its draws.
+def inject(
+    fault: Fault,
+    robot: RobotDescription,
+    session: BoardSession | VehicleSession,
+    bad_line: Callable[[], BadLine],
+    offset_s: float = 0.0,
+) -> Fired:
+    """Hands a fault over to who carries it out.
+
+    Args:
+        robot: that has it.
+        session: of that robot.
+        bad_line: gives what damages the line to its board from then on; called for what is on the host's side.
+        offset_s: time of the session's transport at the run's time 0.
 
     Raises:
         BoebotError: it cannot be here.
     """
-    fault = checked(fault, driver.description)
+    fault = checked(fault, robot)
     owner, _, name = fault.name.partition(".")
-    kind, owners = known(driver.description)[fault.name]
+    kind, owners = known(robot)[fault.name]
     value = float(kind.words.index(str(fault.value)) if kind.words else fault.value or 0.0)
-    offset_s = driver.status().clock_offset
-    begin_s, end_s = fault.begin_s + offset_s, math.inf if fault.end_s is None else fault.end_s + offset_s
+    span = fault.begin_s + offset_s, math.inf if fault.end_s is None else fault.end_s + offset_s
     if fault.name == "serial.rate":
-        driver.session.fault(owner, name, value, begin_s, end_s)
+        session.fault(owner, name, value, *span)
     if owner in HOST:
-        return driver.bad_line(seed).add(fault.name, value, begin_s, end_s)
-    fired = [driver.session.fault(one, name, value, begin_s, end_s) for one in owners]
+        return bad_line().add(fault.name, value, *span)
+    fired = [session.fault(one, name, value, *span) for one in owners]
     return lambda: sum(one() for one in fired)
 
 

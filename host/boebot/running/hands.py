@@ -158,7 +158,10 @@ class Hands:
                 check_setting(self.driver.description, part, value)
                 self.driver.session.set_part(part, value)
             case Fault():
-                self.faults.append((one, inject(one, self.driver, self.task.seed)))
+                driver, seed = self.driver, self.task.seed
+                offset_s = driver.status().clock_offset
+                fired = inject(one, driver.description, driver.session, lambda: driver.bad_line(seed), offset_s)
+                self.faults.append((one, fired))
             case _ if self.driver.is_program:
                 raise BoebotError("a program drives this robot, no brain: it takes what is typed, and buttons")
             case _:

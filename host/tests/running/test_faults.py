@@ -64,6 +64,7 @@ def test_read(text: str, fault: Fault) -> None:
         ("board.reset=power@3", "'power' is none of external, watchdog"),
         ("board.reset@3..4", "board.reset happens at one time; expected no END"),
         ("cable.out@3..2", "ends at 2 s; expected a time later than its begin"),
+        ("host.stopped@1", "host.stopped@1s never ends; expected an END"),
         ("cable.out@-1", "begins at -1 s; expected a time of the run"),
         ("cable.out@9", "is never: the run ends at 5 s"),
         ("3:cable.out@1", "there is no robot 3 in the run"),
