@@ -34,7 +34,7 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
         BoebotError: pytest itself has failed.
     """
     if find_spec("pytest") is None:
-        raise CallError("boebot test needs pytest; expected it here: pip install 'boebot[hil]'")
+        raise CallError("tests need pytest; expected it here: pip install 'boebot[hil]'")
     from boebot.boards import is_live
     from boebot.sketch import cache
 
