@@ -14,6 +14,7 @@
 #include "codec.h"
 
 #define ANY_SEQUENCE (-1)
+#define COPY 255 /* the gap that the frame before leaves if it comes once more */
 #define NO_ORIGIN UINT64_MAX
 
 struct codec_decoder {
@@ -58,8 +59,9 @@ static bool counts_anew(codec_decoder *self) {
 static void count_lost(codec_decoder *self) {
   const uint8_t sequence = frame_sequence(&self->frames);
   const bool anew = counts_anew(self);
-  if (self->next != ANY_SEQUENCE && !anew) {
-    self->counts.lost += (uint8_t)(sequence - self->next);
+  const uint8_t gap = (uint8_t)(sequence - self->next);
+  if (self->next != ANY_SEQUENCE && !anew && gap != COPY) {
+    self->counts.lost += gap;
   }
   self->next = (uint8_t)(sequence + 1);
 }

@@ -90,7 +90,10 @@ class TelemetryBuffer:
         return is_first or was_reset
 
     def receive(self, payload: bytes, now_s: float) -> None:
-        """Takes a `telemetry`; `stamp` follows when all that came with it was received."""
+        """Takes a `telemetry`; `stamp` follows when all that came with it was received. A copy counts for nothing."""
+        if payload == self.latest:
+            self._counts.duplicate += 1
+            return
         self.latest = payload
         self.latest_s = now_s
         self._piece.append(payload)

@@ -265,7 +265,7 @@ class PlainDecoder:
         for place, (block, may_be) in enumerate(reference_frame.pieces(stream, sizes)):
             message = self.open(block) if may_be else None
             if message is not None:
-                if found:
+                if found and message[1] != found[-1][1]:  # else it is a copy
                     self.lost += (message[1] - found[-1][1] - 1) % 256
                 found.append(message)
                 self.good += 1

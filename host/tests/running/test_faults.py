@@ -155,6 +155,14 @@ def test_damage_on_the_line_is_never_delivered(board: str) -> None:
     assert (np.diff(ticks) > 0).all() and np.diff(ticks).max() <= 1 + result.lost_frames
 
 
+def test_frames_that_come_twice_count_once() -> None:
+    """Of telemetry the latest counts: a copy is no loss, no step and no row."""
+    plain = boebot.run(straight, on="native", arena="empty", seconds=1.5)
+    result = boebot.run(straight, on="native", arena="empty", seconds=1.5, faults=["serial.repeated=1@0.5..1"])
+    assert result.link["host"]["duplicate"] >= 48 and result.lost_frames == result.bad_frames == result.late_steps == 0
+    assert (result.steps, result.ticks, result.hash) == (plain.steps, plain.ticks, plain.hash)
+
+
 @pytest.mark.parametrize(("share", "works"), [("1%", True), ("-1%", True), ("8%", False)])
 def test_a_bit_rate_that_is_off(share: str, works: bool) -> None:
     """The data sheet asks for an error of 2 % at most at 8 data bits (ATmega328P, table 20-3)."""
