@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import weakref
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from boebot.arguments import point, shown, whole
 from boebot.boards import TruthNow
 from boebot.description import robots
 from boebot.devices.display import letters_of
+from boebot.devices.faults import BODY_FAULTS
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.record.blocks import Block, Group, group_of
 from sim_bridge._core import ffi, lib
@@ -34,6 +35,13 @@ CYCLES_MAXIMUM = 2**62  # 9,000 years
 NUMBER_MAXIMUM = 2**30 - 1
 STEP_MINIMUM = 160  # cycles of a world step: 10 us
 NEVER = 2**64 - 1
+
+BODY_PLACES = {
+    "wheel_left": lib.FAULTY_LEFT_WHEEL,
+    "wheel_right": lib.FAULTY_RIGHT_WHEEL,
+    "robot": lib.FAULTY_ROBOT,
+}
+"""In the place of a part's number."""
 
 TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
 TONE = ("time", "duration", "frequency")
@@ -540,6 +548,35 @@ class SimRobot:
         parts = self.parts
         if device not in parts or lib.robot_set_part(self.handle, parts[device], value) != lib.SIM_OK:
             raise BoardError(f"device {device!r} of robot {self.description.name!r} cannot be set to {value:g}")
+
+    def fault(self, owner: str, kind: str, value: float, begin_cycle: int, end_cycle: int = NEVER) -> Callable[[], int]:
+        """Lays a fault on a device at its board, a wheel ("wheel_left", "wheel_right"), the "battery" or the whole
+        "robot", from a cycle (now at the earliest) up to another. `kind` and the unit of `value`: as `Device.FAULTS`
+        and `BODY_FAULTS` have them. Returns what says how often it has fired: what went out was not what would have
+        gone out.
+
+        Raises:
+            BoardError: the robot has no such fault, or one of its kind acts at the same time; a value or a span that is
+                none.
+        """
+        self._need_board("parts that fail")
+        where = f"fault {owner}.{kind}"
+        parts = {**self.parts, **BODY_PLACES, **({"battery": 0} if self.handle.battery else {})}
+        device = self.description.device.get(owner)
+        kinds = BODY_FAULTS.get(owner, {} if device is None else device.FAULTS)
+        if owner not in parts or kind not in kinds:
+            raise BoardError(f"{where}: robot {self.description.name!r} has no such fault")
+        one = kinds[kind]
+        most = len(one.words) - 1 if one.words else one.most
+        value = arguments.number(f"{where}: its value", value, BoardError, least=one.least, most=most)
+        begin = whole(f"{where}: its begin", begin_cycle, BoardError, least=0, most=NEVER - 1)
+        end = whole(f"{where}: its end", end_cycle, BoardError, least=max(begin, self.sim.cycle) + 1, most=NEVER)
+        which = getattr(lib, f"FAULT_{kind.upper()}")
+        slot = lib.robot_fault(self.handle, parts[owner], which, value, begin, end)
+        if slot == lib.SIM_BAD_ARGUMENT:
+            raise BoardError(f"{where}: another one acts at the same time; expected one after the other")
+        done(slot if slot < 0 else lib.SIM_OK, where)
+        return lambda: int(lib.robot_fault_fired(self.handle, slot))
 
     # ---- its line ----------------------------------------------------------------------------------------------------
 

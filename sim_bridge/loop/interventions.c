@@ -1,4 +1,6 @@
 /* interventions.c: see loop.h. Here: what a test does to a simulation, past its parts. */
+#include <stdlib.h>
+
 #include "parts/ping.h"
 #include "state.h"
 
@@ -87,4 +89,36 @@ void robot_unplug(robot *self, int number, int unplugged) {
     p->op->edge(p, op->now(self->board), pin, robot_heard(self, p, pin, op->output(self->board, pin)));
   }
   part_unplug(p, unplugged);
+}
+
+/* Faults that a wheel, and the whole robot, can have. */
+static uint32_t faults_of_place(int number) {
+  return number == FAULTY_ROBOT ? FAULT_BIT(FAULT_LIFTED) : FAULT_BIT(FAULT_BLOCKED) | FAULT_BIT(FAULT_SLIPPING);
+}
+
+int robot_fault(robot *self, int number, int kind, double value, uint64_t begin, uint64_t end) {
+  const uint64_t now = self->sim->now;
+  part *of = number < 0 ? NULL : self->parts[number];
+  if (begin < now) begin = now;
+  if (end <= begin || (of == NULL && !(faults_of_place(number) & FAULT_BIT(kind)))) return SIM_BAD_ARGUMENT;
+  fault **faults = realloc(self->faults, (size_t)(self->fault_count + 1) * sizeof *faults);
+  if (faults == NULL) return SIM_NO_MEMORY;
+  self->faults = faults;
+  fault *made = calloc(1, sizeof *made);
+  if (made == NULL) return SIM_NO_MEMORY;
+  const uint32_t device = FAULT_NOISE * ((uint32_t)kind + 1u) + (of == NULL ? 0u : of->noise.device);
+  *made = (fault){.kind = kind, .value = value, .begin = begin, .end = end, .pin = PART_NO_PIN};
+  made->key = noise_key(self->sim->seed, (uint32_t)self->number, device);
+  if ((of == NULL ? fault_insert(&self->chassis.faults[-1 - number], made) : part_add_fault(of, made)) != 0) {
+    free(made);
+    return SIM_BAD_ARGUMENT;
+  }
+  faults[self->fault_count] = made;
+  return self->fault_count++;
+}
+
+uint64_t robot_fault_fired(const robot *self, int number) {
+  const fault *f = self->faults[number];
+  const int took_pin = f->pin != PART_NO_PIN && f->before != f->level && self->sim->now >= f->begin;
+  return f->fired + (uint64_t)took_pin;
 }

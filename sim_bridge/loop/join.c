@@ -31,6 +31,8 @@ static void destroy_robot(robot *r) {
   if (r->vehicle != NULL) vehicles_destroy(r->vehicle);
   for (int i = 0; i < r->part_count; i++) free(r->parts[i]);
   free(r->parts);
+  for (int i = 0; i < r->fault_count; i++) free(r->faults[i]);
+  free(r->faults);
   buffer_free(&r->received);
   buffer_free(&r->received_at);
   buffer_free(&r->truth);

@@ -26,7 +26,8 @@
 
 /* python: begin */
 enum { SIM_LEFT = 0, SIM_RIGHT = 1 };
-enum { SIM_OBSTACLES_MAXIMUM = 64 }; /* that move; robots: BODY_MAXIMUM */
+enum { FAULTY_LEFT_WHEEL = -1, FAULTY_RIGHT_WHEEL = -2, FAULTY_ROBOT = -3 }; /* in the place of a part's number */
+enum { SIM_OBSTACLES_MAXIMUM = 64 };                                         /* that move; robots: BODY_MAXIMUM */
 enum {
   SIM_OK = 0,
   SIM_NO_MEMORY = -1,
@@ -124,6 +125,15 @@ void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level);
 int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int robot_answer_ping(robot *self, int64_t echo_cycles);
 void robot_unplug(robot *self, int number, int unplugged);
+
+/* Lays a fault (FAULT_...) on the part of that number, or on a wheel or the whole robot, for the cycles from `begin`, now at
+ * the earliest, up to `end`; `value` in the unit of the device's FAULTS. Wheels and motors take up a fault with a step of
+ * the world. Returns its number, or an error: SIM_BAD_ARGUMENT, there is no such fault of that part, another one of its kind
+ * acts at the same time, or it never acts. */
+int robot_fault(robot *self, int number, int kind, double value, uint64_t begin, uint64_t end);
+
+/* How often what went out was not what would have gone out without the fault of that number, so far. */
+uint64_t robot_fault_fired(const robot *self, int number);
 
 /* The voltage of the rail as it is now goes to all that runs on it: after a change of `held_supply`, too. */
 void robot_update_supply(robot *self);

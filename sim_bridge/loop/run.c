@@ -67,6 +67,26 @@ static void exchange_light(sim *self) {
   }
 }
 
+/* Faults of the wheels and of the whole robot, for the step that begins under these torques. */
+static void take_faults(robot *r, const double torques[2]) {
+  chassis *c = &r->chassis;
+  body_faults *now = &r->body->faults;
+  fault *lifted = fault_find(c->faults[2], FAULT_LIFTED, c->since);
+  *now = (body_faults){.lifted = lifted != NULL, .grip = {INFINITY, INFINITY}};
+  for (int side = 0; side < 2; side++) {
+    const int turns = torques[side] != 0.0 || c->wheel[side].speed != 0.0;
+    fault *blocked = fault_find(c->faults[side], FAULT_BLOCKED, c->since);
+    fault *slipping = fault_find(c->faults[side], FAULT_SLIPPING, c->since);
+    if (lifted != NULL) lifted->fired += (uint64_t)turns;
+    if (blocked != NULL) blocked->fired += (uint64_t)turns;
+    now->blocked[side] = blocked != NULL;
+    if (slipping == NULL) continue;
+    slipping->fired += (uint64_t)r->body->state.slipping;
+    now->slippery = 1;
+    now->grip[side] = slipping->value;
+  }
+}
+
 /* Motors say their torque for the step that begins. */
 static void begin_step(void *owner, double torques[2]) {
   robot *r = owner;
@@ -86,6 +106,7 @@ static void begin_step(void *owner, double torques[2]) {
   }
   for (int side = 0; side < 2; side++) torques[side] = c->wheel[side].torque;
   if (r->vehicle != NULL) VEHICLE_OPERATIONS.torques(r->vehicle->worlds, torques);
+  if (r->fault_count > 0) take_faults(r, torques);
 }
 
 static void has_moved(void *owner) {

@@ -29,6 +29,8 @@ struct robot {
   chassis chassis;
   part **parts;
   int part_count;
+  fault **faults; /* of all parts and of the robot, by their numbers */
+  int fault_count;
   part *hears[BOARD_PIN_COUNT][HEARING_PARTS + 1]; /* of each pin, up to the first NULL */
   uint8_t outside[BOARD_PIN_COUNT];                /* what parts do to pins, for others that hear them; else RELEASED */
   uint8_t drives[BOARD_PIN_COUNT];                 /* role of the part that drives the pin, or 0 */

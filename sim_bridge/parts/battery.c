@@ -15,6 +15,11 @@ static void step(part *base) {
   c->motors_a = motors_a;
   supply_step(&self->parameters.supply, &self->supply, motors_a, c->at_charger,
               (double)c->step_cycles / BOARD_CLOCK_HZ);
+  fault *sagging = part_fault(base, FAULT_SAGGING, c->since);
+  if (sagging != NULL && sagging->value < self->supply.pack_v) {
+    supply_sag(&self->parameters.supply, &self->supply, sagging->value);
+    sagging->fired++;
+  }
   c->pack_v = self->supply.pack_v;
 }
 
@@ -25,7 +30,7 @@ static double analog(part *base, uint64_t cycle) {
   return v < 0.0 ? 0.0 : (v > SUPPLY_NOMINAL_V ? SUPPLY_NOMINAL_V : v);
 }
 
-static const part_operations OPERATIONS = {.step = step, .analog = analog};
+static const part_operations OPERATIONS = {.step = step, .analog = analog, .faults = FAULT_BIT(FAULT_SAGGING)};
 
 void battery_init(battery *self, const part_place *place, uint8_t channel, const battery_parameters *parameters) {
   memset(self, 0, sizeof *self);

@@ -1,6 +1,6 @@
 /* battery.h: the pack that everything runs on (world/supply), and a share of its voltage, with noise, at an analog pin.
  *
- * On a charging station of the arena it takes charge.
+ * On a charging station of the arena it takes charge. Fault: sagging, to at most that many V at the pack's terminals.
  */
 #ifndef PART_BATTERY_H
 #define PART_BATTERY_H

@@ -24,7 +24,10 @@ static void begin(capacitor *self, uint64_t cycle, int charging) {
 /* The board has let go: a constant current, so the voltage falls in a straight line. */
 static void decay(capacitor *self, uint64_t cycle, uint8_t pin) {
   begin(self, cycle, 0);
-  self->decay_per_s = (BOARD_NOMINAL_VOLTS - self->parameters.threshold_v) / self->decay_time(self, cycle);
+  const fault *dirty = part_fires(&self->part, FAULT_DIRTY, cycle);
+  const double clean_s = self->decay_time(self, cycle);
+  const double decay_s = dirty == NULL ? clean_s : clean_s / (1.0 - dirty->value);
+  self->decay_per_s = (BOARD_NOMINAL_VOLTS - self->parameters.threshold_v) / decay_s;
   const double above = self->volts - self->parameters.threshold_v;
   part_drive(&self->part, cycle, pin, above > 0.0 ? BOARD_HIGH : BOARD_LOW);
   if (above <= 0.0) return;
@@ -51,7 +54,7 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
 }
 
-static const part_operations OPERATIONS = {.edge = edge};
+static const part_operations OPERATIONS = {.edge = edge, .faults = FAULT_BIT(FAULT_DIRTY)};
 
 void capacitor_init(capacitor *self, const part_place *place, uint8_t pin, const capacitor_parameters *parameters,
                     capacitor_decay decay_time) {

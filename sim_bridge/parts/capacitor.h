@@ -2,7 +2,8 @@
  *
  * The board raises the pin: the capacitor charges through a resistor. The board lets go: a current that is constant during
  * the decay takes the charge away, and the pin reads low once the voltage is below the input's threshold. The greater the
- * current, the sooner. What was not charged in full decays sooner.
+ * current, the sooner. What was not charged in full decays sooner. Fault: dirty, a share of the light, and so of the current,
+ * is lost.
  */
 #ifndef PART_CAPACITOR_H
 #define PART_CAPACITOR_H

@@ -4,6 +4,8 @@
  * linear interpolation gives. `edges_per_turn` counts both edges of all channels. With two channels A leads B when the
  * wheel turns forward: (A, B) = 00, 10, 11, 01. A sensor too near or too far from its disc sees edges that are none, and
  * misses some (section 7 of the hardware's fact sheet); one whose output has no hysteresis bounces at each edge.
+ * Faults: missing, a share of the edges; extra, a flicker after a share of them; noisy, a square wave of that many Hz at A in
+ * the place of its edges.
  */
 #ifndef PART_ENCODER_H
 #define PART_ENCODER_H
@@ -31,6 +33,7 @@ typedef struct {
   double position; /* edges, at the end of the last step */
   long long index; /* its whole part */
   long long first; /* and at power-on */
+  uint64_t waved;  /* a fault's square wave is on the pin up to this cycle */
 } encoder;
 
 /* python: begin */

@@ -19,10 +19,21 @@ typedef struct {
   uint64_t asked;          /* and that cycle */
 } h_bridge;
 
+static int drives(const h_bridge *self) { return self->is_high[ENABLE] && self->is_high[0] != self->is_high[1]; }
+
 static int switches(const h_bridge *self) {
   if (!self->is_high[ENABLE] || self->part.unplugged) return H_BRIDGE_COAST;
-  if (self->is_high[0] == self->is_high[1]) return H_BRIDGE_BRAKE;
-  return self->is_high[self->parameters.forward] ? H_BRIDGE_FORWARD : H_BRIDGE_BACKWARD;
+  if (part_fault(&self->part, FAULT_DEAD, self->until) != NULL) return H_BRIDGE_COAST;
+  if (!drives(self)) return H_BRIDGE_BRAKE;
+  const int reversed = part_fault(&self->part, FAULT_REVERSED, self->until) != NULL;
+  return self->is_high[self->parameters.forward] != reversed ? H_BRIDGE_FORWARD : H_BRIDGE_BACKWARD;
+}
+
+/* Counts faults of what drives from that cycle on. */
+static void count_faults(h_bridge *self, uint64_t cycle) {
+  if (!drives(self)) return;
+  part_fires(&self->part, FAULT_DEAD, cycle);
+  part_fires(&self->part, FAULT_REVERSED, cycle);
 }
 
 /* The current flows on up to that cycle. */
@@ -42,6 +53,7 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   for (int i = 0; i < INPUTS; i++) {
     if (base->pins[i].pin == pin) self->is_high[i] = level == BOARD_HIGH || level == BOARD_PULLED_UP;
   }
+  count_faults(self, cycle);
 }
 
 /* The wheel's torque in a step of `dt` for that mean current. What a gear loses goes against the motion: it lessens what
@@ -64,10 +76,16 @@ static void before_step(part *base) {
   chassis *c = base->chassis;
   const double dt = (double)c->step_cycles / BOARD_CLOCK_HZ;
   pass(self, c->since);
+  count_faults(self, c->since);
   chassis_wheel *wheel = &c->wheel[self->side];
   self->speed = wheel->speed / p->wheel_radius;
   wheel->torque = torque_of(self, self->flow.charge / dt, dt);
   wheel->is_bridged = 1;
+  fault *weak = part_fault(base, FAULT_WEAK, c->since);
+  if (weak != NULL) {
+    weak->fired += wheel->torque != 0.0;
+    wheel->torque *= weak->value;
+  }
   c->bridges_a += p->idle_a + self->flow.drawn / dt;
   self->flow.charge = self->flow.drawn = 0.0;
 }
@@ -84,7 +102,11 @@ static int read(part *base, double *values) {
   return 1;
 }
 
-static const part_operations OPERATIONS = {.edge = edge, .before_step = before_step, .read = read};
+static const part_operations OPERATIONS = {
+    .edge = edge,
+    .before_step = before_step,
+    .read = read,
+    .faults = FAULT_BIT(FAULT_DEAD) | FAULT_BIT(FAULT_WEAK) | FAULT_BIT(FAULT_REVERSED)};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   h_bridge *self = (h_bridge *)base;

@@ -7,6 +7,8 @@
  * Between two edges the current is solved exactly (world/h_bridge), at the speed of the wheel and the voltage of the pack
  * with which the world's step began. The torque of the next step is that of the mean current since the last: each PWM
  * pulse counts in full, whatever its frequency, a step late.
+ * Faults, from the next edge or step on: dead, the motor's leads are off; reversed, they are swapped; weak, that share of its
+ * torque.
  */
 #ifndef PART_H_BRIDGE_H
 #define PART_H_BRIDGE_H

@@ -75,7 +75,12 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
 }
 
-static const part_operations OPERATIONS = {.edge = edge};
+static void hold(const part *base, fault *f) {
+  f->pin = base->pins[1].pin;
+  f->level = BOARD_LOW;
+}
+
+static const part_operations OPERATIONS = {.edge = edge, .faults = FAULT_BIT(FAULT_BLINDED), .hold = hold};
 
 infrared *infrared_of(part *base) { return base->op == &OPERATIONS ? (infrared *)base : NULL; }
 

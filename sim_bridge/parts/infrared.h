@@ -4,6 +4,7 @@
  * (world/sensors/infrared_pair), and it stays low until the carrier has been gone for a few cycles. Light is that of the own
  * LED, thrown back by something within range, or that of another robot's LED (cross-talk), or imagined. Another robot's
  * light arrives one world step late: that is what two boards that run one after the other can know of each other.
+ * Fault: blinded, by light of its carrier: the output is low throughout.
  */
 #ifndef PART_INFRARED_H
 #define PART_INFRARED_H

@@ -23,7 +23,7 @@ static int set_contact(part *base, double value) {
   const int closed = value == 1.0;
   if (closed == p->closed) return 0;
   p->closed = closed;
-  part_bounce(base, now(base) + PART_GUARD, level_of(p, closed), level_of(p, !closed), p->bounce_s);
+  part_bounce(base, &base->noise, now(base) + PART_GUARD, level_of(p, closed), level_of(p, !closed), p->bounce_s);
   return 0;
 }
 

@@ -14,7 +14,10 @@ typedef struct {
 /* Parts of the supply at the node. */
 static double share_at(line_module *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
-  const double share = 1.0 - self->parameters.slope * reflectance_read(&self->sensor, &from, &self->part.noise);
+  const fault *dirty = part_fires(&self->part, FAULT_DIRTY, cycle);
+  double light = reflectance_read(&self->sensor, &from, &self->part.noise);
+  if (dirty != NULL) light *= 1.0 - dirty->value;
+  const double share = 1.0 - self->parameters.slope * light;
   return share < SATURATED ? SATURATED : share;
 }
 
@@ -48,7 +51,8 @@ static int read(part *base, double *values) {
   return 2;
 }
 
-static const part_operations OPERATIONS = {.step = step, .analog = analog, .read = read};
+static const part_operations OPERATIONS = {
+    .step = step, .analog = analog, .read = read, .faults = FAULT_BIT(FAULT_DIRTY)};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   line_module *self = (line_module *)base;

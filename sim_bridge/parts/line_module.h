@@ -3,7 +3,7 @@
  *
  * The phototransistor pulls the node down from the supply by a current in proportion to the floor's reflectance; it
  * saturates at some 0.3 V. An analog output is that voltage. A digital one is a comparator's (LM393), against the module's
- * potentiometer, with a little hysteresis.
+ * potentiometer, with a little hysteresis. Fault: dirty, a share of the light is lost.
  */
 #ifndef PART_LINE_MODULE_H
 #define PART_LINE_MODULE_H

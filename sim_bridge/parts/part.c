@@ -12,15 +12,52 @@ void part_join(part *self, const part_operations *op, const part_place *place, c
   self->overridden = 0;
   self->unplugged = 0;
   self->turret = NULL;
+  self->faults = NULL;
   for (int i = 0; i < PART_PINS; i++) {
     self->pins[i] = i < count ? pins[i] : (part_pin){PART_NO_PIN, 0};
     self->level[i] = BOARD_RELEASED;
   }
 }
 
-static void drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
+static void put(part *self, uint64_t at, uint8_t pin, uint8_t level) {
+  if (at == FAULT_NEVER) return;
   self->chassis->driven[pin] = level;
   self->chassis->board->op->drive(self->chassis->board, at, pin, level);
+}
+
+/* Faults from `f` on take the pin when they begin, and give it back at `level`. */
+static void queue_holds(part *self, fault *f, uint8_t pin, uint8_t level) {
+  for (; f != NULL; f = f->next) {
+    if (f->pin != pin) continue;
+    f->before = level;
+    put(self, f->begin, pin, f->level);
+    put(self, f->end, pin, level);
+  }
+}
+
+static void drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
+  fault *f = self->faults;
+  for (; f != NULL && f->begin <= at; f = f->next) {
+    if (f->pin != pin || at >= f->end) continue;
+    f->fired += level != f->level;
+    at = f->end;
+  }
+  put(self, at, pin, level);
+  queue_holds(self, f, pin, level);
+}
+
+void part_put(part *self, uint64_t at, uint8_t pin, uint8_t level) {
+  if (!self->overridden && !self->unplugged) put(self, at, pin, level);
+}
+
+int part_add_fault(part *self, fault *made) {
+  if (!(self->op->faults & FAULT_BIT(made->kind)) || fault_insert(&self->faults, made) != 0) return -1;
+  if (self->op->hold != NULL) self->op->hold(self, made);
+  for (int i = 0; i < PART_PINS; i++) {
+    if (self->pins[i].pin != made->pin || made->pin == PART_NO_PIN || self->overridden || self->unplugged) continue;
+    queue_holds(self, made, made->pin, self->level[i]);
+  }
+  return 0;
 }
 
 void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
@@ -31,11 +68,10 @@ void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level) {
   if (!self->overridden && !self->unplugged) drive(self, at, pin, level);
 }
 
-void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double mean_s) {
-  noise_source *noise = &self->noise;
+int part_bounce(part *self, noise_source *noise, uint64_t at, uint8_t level, uint8_t before, double mean_s) {
   const uint8_t pin = self->pins[0].pin;
   part_drive(self, at, pin, level);
-  if (mean_s <= 0.0 || !noise->on) return;
+  if (mean_s <= 0.0 || !noise->on) return 0;
   double length = -mean_s * number_log(1.0 - noise_next_uniform(noise));
   if (length > 5.0 * mean_s) length = 5.0 * mean_s;
   const int flicks = (int)(noise_next_uniform(noise) * (BOUNCES_MAXIMUM + 1));
@@ -45,6 +81,7 @@ void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double 
     next += 16.0 + share * 2.0 * noise_next_uniform(noise);
     part_drive(self, (uint64_t)next, pin, (i & 1) ? level : before);
   }
+  return flicks;
 }
 
 void part_unplug(part *self, int unplugged) {
@@ -53,7 +90,11 @@ void part_unplug(part *self, int unplugged) {
   if (self->overridden) return;
   for (int i = 0; i < PART_PINS; i++) {
     if (!(self->pins[i].role & PART_DRIVES) || self->pins[i].pin >= BOARD_PIN_COUNT) continue;
-    drive(self, now, self->pins[i].pin, unplugged ? (uint8_t)BOARD_RELEASED : self->level[i]);
+    if (unplugged) {
+      put(self, now, self->pins[i].pin, BOARD_RELEASED);
+    } else {
+      drive(self, now, self->pins[i].pin, self->level[i]);
+    }
   }
 }
 

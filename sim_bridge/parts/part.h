@@ -17,6 +17,7 @@
 #include "../world/body.h"
 #include "../world/noise.h"
 #include "../world/sensors/beam.h"
+#include "fault.h"
 #include "logs.h"
 
 #define PART_GUARD BOARD_GUARD_CYCLES
@@ -64,6 +65,7 @@ typedef struct {
   double bridges_a;                /* that the H-bridges draw from it in this step, A */
   double motors_a;                 /* that all motors drew in the step before, A */
   int at_charger;                  /* 1: the body stands at a charging station */
+  fault *faults[3];                /* of the left wheel, the right one, the robot */
   uint8_t driven[BOARD_PIN_COUNT]; /* what was driven last, by pin */
   int recording;                   /* 1: looks are logged */
   buffer *tones;                   /* sim_tone */
@@ -104,6 +106,11 @@ typedef struct {
 
   /* A person works it: a button, a knob. Returns 0, or -1: it cannot be set so. */
   int (*set)(part *self, double value);
+
+  uint32_t faults; /* FAULT_BIT of each kind that it can have */
+
+  /* The pin that a fault of its holds, and the level, if it holds one. */
+  void (*hold)(const part *self, fault *f);
 } part_operations;
 
 struct part {
@@ -115,6 +122,7 @@ struct part {
   const part_turret *turret; /* that carries it; NULL: the body does */
   int overridden;            /* 1: a test has its pins; it drives none */
   int unplugged;             /* 1: its plug is out; it neither hears nor drives */
+  fault *faults;             /* NULL: none */
 };
 
 /* Where a part is joined; the loop knows it when the part is made. */
@@ -139,10 +147,29 @@ void part_join(part *self, const part_operations *op, const part_place *place, c
 /* From cycle `at` on the part drives `pin` to LOW, HIGH, or lets go of it. Replaces what was queued from `at` on. */
 void part_drive(part *self, uint64_t at, uint8_t pin, uint8_t level);
 
+/* The same past its faults: by one of them. */
+void part_put(part *self, uint64_t at, uint8_t pin, uint8_t level);
+
+/* The part's fault of that kind that acts at `cycle`, or NULL. */
+static inline fault *part_fault(const part *self, int kind, uint64_t cycle) {
+  return self->faults == NULL ? NULL : fault_find(self->faults, kind, cycle);
+}
+
+/* The same of one that makes a difference there. */
+static inline fault *part_fires(part *self, int kind, uint64_t cycle) {
+  fault *f = part_fault(self, kind, cycle);
+  if (f != NULL) f->fired++;
+  return f;
+}
+
+/* Lays a fault on the part. Returns 0, or -1: it can have none of that kind, or has another one at the same time. */
+int part_add_fault(part *self, fault *made);
+
 /* A contact at its first pin changes that from level `before` to `level`, and bounces: it flicks back up to four times, each
  * number as likely, in steps that are on average an eighth of an exponential length (s, mean), cut at five times that. So
- * the last edge comes after half of that length on average. Without noise, or by a mean of 0: not at all. */
-void part_bounce(part *self, uint64_t at, uint8_t level, uint8_t before, double mean_s);
+ * the last edge comes after half of that length on average. Without noise, or by a mean of 0: not at all. Returns how
+ * often it flicks. */
+int part_bounce(part *self, noise_source *noise, uint64_t at, uint8_t level, uint8_t before, double mean_s);
 
 /* All that it does with that pin. */
 static inline unsigned part_role(const part *self, uint8_t pin) {

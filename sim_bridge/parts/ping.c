@@ -13,15 +13,23 @@ static uint64_t echo(ping *self, const viewpoint *from) {
   return cycles < self->shortest ? self->shortest : (cycles > self->nothing ? self->nothing : cycles);
 }
 
+/* An echo pulse that begins at `start`. Returns when it ends. */
+static uint64_t pulse(ping *self, uint64_t start, uint64_t length) {
+  part_drive(&self->part, start, self->echo_pin, BOARD_HIGH);
+  part_drive(&self->part, start + length, self->echo_pin, BOARD_LOW);
+  return start + length;
+}
+
 /* A trigger ended at `cycle`. */
 static void answer(ping *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
-  const uint64_t start = cycle + self->delay;
-  const uint64_t end = start + (self->answer >= 0 ? (uint64_t)self->answer : echo(self, &from));
+  const uint64_t length = self->answer >= 0 ? (uint64_t)self->answer : echo(self, &from);
   part_log_look(&self->part, cycle, LOOK_PING, &from, &self->mount, self->sonar.range_maximum, self->distance);
-  if (self->answer == PING_ANSWER_NONE) return;
-  part_drive(&self->part, start, self->echo_pin, BOARD_HIGH);
-  part_drive(&self->part, end, self->echo_pin, BOARD_LOW);
+  if (self->answer == PING_ANSWER_NONE || part_fires(&self->part, FAULT_MISSING, cycle) != NULL) return;
+  const fault *late = part_fires(&self->part, FAULT_LATE, cycle);
+  const fault *doubled = part_fires(&self->part, FAULT_DOUBLED, cycle);
+  uint64_t end = pulse(self, cycle + self->delay + (late == NULL ? 0u : cycles_of(late->value)), length);
+  if (doubled != NULL) end = pulse(self, end + cycles_of(doubled->value), length);
   if (self->idle_level != BOARD_LOW) part_drive(&self->part, end + self->rest / 2, self->echo_pin, self->idle_level);
   self->ready = end + self->rest;
   self->ping_cycle = cycle;
@@ -44,7 +52,11 @@ static int read(part *base, double *values) {
   return 2;
 }
 
-static const part_operations OPERATIONS = {.edge = edge, .read = read};
+static const part_operations OPERATIONS = {
+    .edge = edge,
+    .read = read,
+    .faults = FAULT_BIT(FAULT_MISSING) | FAULT_BIT(FAULT_LATE) | FAULT_BIT(FAULT_DOUBLED),
+};
 
 ping *ping_of(part *base) { return base->op == &OPERATIONS ? (ping *)base : NULL; }
 

@@ -9,6 +9,7 @@
  *                           burst takes 200)                       eight cycles of 40 kHz go out, is in no sheet
  *
  * Triggers are not heard while the echo pulse lasts.
+ * Faults, of triggers that end while they act: missing, no pulse; late, by s; doubled, the same pulse again s after its end.
  */
 #ifndef PART_PING_H
 #define PART_PING_H

@@ -4,7 +4,11 @@
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   servo *self = (servo *)base;
   if (!part_pulse_ends(&self->pulse, cycle, level)) return;
-  const double width = (double)(cycle - self->pulse.rise) * (1e6 / BOARD_CLOCK_HZ);
+  double width = (double)(cycle - self->pulse.rise) * (1e6 / BOARD_CLOCK_HZ);
+  if (part_fires(base, FAULT_DEAD, cycle) != NULL) return;
+  if (part_fires(base, FAULT_REVERSED, cycle) != NULL) width = 2.0 * self->parameters.centre_us - width;
+  const fault *offset = part_fires(base, FAULT_OFFSET, cycle);
+  if (offset != NULL) width += offset->value;
   if (servo_motor_pulse(&self->parameters, &self->motor, width)) self->pulses++;
 }
 
@@ -14,9 +18,17 @@ static void before_step(part *base) {
   chassis_wheel *wheel = &base->chassis->wheel[self->side];
   wheel->powered = self->pulses > 0;
   wheel->torque = servo_motor_torque(&self->parameters, &self->motor, wheel->speed, base->chassis->servo_supply);
+  fault *weak = part_fault(base, FAULT_WEAK, base->chassis->since);
+  if (weak == NULL) return;
+  weak->fired += wheel->torque != 0.0;
+  wheel->torque *= weak->value;
 }
 
-static const part_operations OPERATIONS = {.edge = edge, .before_step = before_step};
+static const part_operations OPERATIONS = {
+    .edge = edge,
+    .before_step = before_step,
+    .faults = FAULT_BIT(FAULT_DEAD) | FAULT_BIT(FAULT_WEAK) | FAULT_BIT(FAULT_OFFSET) | FAULT_BIT(FAULT_REVERSED),
+};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   servo *self = (servo *)base;

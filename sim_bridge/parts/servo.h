@@ -1,6 +1,8 @@
 /* servo.h: the pin of a continuous-rotation servo: it measures the width of each pulse, which the motor behind it takes.
  *
  * A pulse counts at its falling edge. What the servo then does is world/servo_motor; a wheel is on its shaft.
+ * Faults: dead, it hears no pulse; reversed, pulses mirrored about the one at which it stands; offset, pulses longer by us;
+ * weak, that share of its torque.
  */
 #ifndef PART_SERVO_H
 #define PART_SERVO_H

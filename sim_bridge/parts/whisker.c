@@ -10,7 +10,18 @@ static void step(part *base) {
   if (pressed == self->pressed) return;
   self->pressed = pressed;
   const uint8_t level = pressed ? BOARD_LOW : BOARD_HIGH;
-  part_bounce(base, part_step_end(base) + PART_GUARD, level, (uint8_t)!level, p->bounce_s);
+  const uint64_t at = part_step_end(base) + PART_GUARD;
+  part_bounce(base, &base->noise, at, level, (uint8_t)!level, p->bounce_s);
+  fault *bouncing = part_fault(base, FAULT_BOUNCING, at);
+  if (bouncing == NULL) return;
+  noise_source draws = fault_noise(bouncing, at);
+  bouncing->fired += part_bounce(base, &draws, at, level, (uint8_t)!level, bouncing->value) > 0;
+}
+
+static void hold(const part *base, fault *f) {
+  if (f->kind != FAULT_STUCK) return;
+  f->pin = base->pins[0].pin;
+  f->level = f->value > 0.0 ? BOARD_LOW : BOARD_HIGH;
 }
 
 static int read(part *base, double *values) {
@@ -18,7 +29,8 @@ static int read(part *base, double *values) {
   return 1;
 }
 
-static const part_operations OPERATIONS = {.step = step, .read = read};
+static const part_operations OPERATIONS = {
+    .step = step, .read = read, .faults = FAULT_BIT(FAULT_STUCK) | FAULT_BIT(FAULT_BOUNCING), .hold = hold};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   whisker *self = (whisker *)base;

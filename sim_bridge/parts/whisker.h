@@ -2,6 +2,7 @@
  *
  * The wire is a segment on the body. The switch bounces: for some milliseconds after a change its contact opens and closes a
  * few times.
+ * Faults: stuck, open (0) or pressed (1), whatever bends it; bouncing, by a mean in s (part_bounce).
  */
 #ifndef PART_WHISKER_H
 #define PART_WHISKER_H

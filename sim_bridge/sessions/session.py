@@ -7,17 +7,17 @@ somebody reads or writes.
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Callable, Mapping
 
 from boebot.boards import PinNow, TruthNow, WatchdogReset
 from boebot.description import robots
 from boebot.devices.uart import Uart
-from boebot.errors import BoardError
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.pins import BoardPins, PinRecorder
 from sim_bridge.sessions.board_faults import KINDS
-from sim_bridge.sim import SimRobot
+from sim_bridge.sim import NEVER, SimRobot
 from sim_bridge.vehicles import STEP_S
 
 NEVER_S = 1e9
@@ -57,7 +57,8 @@ class InWorld:
 
     def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
         """See `boebot.boards.Session`."""
-        raise BoardError(f"the simulated robot {self.robot.description.name!r} has no fault {owner}.{kind}")
+        begin, end = (NEVER if at == math.inf else round(at * CLOCK_HZ) for at in (begin_s, end_s))
+        return self.robot.fault(owner, kind, value, begin, end)
 
     def place(self, x: float, y: float, heading: float) -> None:
         """Lifts the robot and puts it there, at rest."""

@@ -78,6 +78,14 @@ typedef struct {
   uint32_t discs[BODY_DISCS_CAPACITY];
 } body_surroundings;
 
+/* What is wrong with it in the step under way; all 0: nothing. Wheels left, right. */
+typedef struct {
+  int lifted;     /* held off the floor: the pose stays, wheels turn freely */
+  int blocked[2]; /* the wheel cannot turn */
+  int slippery;   /* 1: `grip` limits the tyres' grip */
+  double grip[2];
+} body_faults;
+
 typedef struct {
   body_parameters parameters;
   uint32_t id;          /* of the mover that it is; different for all robots of a world */
@@ -94,6 +102,7 @@ typedef struct {
   double mass, inertia; /* of body and wheels without the wheels' turning: what a force on a slipping body meets */
   double half_load;     /* on a wheel, N */
   body_state state;
+  body_faults faults;
   body_surroundings near;
 } body;
 

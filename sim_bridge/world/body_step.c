@@ -46,12 +46,27 @@ static void hold_across(body *self, const scene *around, const double limits[2],
   }
 }
 
+/* Off the floor the wheels turn by their torques alone. */
+static void spin(body *self, const double torque[2], double dt) {
+  body_state *s = &self->state;
+  const double gain = dt * self->per_radius / self->slip_spin;
+  s->rim_left = self->faults.blocked[0] ? 0.0 : number_limited(s->rim_left + gain * torque[0], 10.0 * SPEED_LIMIT);
+  s->rim_right = self->faults.blocked[1] ? 0.0 : number_limited(s->rim_right + gain * torque[1], 10.0 * SPEED_LIMIT);
+  s->speed = s->turn_rate = s->lateral = 0.0;
+  s->slipping = 1;
+}
+
 /* New speeds by the torques. */
 static void drive(body *self, const scene *around, const double torque[2], double dt) {
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   double limits[2] = {0.0, 0.0};
-  if (!s->slipping && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
+  if (self->faults.lifted) {
+    spin(self, torque, dt);
+    return;
+  }
+  const int blocked = self->faults.blocked[0] | self->faults.blocked[1];
+  if (!s->slipping && !blocked && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
     /* (2.31), (2.32), (3.16), (3.17) */
     const double force = self->force_gain * (torque[0] + torque[1]) - self->drag * s->speed;
     const double moment = self->torque_gain * (torque[1] - torque[0]) - self->turn_drag * s->turn_rate;

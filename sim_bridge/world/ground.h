@@ -5,7 +5,7 @@
  * floor pulls against the slip, F = -grip N s / |s| with s the velocity of the tyre's print over the floor. A step solves
  * both wheels together for the impulses that leave the least energy, which is that law with the slip at the step's
  * end: stable at any step, and it never adds energy. With `slip` off the wheels always roll, and only the speed across
- * the heading is held by friction.
+ * the heading is held by friction. A wheel that is blocked is one whose rim stands still whatever the floor does to it.
  */
 #ifndef WORLD_GROUND_H
 #define WORLD_GROUND_H
@@ -25,6 +25,9 @@ static inline void ground_limits(const body *self, const arena *where, double li
   const double dy = self->parameters.half_track * s->cosine;
   limits[0] = self->half_load * arena_grip(where, s->x + dx, s->y + dy, grip);
   limits[1] = self->half_load * arena_grip(where, s->x - dx, s->y - dy, grip);
+  if (self->faults.slippery) {
+    for (int i = 0; i < 2; i++) limits[i] = fmin(limits[i], self->half_load * self->faults.grip[i]);
+  }
 }
 
 /* 1 if the tyres hold while the body, that rolls, comes to these speeds within `dt` under these torques. */

@@ -11,13 +11,17 @@ double supply_servo_current(const supply_parameters *p, int pulsed, double speed
   return current;
 }
 
-static void load(const supply_parameters *p, supply *self, double current) {
-  self->pack_v = p->empty_v + (p->full_v - p->empty_v) * self->charge - p->resistance_ohm * current;
-  if (self->pack_v < 0.0) self->pack_v = 0.0;
+void supply_sag(const supply_parameters *p, supply *self, double pack_v) {
+  self->pack_v = pack_v;
   self->board_v = self->pack_v - p->drop_out_v;
   if (self->board_v > SUPPLY_NOMINAL_V) self->board_v = SUPPLY_NOMINAL_V;
   if (self->board_v < 0.0) self->board_v = 0.0;
   self->servo_v = p->unregulated != 0.0 ? self->pack_v : self->board_v;
+}
+
+static void load(const supply_parameters *p, supply *self, double current) {
+  const double pack_v = p->empty_v + (p->full_v - p->empty_v) * self->charge - p->resistance_ohm * current;
+  supply_sag(p, self, pack_v < 0.0 ? 0.0 : pack_v);
 }
 
 void supply_init(const supply_parameters *p, supply *self, double charge) {

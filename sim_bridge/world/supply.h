@@ -38,6 +38,9 @@ void supply_init(const supply_parameters *p, supply *self, double charge);
 /* `dt` seconds under the load of all motors, A; `at_charger`: the robot stands at a charging station. */
 void supply_step(const supply_parameters *p, supply *self, double motors_a, int at_charger, double dt);
 
+/* That voltage at the pack's terminals, and what the rails have then. */
+void supply_sag(const supply_parameters *p, supply *self, double pack_v);
+
 /* An energy E in [0, 1], the kit's own: it falls by p_0 and by p_m per motor signal, and rises by p_c at a charger, all
  * 1/s. Returns E after `dt`. */
 typedef struct {

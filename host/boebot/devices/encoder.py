@@ -17,13 +17,25 @@ such as 2 and 3 for attachInterrupt.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
 
-from boebot.devices.device import ANALOG_PINS, FIVE_VOLTS, GROUND, Checkup, Column, Device, Place, Reader, Run, Wire
+from boebot.devices.device import (
+    ANALOG_PINS,
+    FIVE_VOLTS,
+    GROUND,
+    Checkup,
+    Column,
+    Device,
+    FaultKind,
+    Place,
+    Reader,
+    Run,
+    Wire,
+)
 from boebot.link.messages import Status, Telemetry
 
 EDGE_PERIOD_SCALE = 16e-6  # seconds per count of the edge periods on the wire
@@ -57,6 +69,12 @@ class WheelEncoder(Device, frozen=True, kw_only=True):
     NAMES: ClassVar[tuple[str, ...]] = ("encoder_left", "encoder_right")
     NEEDS: ClassVar[dict[str, str]] = {"pin-change interrupt of port C": "encoders"}
     LINES: ClassVar[int]
+
+    FAULTS: ClassVar[Mapping[str, FaultKind]] = {
+        "missing": FaultKind("this share of the edges is not seen", default=1.0),
+        "extra": FaultKind("after this share of the edges the line flickers", default=1.0),
+        "noisy": FaultKind("a square wave is on its first line", "Hz", default=100e3, least=1.0, most=1e6),
+    }
 
     def metres_per_edge(self, wheel_radius_m: float) -> float:
         """What the wheel rolls from one edge to the next (m)."""

@@ -21,6 +21,7 @@ import math
 from typing import ClassVar, Literal
 
 from boebot.devices.device import FIVE_VOLTS, GROUND, PACK, Device, NotNegative, Positive, Wire
+from boebot.devices.faults import MOTOR_FAULTS
 
 
 class HBridge(Device, tag="h_bridge", frozen=True, kw_only=True):
@@ -41,6 +42,7 @@ class HBridge(Device, tag="h_bridge", frozen=True, kw_only=True):
 
     PINS: ClassVar[dict[str, str]] = {"in1_pin": "in1", "in2_pin": "in2", "enable_pin": "enable"}
     HEARS: ClassVar[frozenset[str]] = frozenset(PINS)
+    FAULTS: ClassVar = MOTOR_FAULTS
     COLUMNS: ClassVar = (("current", "a", 4),)
     SHOWN: ClassVar = ("current", "A", 1.0, 2)
 

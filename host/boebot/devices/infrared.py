@@ -34,6 +34,7 @@ from boebot.devices.device import (
     Checkup,
     Column,
     Device,
+    FaultKind,
     NotNegative,
     Opening,
     Place,
@@ -97,6 +98,7 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
         Wire(GROUND, "receiver ground"),
     )
     NEEDS: ClassVar[dict[str, str]] = {"Timer2": "infra-red carrier"}
+    FAULTS: ClassVar = {"blinded": FaultKind("light of its carrier shines into the receiver throughout")}
 
     def checkup(self, readings: Sequence[Infrared]) -> Checkup:
         """See `Device`."""

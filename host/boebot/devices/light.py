@@ -33,6 +33,7 @@ from boebot.devices.device import (
     SlowDevice,
     Wire,
 )
+from boebot.devices.faults import DIRTY
 
 LONGEST_US = 14_000  # on the wire: this time or longer
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -65,6 +66,7 @@ class LightSensor(SlowDevice, tag="light_sensor", frozen=True, kw_only=True):
     GROUP: ClassVar[str] = "lights"
     NAMES: ClassVar[tuple[str, ...]] = ("light_left", "light_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    FAULTS: ClassVar = DIRTY
     WIRES: ClassVar[tuple[Wire, ...]] = (
         Wire("pin", "collector", part="1 kΩ"),
         Wire(GROUND, "collector", part="0.1 µF"),

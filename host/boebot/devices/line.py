@@ -36,6 +36,7 @@ from boebot.devices.device import (
     Wire,
     pin_number,
 )
+from boebot.devices.faults import DIRTY
 from boebot.link.messages import LineTelemetry
 
 FRAME_TICKS = 2  # one reading in each servo frame
@@ -77,6 +78,7 @@ class LineSensor(SlowDevice, tag="line_sensor", frozen=True, kw_only=True):
     MESSAGE: ClassVar[type] = LineTelemetry
     AGE: ClassVar[str] = "line_age"
     PERIOD_TICKS: ClassVar[int] = FRAME_TICKS
+    FAULTS: ClassVar = DIRTY
     COLUMNS: ClassVar = (("decay_time", "s", 6),)
     SHOWN: ClassVar = ("decay_time", "ms", 1e3, 3)
 
@@ -125,6 +127,7 @@ class LineModule(Device, tag="line_module", frozen=True, kw_only=True):
 
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "OUT"), Wire(FIVE_VOLTS, "VCC"), Wire(GROUND, "GND"))
+    FAULTS: ClassVar = DIRTY
     COLUMNS: ClassVar = (("voltage", "v", 3), ("dark", "", None))
     SHOWN: ClassVar = ("voltage", "V", 1.0, 2)
     SIGN: ClassVar = ("dark", "ink")

@@ -35,6 +35,7 @@ from boebot.devices.device import (
     Checkup,
     Column,
     Device,
+    FaultKind,
     NotNegative,
     Opening,
     Place,
@@ -54,6 +55,12 @@ SPEED_OF_SOUND = 331.5 + 0.6 * TEMPERATURE_C  # m/s, in air
 METRES_PER_US = SPEED_OF_SOUND / 2 * 1e-6
 _SHADE, _ECHO = 0.10, 0.14
 SHOWN: Final = ("distance", "m", 1.0, 2)
+FAULTS: Final = {
+    "missing": FaultKind("no echo pulse comes"),
+    "late": FaultKind("the echo pulse begins later by this", "s", default=0.01, most=1.0),
+    "doubled": FaultKind("so long after its end the echo pulse comes again", "s", default=0.001, least=1e-6, most=1.0),
+}
+"""Of every range finder at a board."""
 
 
 class RangeFinder(Protocol):
@@ -136,6 +143,7 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
     WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "SIG"), Wire(FIVE_VOLTS, "5 V"), Wire(GROUND, "GND"))
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 input capture": ""}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8,)}
+    FAULTS: ClassVar = FAULTS
 
     def _echo_range_us(self) -> tuple[float, float]:
         """The range's ends on the wire. A Ping that hears nothing ends its pulse after 18.5 ms, as if at 3.18 m."""

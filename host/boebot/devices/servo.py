@@ -20,7 +20,8 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import SERVO_CABLE, Checkup, Column, Device, Place, Reader, Run, Wire
+from boebot.devices.device import SERVO_CABLE, Checkup, Column, Device, FaultKind, Place, Reader, Run, Wire
+from boebot.devices.faults import MOTOR_FAULTS
 from boebot.link.messages import Telemetry
 
 PULSE_SCALE_US = 0.0625  # microseconds per count of the pulse widths on the wire
@@ -55,6 +56,10 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+    FAULTS: ClassVar = {
+        **MOTOR_FAULTS,
+        "offset": FaultKind("it takes pulses for longer by this", "us", default=30.0, least=-500.0, most=500.0),
+    }
 
     def checkup(self, readings: Sequence[Servo]) -> Checkup:
         """See `Device`."""

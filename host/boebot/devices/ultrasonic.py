@@ -17,7 +17,7 @@ from typing import ClassVar
 
 from boebot.devices.device import FIVE_VOLTS, GROUND, Angle, Column, Device, Opening, Place, Point, Positive, Run, Wire
 from boebot.devices.drawing import Item
-from boebot.devices.ping import SHOWN, beam, range_fault, shown_columns
+from boebot.devices.ping import FAULTS, SHOWN, beam, range_fault, shown_columns
 
 
 class UltrasonicSensor(Device, tag="ultrasonic", frozen=True, kw_only=True):
@@ -40,6 +40,7 @@ class UltrasonicSensor(Device, tag="ultrasonic", frozen=True, kw_only=True):
         Wire(GROUND, "GND"),
     )
     SHOWN: ClassVar = SHOWN
+    FAULTS: ClassVar = FAULTS
 
     def fault(self) -> tuple[str, str] | None:
         """See `Device`."""

@@ -24,6 +24,7 @@ from boebot.devices.device import (
     Checkup,
     Column,
     Device,
+    FaultKind,
     Place,
     Point,
     Reader,
@@ -68,6 +69,10 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
         Wire(FIVE_VOLTS, "post", part="10 kΩ"),
         Wire(GROUND, "whisker", part="its screw"),
     )
+    FAULTS: ClassVar = {
+        "stuck": FaultKind("the contact is stuck", words=("open", "pressed")),
+        "bouncing": FaultKind("the contact bounces for so long on average", "s", default=0.02, most=1.0),
+    }
 
     def checkup(self, readings: Sequence[Whisker]) -> Checkup:
         """See `Device`."""
