@@ -74,7 +74,8 @@ class Image:
     flash_bytes: int  # written to flash: code, constants, initial values of variables
     ram_bytes: int  # of all variables
     stack_start: int  # first value of the stack pointer
-    lines: dict[int, str] = field(default_factory=dict)
+    lines: dict[int, str] = field(default_factory=dict)  # "file.c:123" by address, where that is known
+    sources: dict[int, tuple[str, int]] = field(default_factory=dict)  # the same with the file's folders
     bounds: tuple[LoopBound, ...] = ()
     assumed_chip: str = ""  # for people, where the file does not say for which chip it is
 
@@ -105,6 +106,7 @@ def _image(path: Path, data: bytes, assumed: str) -> Image:
         raise AnalysisError(f"{path} is not linked ({elf['e_type']}): an image as it is written to flash is expected")
     code, written = _flash(path, elf)
     symbols, stack_start = _symbols(elf)
+    sources = _sources(elf, len(code))
     return Image(
         path=str(path),
         code=code,
@@ -114,13 +116,14 @@ def _image(path: Path, data: bytes, assumed: str) -> Image:
         flash_bytes=written,
         ram_bytes=_ram(elf),
         stack_start=stack_start,
-        lines=_lines(elf, len(code)),
+        lines={address: f"{file.rpartition('/')[2]}:{line}" for address, (file, line) in sources.items()},
+        sources=sources,
         bounds=_bounds(path, section_of(data, LOOPS), len(code)),
         assumed_chip=assumed,
     )
 
 
-def _lines(elf: ELFFile, end: int) -> dict[int, str]:
+def _sources(elf: ELFFile, end: int) -> dict[int, tuple[str, int]]:
     """The source lines; none where the debugging information is not one that pyelftools reads. The program is all the
     same what it is."""
     try:

@@ -1,4 +1,4 @@
-"""Where an address of a program is, for people: its function and source line."""
+"""Where an address of a program is, for people: its function and source line; and which labels are of a function."""
 
 from __future__ import annotations
 
@@ -22,3 +22,12 @@ def place(image: Image, address: int) -> str:
     line = image.lines.get(address & ~1)
     parts = [f"in {within[-1].partition('.')[0]}" if within else "", f"({line})" if line else ""]
     return " ".join(part for part in parts if part)
+
+
+def is_of(label: str, name: str) -> bool:
+    """A name in the image is that of a function of the source: the compiler may have made a copy of it, or a part, with
+    more behind its name (`f.lto_priv.3`, `f.constprop.0`, `f.part.1`); names of C++ (`pulse`, `Servo::write`) have
+    lengths before them and types behind (Itanium C++ ABI, 5.1)."""
+    coded = "".join(f"{len(word)}{word}" for word in name.split("::"))
+    cpp = (f"_ZN{coded}E", f"_ZNK{coded}E") if "::" in name else (f"_Z{coded}", f"_ZL{coded}")
+    return label == name or label.startswith((f"{name}.", *cpp))

@@ -1,0 +1,83 @@
+"""A variable of the program that runs on an emulated board: its value in RAM, read and set by its name in the source.
+
+What RAM holds may be older than what the program works with, which it keeps in registers for a while; and a variable of
+several bytes that is set between two of the program's accesses to it is half old and half new there. `volatile` ones
+are read and written where the source says so.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boebot.errors import CallError
+from boebot.image.data import Variable
+from sim_bridge.boards.board import BoardMemory
+
+
+class Symbol:
+    """A variable of a board's memory."""
+
+    def __init__(self, memory: BoardMemory, variable: Variable) -> None:
+        """Raises CallError where the type of the variable has no size that the image says."""
+        if variable.dtype.itemsize == 0:
+            raise CallError(
+                f"{variable.name} is of a type whose size the image does not say; expected another variable"
+            )
+        self.variable = variable
+        self._memory = memory
+
+    @property
+    def value(self) -> Any:
+        """A number, an array of numpy, or bytes of what is neither."""
+        return _plain(self._cells()[0])
+
+    @value.setter
+    def value(self, value: Any) -> None:
+        """Raises CallError where it does not fit."""
+        cells = self._cells()
+        self._put(cells, cells, 0, value)
+
+    def __getitem__(self, index: Any) -> Any:
+        """An element of an array. Raises CallError: there is none."""
+        return _plain(self._cells()[0][self._checked(index)])
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        """Raises CallError where there is none, or it does not fit."""
+        cells = self._cells()
+        self._put(cells, cells[0], self._checked(index), value)
+
+    def _cells(self) -> NDArray[Any]:
+        """An array of one: the variable, as its bytes are now."""
+        data = bytearray(self._memory.read_memory(self.variable.address, self.variable.dtype.itemsize))
+        return np.frombuffer(data, self.variable.dtype)
+
+    def _checked(self, index: Any) -> Any:
+        try:
+            np.empty(self.variable.dtype.shape)[index]
+        except IndexError as error:
+            raise CallError(f"{self.variable.name}[{index!r}]: {str(error).rstrip('.')}; expected an element") from None
+        return index
+
+    def _put(self, cells: NDArray[Any], holder: NDArray[Any], at: Any, value: Any) -> None:
+        """Into what `cells` shows, at a place, and from there to the board."""
+        kind, shape = holder[at].dtype, np.shape(holder[at])
+        try:
+            holder[at] = value
+            fits = np.shape(value) == shape and (kind.kind not in "iub" or np.array_equal(holder[at], value))
+        except (OverflowError, ValueError, TypeError):
+            fits = False
+        if not fits:
+            expected = (
+                f"{np.iinfo(kind).min} to {np.iinfo(kind).max}" if kind.kind in "iu" else f"a value of type {kind}"
+            )
+            each = f"an array {shape} of " if shape else ""
+            raise CallError(f"{self.variable.name}: {value!r} does not fit; expected {each}{expected}")
+        self._memory.write_memory(self.variable.address, cells.tobytes())
+
+
+def _plain(value: Any) -> Any:
+    """As Python has it, where numpy has one number."""
+    return value.tobytes() if isinstance(value, np.void) else value.item() if isinstance(value, np.generic) else value
