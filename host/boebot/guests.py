@@ -9,6 +9,7 @@
                                                      of that name for robots, by their numbers, into a folder
     boebot.records    a foreign record, by suffix    boebot.guests.ReadRecord
     boebot.checks     what cannot be in time         boebot.running.tasks.Check
+    boebot.bounds     what functions take at most    boebot.guests.BoundsOf
 
 Nothing of a guest is imported before it is asked for. The entry points are looked up once per process; names of the
 core come before those of guests.
@@ -16,7 +17,7 @@ core come before those of guests.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -25,8 +26,8 @@ from typing import Any, NamedTuple, Protocol
 
 from boebot.errors import BoebotError
 
-PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS = (
-    f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records", "checks")
+PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS, BOUNDS = (
+    f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records", "checks", "bounds")
 )
 
 
@@ -50,6 +51,14 @@ class ReadRecord(Protocol):
         Raises:
             BoebotError: it cannot be read.
         """
+
+
+class BoundsOf(Protocol):
+    """Works out how long functions of a program for the ATmega328P can take."""
+
+    def __call__(self, image: Path, entries: Collection[int]) -> Mapping[int, int | str]:
+        """For each function of an ELF file, by its first address: the most cycles from its first instruction to the
+        end of its return, interrupts aside; or a sentence why there is no bound."""
 
 
 class Guest(NamedTuple):

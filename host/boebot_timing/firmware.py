@@ -13,8 +13,9 @@ from avr_timing.flow.graph import program_of
 from avr_timing.interrupts.interrupts_off import InterruptsOff
 from avr_timing.interrupts.latency import Latencies
 from avr_timing.program import Program
-from boebot.errors import TimingError
+from boebot.errors import AnalysisError, TimingError
 from boebot.image.elf import Image, read_image
+from boebot.image.places import is_of
 from boebot_timing.loads import APART, NEVER_NEAR, SLOT, TICK
 from boebot_timing.table import Constants, Table, read_table
 
@@ -48,11 +49,8 @@ class Firmware:
 
     def entry_of(self, name: str) -> int | None:
         """Of a function of the source; the compiler may have added to its name. None: there is none, or several."""
-        by_name = self.program.by_name
-        if name in by_name:
-            return by_name[name]
-        found = [entry for other, entry in by_name.items() if other.startswith(f"{name}.")]
-        return found[0] if len(found) == 1 else None
+        found = {other: entry for other, entry in self.program.by_name.items() if is_of(other, name)}
+        return found.get(name, next(iter(found.values())) if len(found) == 1 else None)
 
     def entries_of(self, names: Collection[str]) -> list[int]:
         """Of those of these functions that the image has."""
@@ -75,6 +73,24 @@ def load_firmware(path: Path) -> Firmware:
     """
     image = read_image(path)
     return Firmware(image, program_of(image), read_table(path))
+
+
+def bounds_of(path: Path, entries: Collection[int]) -> dict[int, int | str]:
+    """For those who ask by the entry point `boebot.bounds` (boebot.guests.BoundsOf): of whatever program."""
+    try:
+        worst = WorstCase(program_of(read_image(path)))
+    except AnalysisError as error:
+        return dict.fromkeys(entries, str(error))
+    return {entry: _bound_of(worst, entry) for entry in entries}
+
+
+def _bound_of(worst: WorstCase, entry: int) -> int | str:
+    if entry not in worst.program.functions:
+        return f"the function at 0x{entry:04X} is called by no address that stands in the program"
+    try:
+        return worst.bound(entry).cycles
+    except AnalysisError as error:
+        return str(error)
 
 
 def check(firmware: Firmware) -> None:

@@ -33,6 +33,9 @@ SPAN = np.dtype(  # avr_span of avr_spans.h; cycles
         ("depth", "<u2"),
     ]
 )
+EXTREMES = np.dtype(  # avr_extremes of avr_spans.h; cycles
+    [(name, "<u8") for name in ("calls", "shortest", "longest", "shortest_at", "longest_at")]
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +46,12 @@ class Watch:
         functions: entries, in bytes, of the functions whose spans are recorded; ids are FUNCTION_IDS, FUNCTION_IDS + 1,
             ...
         patience: cycles without sleep after which the program hangs; 0: any number.
+        only_extremes: of each function how often it was called, its shortest and its longest call, and no spans.
     """
 
     functions: Sequence[int] = ()
     patience: int = 0
+    only_extremes: bool = False
 
 
 def _extension() -> Any:
@@ -62,6 +67,8 @@ def _extension() -> Any:
 
 class AvrBoard(EmulatedBoard):
     """An emulated Arduino Uno. `assumed`: a sentence where its program does not say for which chip it is, or ""."""
+
+    _watched = 0  # functions that are recorded
 
     def __init__(self, program: Program) -> None:
         """Powers on a board with that program in flash."""
@@ -108,12 +115,13 @@ class AvrBoard(EmulatedBoard):
             BoardError: too many functions, or one that begins at no address of flash.
         """
         entries = self.ffi.new("uint32_t[]", list(watch.functions))
-        what = self.ffi.new("avr_watch *", (entries, len(watch.functions), watch.patience))
+        what = self.ffi.new("avr_watch *", (entries, len(watch.functions), watch.patience, watch.only_extremes))
         if not self.lib.avr_board_record(self.handle, what):
             raise BoardError(
                 f"record: {len(watch.functions)} functions; expected even addresses below 0x8000, at most "
                 f"{self.lib.AVR_FUNCTIONS_MAXIMUM} of them"
             )
+        self._watched = len(watch.functions)
 
     def stop_recording(self) -> None:
         """Forgets all that was recorded; the board is as fast as before."""
@@ -127,6 +135,11 @@ class AvrBoard(EmulatedBoard):
         found = np.frombuffer(self.ffi.buffer(spans, size)[:] if size else b"", dtype=SPAN)
         self.lib.avr_board_forget_spans(self.handle)
         return found[np.argsort(found["begin"], kind="stable")]
+
+    def extremes(self) -> NDArray[Any]:
+        """Of each function of the watch, which asks for them, what was seen so far (dtype EXTREMES)."""
+        found, size = self.lib.avr_board_extremes(self.handle), self._watched * EXTREMES.itemsize
+        return np.frombuffer(self.ffi.buffer(found, size)[:] if found and size else b"", dtype=EXTREMES)
 
     @property
     def lowest_stack(self) -> int:

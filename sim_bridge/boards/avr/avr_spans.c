@@ -31,6 +31,8 @@ typedef struct avr_recorder {
   uint64_t patience;
   avr_span *spans;
   size_t first, end, capacity;
+  bool only_extremes;
+  avr_extremes extremes[AVR_FUNCTIONS_MAXIMUM];
   open_span open[OPEN_MAXIMUM];
   unsigned open_count;
   uint64_t request[VECTOR_TWI + 1], next_request[VECTOR_TWI + 1]; /* since when each interrupt is wanted, or NEVER */
@@ -42,7 +44,17 @@ typedef struct avr_recorder {
 
 /* ---- spans ---- */
 
-static void keep(avr_recorder *r, const avr_span *span) {
+static void keep_extremes(avr_extremes *e, uint64_t begin, uint64_t net) {
+  if (!e->calls || net < e->shortest) e->shortest = net, e->shortest_at = begin;
+  if (!e->calls || net > e->longest) e->longest = net, e->longest_at = begin;
+  e->calls++;
+}
+
+static void keep(avr_recorder *r, const avr_span *span, uint64_t net) {
+  if (r->only_extremes) {
+    if (span->id >= AVR_FUNCTION_IDS) keep_extremes(&r->extremes[span->id - AVR_FUNCTION_IDS], span->begin, net);
+    return;
+  }
   r->spans = board_room_for(r->spans, sizeof *r->spans, &r->first, &r->end, &r->capacity, 1);
   r->spans[r->end++] = *span;
 }
@@ -64,7 +76,7 @@ static void close_one(avr_board *b) {
   uint64_t gross = b->avr->cycle - ended->span.begin;
   ended->span.gross = (uint32_t)gross;
   ended->span.net = (uint32_t)(gross - ended->interrupted);
-  keep(r, &ended->span);
+  keep(r, &ended->span, gross - ended->interrupted);
   if (ended->span.id >= AVR_FUNCTION_IDS) return;
   /* An interrupt below takes it off itself, and hands on what it takes in all. */
   for (unsigned i = r->open_count; i-- > 0;) {
@@ -199,6 +211,7 @@ bool avr_board_record(board *self, const avr_watch *watch) {
     r->stops.marked[watch->entries[i] / 2] = (uint8_t)(i + 1);
   }
   r->patience = watch->patience;
+  r->only_extremes = watch->only_extremes;
   r->lowest_stack = _avr_sp_get(b->avr);
   spans_free(b);
   b->recorder = r;
@@ -219,6 +232,11 @@ const avr_span *avr_board_spans(const board *self, size_t *count) {
 void avr_board_forget_spans(board *self) {
   avr_recorder *r = ((avr_board *)self)->recorder;
   if (r) r->end = 0;
+}
+
+const avr_extremes *avr_board_extremes(const board *self) {
+  const avr_recorder *r = ((const avr_board *)self)->recorder;
+  return r && r->only_extremes ? r->extremes : NULL;
 }
 
 uint16_t avr_board_lowest_stack(const board *self) {

@@ -31,10 +31,18 @@ typedef struct {
   uint16_t depth;    /* spans that it came into */
 } avr_span;
 
+/* Of all calls of a function that have ended. */
+typedef struct {
+  uint64_t calls;
+  uint64_t shortest, longest;       /* net cycles */
+  uint64_t shortest_at, longest_at; /* cycle at which the first one of that length began */
+} avr_extremes;
+
 typedef struct {
   const uint32_t *entries; /* byte addresses of functions */
   size_t entry_count;
-  uint64_t patience; /* cycles without sleep after which the program hangs; 0: any number */
+  uint64_t patience;  /* cycles without sleep after which the program hangs; 0: any number */
+  bool only_extremes; /* of functions, and no list of spans: however long it runs, it takes no memory */
 } avr_watch;
 
 /* Begins to record, anew if it did already. False: no memory, or an entry that is no address of flash. */
@@ -44,6 +52,9 @@ void avr_board_stop_recording(board *self);
 /* Spans that have ended, in the order of their ends; valid until the board runs on. */
 const avr_span *avr_board_spans(const board *self, size_t *count);
 void avr_board_forget_spans(board *self);
+
+/* Of each function of the watch, in its order; NULL: they are not kept. */
+const avr_extremes *avr_board_extremes(const board *self);
 
 /* Lowest value of the stack pointer while it records. */
 uint16_t avr_board_lowest_stack(const board *self);

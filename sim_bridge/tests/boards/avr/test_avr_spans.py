@@ -38,11 +38,11 @@ TIMERS = """
 """
 
 
-def recorded(source: str, cycles: int, *functions: str, **watch: int) -> tuple[Machine, Any]:
+def recorded(source: str, cycles: int, *functions: str, patience: int = 0) -> tuple[Machine, Any]:
     """A machine that has run for some cycles, and what was recorded of it."""
     machine = Machine(source)
     entries = [entry_of(assemble(source), name) for name in functions]
-    machine.avr.record(Watch(functions=entries, **watch))
+    machine.avr.record(Watch(functions=entries, patience=patience))
     machine.board.run(cycles)
     return machine, machine.avr.spans()
 
