@@ -17,6 +17,7 @@ from boebot_hil.rig import Rig
 
 def pytest_configure(config: pytest.Config) -> None:
     for mark in (
+        "promise(heading, words...): what it proves, in the words of PROTOCOL.md",
         "emulated: reaches for what only an emulated board gives: its pins, its reset, its EEPROM",
         "soak: takes long",
         "soak_on_avr: takes long there",

@@ -49,6 +49,7 @@ def pulses(board: BoardSession) -> int:
     return len(log[((log["pin"] == 13) | (log["pin"] == 12)) & (log["level"] == 1)])
 
 
+@pytest.mark.promise("**exactly_once**, requests")
 @pytest.mark.parametrize(("bit_errors", "copies"), [(1e-4, 0.0), (1e-3, 0.0), (1e-4, 0.3)])
 def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float, copies: float) -> None:
     """Each sets another value and reads it back: nothing lost, nothing twice, nothing swapped. At 1e-4, 99 of 100
@@ -75,6 +76,7 @@ def test_requests_arrive_once_and_in_time(board: BoardSession, bit_errors: float
         assert link.board_counters.values["duplicate"] > 50
 
 
+@pytest.mark.promise("**exactly_once**, events")
 @pytest.mark.parametrize("bit_errors", [1e-4, 1e-3])
 def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float) -> None:
     """A whisker is pressed and let go: every change comes, once."""
@@ -94,6 +96,7 @@ def test_events_arrive_once_and_in_order(board: BoardSession, bit_errors: float)
     assert link.counts.sessions == 1
 
 
+@pytest.mark.promise("It is refused as *late* when its time to live has passed")
 @pytest.mark.parametrize("held_s", [2.0, 0.9])
 def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: float) -> None:
     """The line to the board stalls with motion commands queued, and lets them go: whether the board has ended the
@@ -125,6 +128,7 @@ def test_commands_that_were_held_up_move_nothing(board: BoardSession, held_s: fl
     assert pulses(board) > 0, "a fresh one moves it"
 
 
+@pytest.mark.promise("was reset, or has not heard it. It opens a new one (step 3)")
 @pytest.mark.parametrize("at_s", [0.0, 0.011, 0.137, 0.5])
 def test_traffic_resumes_within_a_second_of_any_reset(board: BoardSession, at_s: float) -> None:
     link = linked(board)

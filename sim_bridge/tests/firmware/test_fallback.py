@@ -8,8 +8,8 @@ import pytest
 from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.link import messages
-from boebot.link.messages import EventKind, Status
-from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
+from boebot.link.messages import Status
+from boebot_hil.rig import CYCLES_PER_US, FRAME_CYCLES, Rig
 from sim_bridge.tests.circle.circle import arena_of, circle
 
 pytestmark = pytest.mark.unsanitized
@@ -32,22 +32,6 @@ def be_silent(rig: Rig, seconds: float) -> None:
 
 def switch_on(rig: Rig, after_ms: int = AFTER_MS) -> None:
     rig.set("fallback_after", after_ms)
-
-
-def speak(rig: Rig) -> messages.Telemetry:
-    rig.alive = rig.acknowledges = True
-    rig.listen(0.1)
-    return rig.telemetry[-1]
-
-
-def first_events(rig: Rig) -> list[EventKind]:
-    """Kinds of the events that a new session gets, in their order."""
-    rig.events.clear()
-    rig.acknowledges = True
-    rig.start(arm=False)
-    for _ in range(20):
-        rig.listen(TICK_S)
-    return [EventKind(kind) for _, kind in sorted({event.number: event.kind for event in rig.events}.items())]
 
 
 # ---- what it does ----------------------------------------------------------------------------------------------------
@@ -115,75 +99,3 @@ def test_native_and_avr_board_give_the_same_pulses() -> None:
 
 
 # ---- when it drives --------------------------------------------------------------------------------------------------
-
-
-def test_the_dead_mans_stop_comes_first_and_the_host_is_told_of_both(board_url: str) -> None:
-    """The time to live is longer than the silence after which the fallback would take over."""
-    with circle(board_url, arena_of()) as rig:
-        switch_on(rig, 100)
-        rig.drive(0.5, 0.5, 300)
-        begun = rig.board.cycle
-        be_silent(rig, 0.9)
-        starts, widths = rig.pulses(LEFT).T
-        ends = np.flatnonzero(np.diff(starts) > FRAME_CYCLES + CYCLES_PER_US)
-        assert len(ends) == 1 and np.abs(widths[: ends[0] + 1] - 1600 * CYCLES_PER_US).max() <= CYCLES_PER_US
-        assert 0.27 < (starts[ends[0]] - begun) / CYCLES_PER_S < 0.33
-        assert WAITS_S <= np.diff(starts)[ends[0]] / CYCLES_PER_S < WAITS_S + 0.06
-        assert rig.telemetry[-1].status & Status.FALLBACK
-        assert first_events(rig) == [EventKind.DEAD_MAN, EventKind.FALLBACK, EventKind.LATCH, EventKind.FALLBACK]
-
-
-def test_the_host_has_the_motors_back_when_it_speaks(board_url: str) -> None:
-    """In its session it need not arm; after the session's end it must."""
-    with circle(board_url, arena_of()) as rig:
-        switch_on(rig)
-        be_silent(rig, AFTER_S + WAITS_S + 0.1)
-        now = rig.telemetry[-1]
-        assert now.status & Status.FALLBACK and (now.pulse_left, now.pulse_right) == FORWARD
-        now = speak(rig)
-        assert now.status & (Status.FALLBACK | Status.LATCHED) == 0 and (now.pulse_left, now.pulse_right) == (0, 0)
-        rig.drive_for(1.0, 1.0, 0.1)
-        assert rig.latest().pulse_left == 1700 * CYCLES_PER_US
-        be_silent(rig, 3.0)
-        assert rig.robot.body().speed > 0.8 * SPEED_M_S, "it drives on when the session has ended"
-        rig.start(arm=False)
-        rig.drive_for(1.0, 1.0, 0.3)
-        assert rig.latest().latch == messages.Latch.SESSION_ENDED and rig.latest().pulse_left == 0
-        assert rig.robot.body().speed < 0.01
-
-
-@pytest.mark.parametrize("how", ["stop", "close", "low supply"])
-def test_what_has_stopped_the_robot_keeps_the_fallback_off_until_a_host_arms(board_url: str, how: str) -> None:
-    with circle(board_url, arena_of()) as rig:
-        switch_on(rig)
-        be_silent(rig, AFTER_S + WAITS_S + 0.1)
-        assert rig.robot.body().speed > 0.5 * SPEED_M_S
-        if how == "stop":
-            rig.stop()
-        elif how == "close":
-            rig.send(messages.Close(rig.seed))
-        else:
-            rig.board.supply(3.5)
-            rig.listen(0.2)
-            rig.board.supply(None)
-        be_silent(rig, 3.0)
-        still = rig.robot.body().x
-        be_silent(rig, 3.0)
-        assert rig.robot.body().x == still
-        rig.start()
-        be_silent(rig, AFTER_S + WAITS_S + 1.0)
-        assert rig.robot.body().x != still
-
-
-@pytest.mark.parametrize("at_start", [False, True])
-def test_after_a_reset_it_drives_only_if_it_was_told_to_and_nothing_was_wrong(board_url: str, at_start: bool) -> None:
-    with circle(board_url, arena_of()) as rig:
-        switch_on(rig)
-        rig.set("fallback_at_start", int(at_start))
-        assert rig.request(messages.SaveParameters, within_s=1.0).status == messages.AnswerStatus.OK
-        for cause in ("watchdog", "brown_out", "external", "power"):
-            rig.board.reset(cause)
-            x = rig.robot.body().x
-            be_silent(rig, 2.0)
-            goes = at_start and cause in ("external", "power")
-            assert (rig.robot.body().x > x + 0.05) == goes, cause

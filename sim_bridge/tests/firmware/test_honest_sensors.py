@@ -64,19 +64,6 @@ def test_a_ping_that_was_never_there_is_absent(board_url: str) -> None:
     assert now.ping_age <= 7
 
 
-def test_a_ping_that_comes_and_goes(rig: Rig) -> None:
-    rig.listen(READINGS_S)
-    assert rig.latest().ping_status == PingStatus.NOTHING_NEAR, "an empty field"
-    rig.board.unplug("ping")
-    rig.listen(READINGS_S)
-    assert rig.latest().ping_status == PingStatus.ABSENT
-    rig.board.plug("ping")
-    rig.board.answer_ping(1000.0)
-    rig.listen(READINGS_S)
-    now = rig.latest()
-    assert (now.ping_status, now.ping_echo) == (PingStatus.OK, 1000)
-
-
 @pytest.mark.parametrize("phase_ms", [0.5, 2, 10, 18])
 def test_a_wire_that_breaks_in_mid_echo_is_no_empty_field(rig: Rig, phase_ms: float) -> None:
     """From the next measurement on; in this one the line may fall, as it does at the end of an echo."""
@@ -219,27 +206,3 @@ def test_a_wheel_that_rocks_within_the_gap_comes_back(board_url: str) -> None:
 
 
 # ---- IR pairs --------------------------------------------------------------------------------------------------------
-
-
-def test_a_receiver_that_is_stuck_low_sees_no_object(rig: Rig) -> None:
-    rig.board.drive(RECEIVER, 0)
-    rig.listen(READINGS_S)
-    frames = rig.listen(READINGS_S)
-    assert {f.infrared for f in frames} == {0}
-    assert max(f.infrared_age for f in frames) <= 7, "it goes on to measure"
-
-
-def test_a_receiver_that_answers_the_burst_sees_an_object(rig: Rig) -> None:
-    seen = rig.board.cycle
-    rig.board.drive(RECEIVER, 1)
-    for _ in range(round(READINGS_S / LOOK_S)):
-        rig.listen(LOOK_S)
-        log = rig.board.pin_log(4000)
-        lit = log["cycle"][(log["pin"] == LED) & (log["level"] == 1) & (log["cycle"] > seen + 5 * MS)]
-        if len(lit):
-            seen = int(lit[0])
-            rig.board.drive(RECEIVER, 0, seen + 500 * CYCLES_PER_US)
-            rig.board.drive(RECEIVER, 1, seen + 1300 * CYCLES_PER_US)
-    now = rig.telemetry[-1]
-    assert now.infrared == messages.Infrared.LEFT
-    assert now.infrared_age <= 7

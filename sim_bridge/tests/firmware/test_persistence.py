@@ -11,7 +11,7 @@ from elftools.elf.elffile import ELFFile
 
 from boebot import resources
 from boebot.link import messages
-from boebot_hil.rig import CYCLES_PER_S, TICK_S
+from boebot_hil.rig import CYCLES_PER_S
 from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
 from sim_bridge.tests.boards.avr.bootloader import KITS
 from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
@@ -55,30 +55,6 @@ def restart(host: DeviceRig, cause: ResetCause) -> messages.Hello:
     """Resets the board and opens a session with it; returns what it says of itself."""
     host.board.reset(cause)
     return host.open_session()
-
-
-def test_saved_parameters_outlive_the_power(board: BoardAccess) -> None:
-    host = DeviceRig(board)
-    assert host.open_session().parameters_saved == 0
-    choose(host, VALUES[0])
-    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
-    choose(host, VALUES[1])  # and does not save
-    for cause in ResetCause:
-        assert restart(host, cause).parameters_saved == 1
-        assert in_force(host) == VALUES[0]
-
-
-def test_a_save_is_answered_when_it_is_written_and_no_tick_is_missed(board: BoardAccess) -> None:
-    host = DeviceRig(board)
-    host.open_session()
-    begin = board.now
-    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
-    assert SAVED_BYTES * CELL_S < (board.now - begin) / CYCLES_PER_S < SAVED_BYTES * WRITE_S + STEPS_S
-    telemetry = [message for message in host.heard if isinstance(message, messages.Telemetry)]
-    ticks = [message.tick for message in telemetry]
-    assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
-    assert telemetry[-1].overruns == 0
-    assert sum(message.status & messages.Status.SAVING != 0 for message in telemetry) >= SAVED_BYTES * CELL_S / TICK_S
 
 
 @pytest.mark.soak_on_avr
@@ -175,44 +151,7 @@ def test_nothing_is_written_while_the_supply_is_low(board: BoardAccess) -> None:
     assert in_force(host) == VALUES[0]
 
 
-def test_supply_is_told_in_millivolts(board: BoardAccess) -> None:
-    host = DeviceRig(board)
-    host.open_session()
-    for volts in (4.4, 5.0, 5.5):
-        board.supply(volts)
-        host.listen(0.05)
-        telemetry = [m for m in host.heard if isinstance(m, messages.Telemetry)][-1]
-        assert telemetry.supply == 1100 * 1024 // int(1.1 * 1024 / volts)
-
-
-@pytest.mark.parametrize("hundreds", [96, 192, 384, 576, 1152, 2500, 5000, 10000])
-def test_line_has_the_saved_rate_after_the_next_reset(board: BoardAccess, hundreds: int) -> None:
-    host = DeviceRig(board)
-    host.open_session()
-    assert host.request(messages.SetParameter, 18, hundreds).status == OK
-    assert host.request(messages.SaveParameters, within_s=1.0).status == OK
-    board.reset(ResetCause.EXTERNAL)
-    board.line_rate(100 * hundreds)
-    host.heard.clear()
-    assert host.open_session().session != 0
-    assert host.request(messages.GetParameter, 18, within_s=2.0).value == hundreds
-
-
 # ---- resets ----------------------------------------------------------------------------------------------------------
-
-
-def test_each_cause_of_a_reset_is_told(board: BoardAccess) -> None:
-    host = DeviceRig(board)
-    assert host.next_hello().reset_cause == messages.ResetCause.POWER
-    for cause, reported in (
-        (ResetCause.EXTERNAL, messages.ResetCause.EXTERNAL),
-        (ResetCause.BROWN_OUT, messages.ResetCause.BROWN_OUT),
-        (ResetCause.WATCHDOG, messages.ResetCause.WATCHDOG),
-        (ResetCause.POWER, messages.ResetCause.POWER),
-    ):
-        board.reset(cause)
-        # the watchdog's may have come while a task was running, which is then reported, too
-        assert messages.ResetCause(host.next_hello().reset_cause).name.partition("_IN_")[0] == reported.name
 
 
 def test_nonce_is_another_one_after_each_reset(board: BoardAccess) -> None:

@@ -14,20 +14,6 @@ from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Ri
 pytestmark = pytest.mark.unsanitized
 
 
-def test_edges_are_counted_and_timed(rig: Rig) -> None:
-    rig.set("encoder_gap", 0)
-    before = rig.latest()
-    rig.board.square_wave(16, period=2 * CYCLES_PER_S // 500, seconds=0.2)  # 500 edges/s: 100 edges
-    rig.board.square_wave(17, period=2 * CYCLES_PER_S // 125, seconds=0.2)  # 125 edges/s: 25 edges
-    frames = rig.listen(0.19)
-    after = rig.listen(0.1)[-1]
-    assert after.encoder_left - before.encoder_left == 100
-    assert after.encoder_right - before.encoder_right == 25
-    unit = 16  # us per count
-    assert abs(frames[-1].edge_period_left * unit - 2000) <= 2 * unit
-    assert abs(frames[-1].edge_period_right * unit - 8000) <= 2 * unit
-
-
 def test_sensors_go_on_when_parameters_are_reset(rig: Rig) -> None:
     assert rig.request(messages.ResetParameters).status == messages.AnswerStatus.OK
     rig.listen(0.3)
@@ -41,51 +27,6 @@ def test_wheels_at_rest_count_nothing_from_power_on(board_url: str, robot: str) 
         rig.start()
         seen = rig.latest()
         assert (seen.encoder_left, seen.encoder_right) == (0, 0)
-
-
-def test_edge_period_is_forgotten_after_half_a_second(rig: Rig) -> None:
-    rig.board.square_wave(16, period=2 * CYCLES_PER_S // 500, seconds=0.1)
-    rig.listen(0.1)
-    assert rig.latest().edge_period_left > 0
-    rig.listen(0.6)
-    assert rig.latest().edge_period_left == 0
-
-
-def test_quadrature_counts_both_directions(board_url: str) -> None:
-    with Rig.open(board_url, robot="shieldbot-quad") as rig:
-        rig.start()
-        rig.set("encoder_gap", 0)
-        rig.latest()  # it counts from the next tick on
-        now = rig.board.cycle + 64_000
-        before = rig.telemetry[-1].encoder_left
-        a_then_b = [(14, 1), (15, 1), (14, 0), (15, 0)]
-        for i, (pin, level) in enumerate(a_then_b * 5):
-            rig.board.drive(pin, level, now + i * 16_000)
-        rig.listen(0.1)
-        forward = rig.latest().encoder_left - before
-        now = rig.board.cycle + 64_000
-        for i, (pin, level) in enumerate([(15, 1), (14, 1), (15, 0), (14, 0)] * 3):
-            rig.board.drive(pin, level, now + i * 16_000)
-        rig.listen(0.1)
-        assert abs(forward) == 20
-        assert rig.latest().encoder_left - before == forward - (12 if forward > 0 else -12)
-
-
-def test_noise_line_is_masked_and_the_tick_goes_on(rig: Rig) -> None:
-    rig.set("encoder_gap", 0)
-    rig.board.square_wave(16, period=160, seconds=0.5)  # 100 kHz
-    rig.board.square_wave(17, period=2 * CYCLES_PER_S // 500, seconds=0.5)  # a wheel that turns
-    before = rig.latest()
-    frames = rig.listen(0.3)
-    assert len(frames) >= 29, "the tick stopped"
-    assert frames[-1].overruns == frames[0].overruns
-    assert all(f.status & messages.Status.ENCODER_LEFT_MASKED for f in frames[1:])
-    assert not any(f.status & messages.Status.ENCODER_RIGHT_MASKED for f in frames)
-    assert not any(f.edge_period_left for f in frames[1:]), "noise is no speed"
-    seconds = (frames[-1].tick - before.tick) * 0.010
-    assert abs(frames[-1].encoder_right - before.encoder_right - 500 * seconds) <= 1, "the other wheel counts on"
-    rig.listen(0.3)
-    assert not rig.latest().status & messages.Status.ENCODER_LEFT_MASKED
 
 
 @dataclass(frozen=True)
@@ -176,20 +117,6 @@ def test_a_line_that_comes_back_has_no_period_across_the_gap(rig: Rig) -> None:
     assert max(periods) > 0
 
 
-@pytest.mark.parametrize(("pin", "bit"), [(5, messages.Whiskers.LEFT), (7, messages.Whiskers.RIGHT)])
-def test_whisker_shows_within_two_ticks(rig: Rig, pin: int, bit: int) -> None:
-    for phase in range(0, 160_000, 23_000):
-        pressed_at = rig.board.cycle + 200_000 + phase
-        rig.board.drive(pin, 0, pressed_at)
-        seen = [f for f in rig.listen(0.06) if f.whiskers & bit]
-        assert seen, "the whisker never showed"
-        tick_start = seen[0].time * CYCLES_PER_US + rig.board.reset_cycle
-        assert tick_start - pressed_at <= 2 * 160_000
-        rig.board.drive(pin, 2, rig.board.cycle)
-        rig.listen(0.06)
-        assert not rig.latest().whiskers
-
-
 PHASES_S = (0.0, 0.0011, 0.0037, 0.0062, 0.0093)  # where in the tick a test begins
 
 
@@ -217,27 +144,6 @@ def test_noise_on_the_ping_pin_is_no_echo(rig: Rig, phase_s: float) -> None:
     frames = rig.listen(0.4)
     assert {f.ping_echo for f in frames} == {0}
     assert max(f.ping_age for f in frames) <= period_s / TICK_S + 2, "it goes on to measure"
-
-
-@pytest.mark.parametrize("distance", [0.10, 0.50, 1.00, 2.50])
-def test_echo_becomes_distance(rig: Rig, distance: float) -> None:
-    """A pulse of the data sheet's length on the pin, at 20 °C: 343.5 m/s, there and back."""
-    echo_us = 2 * distance / (331.5 + 0.6 * 20) * 1e6
-    rig.board.answer_ping(echo_us)
-    rig.listen(0.15)
-    now = rig.latest()
-    assert abs(now.ping_echo - echo_us) <= 1.0
-    assert now.ping_age <= 6
-
-
-def test_a_ping_that_is_silent_is_absent(rig: Rig) -> None:
-    rig.board.answer_ping(500.0)
-    rig.listen(0.15)
-    assert rig.latest().ping_echo > 0
-    rig.board.answer_ping(None)
-    rig.listen(0.2)
-    now = rig.latest()
-    assert (now.ping_echo, now.ping_status) == (0, messages.PingStatus.ABSENT)
 
 
 @pytest.mark.parametrize("phase_s", PHASES_S)
