@@ -291,7 +291,7 @@ class BoardDriver(Driver):
             awake_s = _host_clock()
             restarted = link.counts.board_resets != self.resets
             if not received:
-                silence_s = SILENCE_S if transport.realtime or bad is not None else SILENCE_SIMULATED_S
+                silence_s = SILENCE_S if transport.realtime or self.has_faults else SILENCE_SIMULATED_S
                 if now_s - received_s > silence_s + period * tick_s:
                     raise BoardError(f"the board at {transport.name} fell silent: no telemetry for {silence_s:g} s")
                 look_s, wait_until_s = now_s, now_s + (period + 1) * tick_s

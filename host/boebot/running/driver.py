@@ -55,6 +55,7 @@ class Driver(Protocol):
         identity: what the board says of itself; None: there is no board.
         layout: where the readings of each device stand; None: they come by the link.
         is_program: a program on its board drives the robot, and no brain.
+        has_faults: something is made to fail, so that a board may be silent for a while.
     """
 
     session: BoardSession | VehicleSession
@@ -67,6 +68,7 @@ class Driver(Protocol):
     identity: Identity | None
     layout: Layout | None
     is_program: bool = False
+    has_faults: bool = False
 
     def begin(self) -> None:
         """Makes the robot ready to move.

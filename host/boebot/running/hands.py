@@ -162,6 +162,7 @@ class Hands:
                 offset_s = driver.status().clock_offset
                 fired = inject(one, driver.description, driver.session, lambda: driver.bad_line(seed), offset_s)
                 self.faults.append((one, fired))
+                driver.has_faults = True
             case _ if self.driver.is_program:
                 raise BoebotError("a program drives this robot, no brain: it takes what is typed, and buttons")
             case _:
