@@ -1,8 +1,9 @@
-"""`boebot faults`: what can fail in a run of a robot, for `boebot run --fault`, with units."""
+"""`boebot faults`: what can fail in a run of a robot, for `boebot run --fault`, with units; and who notices it."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,43 +13,65 @@ from boebot.devices.device import FaultKind
 from boebot.errors import CallError
 from boebot.running.faults import known
 
+if TYPE_CHECKING:
+    from boebot.running.noticed import Noticed
+
+HEADINGS = ["name", "fired", "noticed by", "after", "valid and wrong", "still after"]
+
 
 def faults(
     robot: Annotated[
         str, typer.Option("--robot", metavar="R", autocompletion=options.complete_robots, help="Whose.")
     ] = "shieldbot",
+    table: Annotated[
+        bool, typer.Option("--table", help="Run each of them once, simulated: who notices it, and when.")
+    ] = False,
     json: options.Json = False,
 ) -> None:
-    """List what can fail in a run of a robot: boebot run --fault NAME[=VALUE]@START[..END]."""
-    there = known(load_robot(robot))
+    """List what can fail in a run of a robot: boebot run --fault NAME[=VALUE]@START[..END].
+
+    A name such as whiskers.stuck is of all whiskers, whisker_left.stuck of one.
+    """
+    description = load_robot(robot)
+    there = known(description)
     if not there:
         raise CallError(f"robot {robot!r} has nothing that can be made to fail; expected a robot with a board")
-    rows = [_row(name, kind, whose) for name, (kind, whose) in there.items()]
+    names = names_of(there)
+    if table:
+        from boebot.running.noticed import noticed
+
+        description.expect_kit()
+        with output.progress_bar("faults", len(names), json, "") as progress:
+            found = []
+            for one in noticed(description, names):
+                found.append(one)
+                progress(len(found))
+        rows, titles, texts = [one._asdict() for one in found], HEADINGS, [cells(one) for one in found]
+    else:
+        rows = [{"name": name, "of": list(whose), **kind._asdict()} for name, (kind, whose) in there.items()]
+        titles, texts = ["name", "value", "when", "what happens"], [[name, *_said(there[name][0])] for name in names]
     if json:
         output.print_json({"robot": robot, "faults": rows})
-        return
-    whole = {one for row in rows if len(row["of"]) > 1 for one in row["of"]}
-    shown = [row for row in rows if row["of"] != [row["name"].partition(".")[0]] or not whole.issuperset(row["of"])]
-    output.print_columns(
-        ["name", "value", "when", "what happens"],
-        ([row["name"], _value(row), "a span" if row["lasts"] else "once", _what(row)] for row in shown),
-        whole=1,
-    )
+    else:
+        output.print_columns(titles, texts, whole=1)
 
 
-def _row(name: str, kind: FaultKind, whose: tuple[str, ...]) -> dict[str, Any]:
-    return {"name": name, "of": list(whose), **kind._asdict()}
+def names_of(there: Mapping[str, tuple[FaultKind, tuple[str, ...]]]) -> list[str]:
+    """Of a robot's faults (`known`) those of whole groups, and of what belongs to none."""
+    members = {one for _, whose in there.values() if len(whose) > 1 for one in whose}
+    return [name for name, (_, whose) in there.items() if len(whose) > 1 or not members.issuperset(whose)]
 
 
-def _value(row: dict[str, Any]) -> str:
-    """Default and range."""
-    if row["words"]:
-        return ", ".join(row["words"])
-    if row["default"] is None:
-        return ""
-    return f"{row['default']:g} {row['unit']}".rstrip() + f" ({row['least']:g} to {row['most']:g})"
+def cells(one: Noticed) -> list[str]:
+    """A row of the table of who notices what."""
+    after, still = ("" if time_s is None else f"{time_s:.2f} s" for time_s in (one.after_s, one.still_s))
+    wrong = "" if one.wrong is None else f"{one.wrong:.0%}"
+    return [one.fault, str(one.fired), ", ".join(one.by) or "nobody", after, wrong, still]
 
 
-def _what(row: dict[str, Any]) -> str:
-    alone = f"; also of {' or '.join(row['of'])} alone" if len(row["of"]) > 1 else ""
-    return str(row["does"]) + alone
+def _said(kind: FaultKind) -> list[Any]:
+    """Value with its range, whether it lasts, and what happens."""
+    value = ", ".join(kind.words)
+    if kind.default is not None:
+        value = f"{kind.default:g} {kind.unit}".rstrip() + f" ({kind.least:g} to {kind.most:g})"
+    return [value, "a span" if kind.lasts else "once", kind.does]

@@ -10,11 +10,13 @@ brain, each with its span, so that none hangs on the steps.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 
 from boebot.boards import RESET_CAUSES, BoardSession, VehicleSession
 from boebot.description.robots import RobotDescription
 from boebot.devices.device import FaultKind
+from boebot.devices.faults import BODY_FAULTS
 from boebot.errors import BoebotError, CallError, did_you_mean
 from boebot.link.bad_line import BadLine
 from boebot.quantity import parse
@@ -24,6 +26,7 @@ EXPECTED = "expected NAME[=VALUE]@START[..END], as in ping.missing@3s..5s"
 HOST = ("serial", "cable", "host")
 """Owners on the host's side of the line: of any board, also a real one."""
 
+_SIDE = re.compile(r"_(left|middle|right|\d+)$")
 NEED_END = ("serial.stalled", "host.stopped")
 """What holds something back until then."""
 
@@ -58,20 +61,17 @@ OWNERS: Mapping[str, Mapping[str, FaultKind]] = {
 
 def known(robot: RobotDescription) -> dict[str, tuple[FaultKind, tuple[str, ...]]]:
     """Those that a robot can have, by name, and whose they are: of a group of devices all of it."""
-    owners: dict[str, tuple[Mapping[str, FaultKind], list[str]]] = {}
-    if robot.has_board:
-        owners = {name: (kinds, [name]) for name, kinds in OWNERS.items()}
-    for name, device in robot.device.items():
-        if not device.on or not device.FAULTS:
-            continue
-        stem = device.GROUP or name.removesuffix("_left").removesuffix("_right")
-        for owner in dict.fromkeys((name, stem)):
-            owners.setdefault(owner, (device.FAULTS, []))[1].append(name)
-    return {
-        f"{owner}.{kind}": (one, tuple(whose))
-        for owner, (kinds, whose) in owners.items()
-        for kind, one in kinds.items()
+    found: dict[str, tuple[FaultKind, tuple[str, ...]]] = {}
+    devices = {name: (device.FAULTS, device.GROUP) for name, device in robot.device.items() if device.on}
+    others = {
+        name: (kinds, "") for name, kinds in {**OWNERS, **BODY_FAULTS}.items() if name != "battery" or robot.supply
     }
+    for name, (kinds, group) in {**devices, **others}.items() if robot.has_board else ():
+        for owner in dict.fromkeys((name, group or _SIDE.sub("", name))):
+            for one, kind in kinds.items():
+                _, whose = found.get(f"{owner}.{one}", (kind, ()))
+                found[f"{owner}.{one}"] = kind, (*whose, name)
+    return found
 
 
 def read(text: str, robot: RobotDescription) -> Fault:

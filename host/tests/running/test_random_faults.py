@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, note, settings
+from hypothesis import HealthCheck, Phase, given, note, settings
 from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
@@ -43,7 +43,7 @@ def faults(draw: st.DrawFn) -> Fault:
     if kind.words:
         value = draw(st.sampled_from(kind.words))
     elif kind.default is not None:
-        value = draw(st.sampled_from([kind.default, kind.least, min(kind.most, 10 * kind.default), kind.default / 10]))
+        value = draw(st.sampled_from([kind.default, kind.least, min(kind.most, 3 * kind.default), kind.default / 10]))
     return Fault(name, value, begin_s, min(end_s, FAULTS_END_S) if kind.lasts else None)
 
 
@@ -74,21 +74,36 @@ def obeys(board: str, schedule: list[Fault]) -> None:
         assert len(again), "the motors are armed again"
 
 
-@settings(max_examples=25, derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+def examples(count: int) -> settings:
+    """The same ones each time."""
+    phases = (Phase.generate, Phase.shrink)
+    unhurried = list(HealthCheck)
+    return settings(
+        max_examples=count,
+        derandomize=True,
+        deadline=None,
+        database=None,
+        suppress_health_check=unhurried,
+        phases=phases,
+        print_blob=False,
+    )
+
+
+@examples(25)
 @given(st.lists(faults(), min_size=1, max_size=4))
 def test_random_schedules(schedule: list[Fault]) -> None:
     obeys("native", schedule)
 
 
 @pytest.mark.soak
-@settings(max_examples=1000, deadline=None, database=None, suppress_health_check=list(HealthCheck), print_blob=True)
+@examples(1000)
 @given(st.lists(faults(), min_size=1, max_size=6))
 def test_a_thousand_random_schedules(schedule: list[Fault]) -> None:
     obeys("native", schedule)
 
 
 @pytest.mark.soak
-@settings(max_examples=100, deadline=None, database=None, suppress_health_check=list(HealthCheck), print_blob=True)
+@examples(100)
 @given(st.lists(faults(), min_size=1, max_size=6))
 def test_a_hundred_random_schedules_on_the_chip(schedule: list[Fault]) -> None:
     obeys("avr", schedule)
