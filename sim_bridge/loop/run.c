@@ -80,9 +80,9 @@ static void take_faults(robot *r, const double torques[2]) {
     if (lifted != NULL) lifted->fired += (uint64_t)turns;
     if (blocked != NULL) blocked->fired += (uint64_t)turns;
     now->blocked[side] = blocked != NULL;
+    now->any |= lifted != NULL || blocked != NULL || slipping != NULL;
     if (slipping == NULL) continue;
     slipping->fired += (uint64_t)r->body->state.slipping;
-    now->slippery = 1;
     now->grip[side] = slipping->value;
   }
 }

@@ -78,12 +78,12 @@ typedef struct {
   uint32_t discs[BODY_DISCS_CAPACITY];
 } body_surroundings;
 
-/* What is wrong with it in the step under way; all 0: nothing. Wheels left, right. */
+/* What is wrong with it in the step under way. Wheels left, right. */
 typedef struct {
+  int any;        /* 0: nothing, whatever the others say */
   int lifted;     /* held off the floor: the pose stays, wheels turn freely */
   int blocked[2]; /* the wheel cannot turn */
-  int slippery;   /* 1: `grip` limits the tyres' grip */
-  double grip[2];
+  double grip[2]; /* of the tyre, at most */
 } body_faults;
 
 typedef struct {

@@ -61,12 +61,8 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
   body_state *s = &self->state;
   const body_parameters *p = &self->parameters;
   double limits[2] = {0.0, 0.0};
-  if (self->faults.lifted) {
-    spin(self, torque, dt);
-    return;
-  }
-  const int blocked = self->faults.blocked[0] | self->faults.blocked[1];
-  if (!s->slipping && !blocked && !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
+  if (!s->slipping && !self->faults.any &&
+      !(p->slip && s->touching)) { /* in touch, tyres and contact are solved together */
     /* (2.31), (2.32), (3.16), (3.17) */
     const double force = self->force_gain * (torque[0] + torque[1]) - self->drag * s->speed;
     const double moment = self->torque_gain * (torque[1] - torque[0]) - self->turn_drag * s->turn_rate;
@@ -80,7 +76,12 @@ static void drive(body *self, const scene *around, const double torque[2], doubl
       return;
     }
   }
+  if (self->faults.any && self->faults.lifted) {
+    spin(self, torque, dt);
+    return;
+  }
   ground_limits(self, around->arena, limits);
+  for (int i = 0; self->faults.any && i < 2; i++) limits[i] = fmin(limits[i], self->half_load * self->faults.grip[i]);
   slide(self, around, limits, torque, dt);
   s->speed = number_limited(s->speed, SPEED_LIMIT);
   s->lateral = number_limited(s->lateral, SPEED_LIMIT);

@@ -6,6 +6,8 @@
 #define LIMIT_LEAST 1e-30 /* N s: less is none */
 #define HELD 1e-9         /* m/s: slower than this a tyre that is within its limit holds */
 
+static int is_blocked(const body *of, int wheel) { return of->faults.any && of->faults.blocked[wheel]; }
+
 void ground_begin(ground *self, body *of, const double limits[2], double torque_left, double torque_right, double dt) {
   body_state *s = &of->state;
   const double half = of->parameters.half_track;
@@ -17,8 +19,8 @@ void ground_begin(ground *self, body *of, const double limits[2], double torque_
   }
   s->rim_left += dt * torque_left * of->per_radius / of->slip_spin;
   s->rim_right += dt * torque_right * of->per_radius / of->slip_spin;
-  if (of->faults.blocked[0]) s->rim_left = 0.0;
-  if (of->faults.blocked[1]) s->rim_right = 0.0;
+  if (is_blocked(of, 0)) s->rim_left = 0.0;
+  if (is_blocked(of, 1)) s->rim_right = 0.0;
   /* alpha and beta of (2.31), (2.32) as the force and the moment that they are for rolling wheels */
   const double drag = dt * of->drag * (of->mass + 2.0 * of->spin) / of->mass;
   const double turn_drag = dt * of->turn_drag * (of->inertia + 2.0 * half * half * of->spin) / of->inertia;
@@ -60,7 +62,7 @@ double ground_round(ground *self, body *of) {
   double across[2];
   double most = 0.0; /* of the speeds along */
   for (int i = 0; i < 2; i++) {
-    const double kx = straight + turning + (of->faults.blocked[i] ? 0.0 : spinning) + fabs(straight - turning);
+    const double kx = straight + turning + (is_blocked(of, i) ? 0.0 : spinning) + fabs(straight - turning);
     double x, y;
     floor_impulse(slip[i] - kx * self->along[i], s->lateral - ky * self->across[i], kx, ky, self->limit[i], &x, &y);
     along[i] = x - self->along[i];
@@ -71,15 +73,15 @@ double ground_round(ground *self, body *of) {
   }
   s->speed += (along[0] + along[1]) / of->mass;
   s->turn_rate += half * (along[1] - along[0]) / of->inertia;
-  if (!of->faults.blocked[0]) s->rim_left -= along[0] / of->slip_spin;
-  if (!of->faults.blocked[1]) s->rim_right -= along[1] / of->slip_spin;
+  if (!is_blocked(of, 0)) s->rim_left -= along[0] / of->slip_spin;
+  if (!is_blocked(of, 1)) s->rim_right -= along[1] / of->slip_spin;
   s->lateral += (across[0] + across[1]) / of->mass;
   return most + ky * fmax(fabs(across[0]), fabs(across[1]));
 }
 
 void ground_end(const ground *self, body *of, double dt) {
   body_state *s = &of->state;
-  if (of->faults.blocked[0] || of->faults.blocked[1]) return;
+  if (is_blocked(of, 0) || is_blocked(of, 1)) return;
   const double centripetal =
       0.5 * of->mass * fabs(s->speed * s->turn_rate) * dt; /* what going round needs, half a wheel */
   for (int i = 0; i < 2; i++) {

@@ -25,9 +25,6 @@ static inline void ground_limits(const body *self, const arena *where, double li
   const double dy = self->parameters.half_track * s->cosine;
   limits[0] = self->half_load * arena_grip(where, s->x + dx, s->y + dy, grip);
   limits[1] = self->half_load * arena_grip(where, s->x - dx, s->y - dy, grip);
-  if (self->faults.slippery) {
-    for (int i = 0; i < 2; i++) limits[i] = fmin(limits[i], self->half_load * self->faults.grip[i]);
-  }
 }
 
 /* 1 if the tyres hold while the body, that rolls, comes to these speeds within `dt` under these torques. */
