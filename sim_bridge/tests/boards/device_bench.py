@@ -138,6 +138,8 @@ class Receiver:
 class DeviceBench:
     """A board session whose devices are ours, and its serial line as a Rig reads and writes it."""
 
+    realtime = False
+
     def __init__(self, access: BoardAccess) -> None:
         self.access = self.board = access
         self.transport = self
