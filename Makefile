@@ -236,7 +236,7 @@ $(VENV)/.done-boebot: pyproject.toml $(VENV)/.done-run | build/.done-core
 # What an installation without a network takes its packages from (tools/tests/test_wheel.py).
 build/wheelhouse/.done: $(DECLARED) | $(VENV)/.done-test
 	@$(PYTHON_VENV) -m pip download --quiet --only-binary :all: --dest build/wheelhouse --constraint requirements.lock \
-		$$($(PYTHON_VENV) tools/requirements.py run)
+		$$($(PYTHON_VENV) tools/requirements.py run hil)
 	@touch $@
 
 build/simavr/.done: tools/fetch_simavr.py build/.done-system-run

@@ -53,7 +53,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Adds up what a test, its set-up and its tear-down took."""
-    _seconds[report.nodeid.partition("/")[0]] += report.duration  # type: ignore[assignment]
+    folder, below, _ = report.nodeid.partition("/")
+    _seconds[folder if below else "this folder"] += report.duration  # type: ignore[assignment]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

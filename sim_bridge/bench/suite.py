@@ -33,12 +33,20 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
         CallError: there is no pytest, or it does not understand its arguments.
         BoebotError: pytest itself has failed.
     """
-    if find_spec("pytest") is None:
+    found = find_spec(SUITE)
+    if find_spec("pytest") is None or found is None or found.origin is None:
         raise CallError("tests need pytest; expected it here: pip install 'boebot[hil]'")
     from boebot.boards import is_live
     from boebot.sketch import cache
 
-    options = ["-m", "not soak", "-rs", *(f"--uno-on={board}" for board in boards), *["--uno-motors"] * motors]
+    options = [
+        f"--rootdir={Path(found.origin).parent}",
+        f"--uno-keep={Path('.uno').absolute()}",
+        "-m",
+        "not soak",
+        "-rs",
+    ]
+    options += [*(f"--uno-on={board}" for board in boards), *["--uno-motors"] * motors]
     if find_spec("xdist") is not None and not any(map(is_live, boards)):
         options.append("--numprocesses=auto")
     with tempfile.TemporaryDirectory() as folder:

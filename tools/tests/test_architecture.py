@@ -54,6 +54,17 @@ def test_the_analysis_of_machine_code_knows_no_robot() -> None:
     assert not guilty
 
 
+def test_pytest_is_known_to_the_plugin_alone() -> None:
+    """It is no requirement: whoever has no tests has no pytest."""
+    knows = [
+        str(source.relative_to(ROOT))
+        for folder in ("host/boebot", "sim_bridge")
+        for source in (ROOT / folder).rglob("*.py")
+        if "tests" not in source.parts and "pytest" in {name.split(".")[0] for name in imported(source)}
+    ]
+    assert knows == ["sim_bridge/bench/plugin.py"]
+
+
 def test_running_a_brain_analyses_no_machine_code() -> None:
     run = """
 import sys
@@ -221,7 +232,8 @@ def test_simulator_knows_no_protocol() -> None:
     for source in (ROOT / "sim_bridge").rglob("*.py"):
         if "tests" not in source.parts:
             spoken = {name for name in imported(source) if name.startswith("boebot.link.")}
-            assert not {name for name in spoken if "transport" not in name and ".ports" not in name}, source
+            carriers = (".transport", ".ports", ".bad_line")  # of bytes
+            assert not {name for name in spoken if not any(one in name for one in carriers)}, source
 
 
 def test_observation_leads_to_nothing_of_the_simulator() -> None:

@@ -40,7 +40,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
     pip = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python"), "--quiet"]
     offline = ["--no-index", "--no-compile", "--find-links", str(PROJECT / "build" / "wheelhouse")]
-    subprocess.run(without_network([*pip, "install", *offline, str(wheel)]), check=True)
+    subprocess.run(without_network([*pip, "install", *offline, f"{wheel}[hil]"]), check=True)
     return environment
 
 
@@ -78,3 +78,15 @@ def test_an_installed_wheel_has_the_sketches(installed: Path, tmp_path: Path) ->
     for command in (["list", "sketches"], ["new", "whiskers", "--sketch"]):
         subprocess.run([str(installed / "bin" / "boebot"), *command], cwd=tmp_path, check=True, capture_output=True)
     assert "Servo.h" in (tmp_path / "whiskers" / "whiskers.ino").read_text(encoding="utf-8")
+
+
+def test_an_installed_wheel_tests_boards_and_programs(installed: Path, tmp_path: Path) -> None:
+    """The kit's own tests, and a user's with the fixture `uno`."""
+    (tmp_path / "test_mine.py").write_text(
+        "import pytest\n\n@pytest.mark.uno(robot='shieldbot')\ndef test_says_hello(uno):\n"
+        "    uno.serial.expect(b'\\x00', within=0.5)\n"
+    )
+    for command in (["boebot", "test", "--on", "native", "-k", "handshake"], ["pytest", "test_mine.py"]):
+        program = str(installed / "bin" / command[0])
+        done = subprocess.run([program, *command[1:]], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0 and " passed" in done.stdout, done.stdout + done.stderr
