@@ -33,7 +33,7 @@ FIGURES = {
     "dead_man_stops": "board: dead-man",
 }
 BOARD = {"bad": "board: checksum", "late": "board: late set-points", "duplicate": "board: request numbers"}
-DRAWN = [name for name in switches() if name != "coast_drag"]  # without which wheels roll on
+DRAWN = [name for name in switches() if name not in ("coast_drag", "slip", "battery_sag")]  # which draw nothing
 _STILL_M_S, _STILL_S = 0.01, 0.3
 
 
