@@ -56,7 +56,7 @@ struct robot {
   int part_count;
   buffer received, received_at, truth, looks, tones;
   bool is_stamped;
-  double sampled[...];
+  double sampled[...], held[...];
   edge_log edges;
   uint64_t last_byte, listen_from, reset_at, contacts;
   ...;

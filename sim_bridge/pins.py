@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,21 @@ class BoardPins(BoardMemory):
         level = whole("drive: the level", level, BoardError, least=0, most=Level.RELEASED)
         lib.robot_drive(self._with_board, at, checked_pin("drive", pin), level)
 
+    def drive_edges(self, pin: int, cycles: NDArray[np.uint64], levels: NDArray[np.uint8]) -> None:
+        """Takes a pin from its part and drives it to each of these levels from its cycle on; the earliest is first."""
+        at, to = ffi.from_buffer("uint64_t[]", cycles), ffi.from_buffer("uint8_t[]", levels)
+        lib.robot_drive_edges(self._with_board, checked_pin("drive", pin), at, to, min(len(cycles), len(levels)))
+
+    def release(self, pin: int) -> None:
+        """Gives a pin back to its part, or lets go of it."""
+        lib.robot_release(self._with_board, checked_pin("release", pin))
+
+    def analog(self, channel: int, volts: float | None) -> None:
+        """Holds the voltage at analog channel 0..5; None: what its part gives, or 0 V."""
+        channel = whole("analog: the channel", channel, BoardError, least=0, most=5)
+        held = math.nan if volts is None else number("analog: the voltage", volts, BoardError, least=0, most=5.5)
+        self._with_board.held[channel] = held
+
     def square_wave(self, pin: int, period: int, seconds: float) -> None:
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
         half = whole("square_wave: the period", period, BoardError, least=2, most=2**32 - 1) // 2
@@ -199,20 +215,31 @@ class PinRecorder:
 
     def drain(self) -> Group:
         """The streams since they were last drained: rows as of boebot.record.record."""
+        log = self._pins.outside_log()
+        return streams_of({"pins": self.edges(), **log})
+
+    def edges(self) -> NDArray[Any]:
+        """The output edges (dtype EDGE) since somebody took them."""
         self._take()
         edges = np.concatenate(self._kept)
         self._kept.clear()
-        log = self._pins.outside_log()
-        streams = {"pins": _edges(edges)}
-        if log:
-            lines = {"line_in": log["to_board"], "line_out": log["from_board"]}
-            streams |= {"inputs": _edges(log["driven"]), **{name: _frames(frames) for name, frames in lines.items()}}
-        return {name: block for name, block in streams.items() if len(block)}
+        return edges
 
     def _take(self) -> None:
         new = self._pins.edge_count - self._seen
         self._seen += new
         self._kept.append(self._pins.pin_log(new))
+
+
+STREAMS = {"pins": "pins", "driven": "inputs", "to_board": "line_in", "from_board": "line_out"}
+"""of a record, by what is logged of a board's pins and line"""
+EDGE_LOGS = ("pins", "driven")  # the others are of frames
+
+
+def streams_of(log: Mapping[str, NDArray[Any]]) -> Group:
+    """What is logged of a board, by the names in STREAMS, as the streams of a record; without empty ones."""
+    rows = {STREAMS[name]: (_edges if name in EDGE_LOGS else _frames)(found) for name, found in log.items()}
+    return {name: block for name, block in rows.items() if len(block)}
 
 
 def _edges(edges: NDArray[Any]) -> Block:

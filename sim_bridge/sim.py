@@ -464,10 +464,15 @@ class SimRobot:
 
     def receive_stamped(self) -> list[tuple[int, int]]:
         """Bytes that left the board since the last call, each with the cycle at which it had come."""
+        data, cycles = self.received()
+        return list(zip(cycles, data, strict=True))
+
+    def received(self) -> tuple[bytes, list[int]]:
+        """The same as bytes and their cycles."""
         data, at = self.receive(), self.handle.received_at
-        cycles = np.frombuffer(ffi.buffer(at.data + at.start, at.count)[:], "<u8") if at.count else ()
+        cycles = np.frombuffer(ffi.buffer(at.data + at.start, at.count)[:], "<u8").tolist() if at.count else []
         at.start = at.count = 0
-        return list(zip(map(int, cycles), data, strict=True))
+        return data, cycles
 
     def send(self, data: bytes | bytearray | memoryview) -> None:
         """Bytes to the board, from now on.

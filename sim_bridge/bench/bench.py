@@ -1,36 +1,91 @@
-"""A board with any image on a test bench: by itself, or in the world of a robot (sessions/world.py), which answers at
-its pins. Both are one simulation, so that what can be done with a robot's board can be done with a bare one."""
+"""An emulated board with a program, and nothing around it or the world of a robot: it runs to a cycle or to an edge,
+its pins are driven and looked at, and what reacts to an edge does so at the edge's own cycle.
+
+Times are cycles of the board's clock (62.5 ns) since power-on, pins Arduino numbers (A0 is 14). A run is a function of
+what the bench is made of and of what is done to it. How it is cut into calls does not matter where edges are driven and
+bytes are sent at a cycle (`at`) that lies 64 cycles ahead, or in a reaction.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Sequence
 from functools import cache
 from pathlib import Path
-from types import TracebackType
+from typing import Any, Protocol, Self
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from boebot.boards import BoardRequest
 from boebot.description.robots import RobotDescription, load_robot
+from boebot.errors import CallError
 from boebot.record.blocks import Group, merged
 from boebot.record.record import Record
+from sim_bridge._core import lib
+from sim_bridge.boards.board import CLOCK_HZ, EDGE, FRAME, LEVELS, PINS, Edge, EmulatedBoard, Level, Reaction
+from sim_bridge.pins import streams_of
 from sim_bridge.sessions.world import AVR, NATIVE, open_on
+
+SLICE_CYCLES = 8_000  # 0.5 ms, between two chances for sources
+AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
+LONGEST_CYCLES = 160_000  # of a slice: all edges in it are fewer than the simulator keeps
+
+
+class Source(Protocol):
+    """What acts on a board from outside, time and again."""
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """Queues what it does up to that cycle; what happened up to now is known."""
+
+
+class EdgeLog:
+    """All edges of a bench, oldest first, and those of each pin, sorted out where somebody asks for it."""
+
+    def __init__(self, new: Callable[[], NDArray[Any]]) -> None:
+        """`new`: takes the edges (dtype EDGE) since it was last called."""
+        self._new = new
+        self._pieces: list[NDArray[Any]] = []
+        self._found: dict[int, tuple[int, list[Edge]]] = {}
+
+    def take(self) -> None:
+        """Takes what is new."""
+        if len(piece := self._new()):
+            self._pieces.append(piece)
+
+    def all(self) -> NDArray[Any]:
+        """Of all pins (dtype EDGE)."""
+        self.take()
+        return np.concatenate([np.empty(0, EDGE), *self._pieces])
+
+    def __getitem__(self, pin: int) -> list[Edge]:
+        self.take()
+        seen, found = self._found.get(pin, (0, []))
+        if seen < len(self._pieces):
+            for piece in self._pieces[seen:]:
+                of_pin = piece[piece["pin"] == pin]
+                found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]
+            self._found[pin] = (len(self._pieces), found)
+        return found
 
 
 @cache
-def bare() -> RobotDescription:
-    """A robot of which only the board is used: no device is joined to it, and nothing drives it anywhere."""
-    return msgspec.structs.replace(
-        load_robot("rover"), name="bare", title="a board by itself", device={}, supply=None, imperfections={}
-    )
+def bare(robot: str) -> RobotDescription:
+    """A robot of which there is only the board: nothing is at its pins, it has 5 V, and nothing drives it anywhere."""
+    own = {"name": "bare", "title": "a board by itself"}
+    return msgspec.structs.replace(load_robot(robot), **own, device={}, supply=None, imperfections={})
 
 
 class Bench:
-    """A board, powered on. Times in cycles since then.
+    """A board, powered on.
 
     Attributes:
-        session: the simulation of the board (SimSession).
-        pins, robot: its pins; the robot that it is on.
-        mark: when what was last waited for happened.
+        session: what the host opens (BoardSession), with its serial line: `session.transport`.
+        board, robot, pins: the board itself, the robot that it is on, and what a test reaches for (sim_bridge/pins.py).
+        edges: what the firmware did to each pin, from the beginning: `edges[13]`.
+        driven: what the outside did, likewise; empty of a native board, which cannot be seen into.
+        mark: the cycle of the last event that was waited for, or that the test itself made.
+        after_slice: who is called whenever time has passed.
     """
 
     def __init__(
@@ -40,56 +95,152 @@ class Bench:
         on: str = "avr",
         robot: RobotDescription | str | None = None,
         arena: str = "empty",
-        seed: int = 1,
         noise: bool = False,
+        **request: Any,
     ) -> None:
-        """`image`: None: the kit's firmware for the robot. `robot`: None: nothing is around the board.
+        """Powers on a board.
+
+        Args:
+            image: ELF or HEX file of its program; None: the kit's firmware.
+            on: avr or native; the native board runs the kit's firmware only.
+            robot: on which it is, in the world; None: it is alone.
+            request: what else a BoardRequest has: seed, bootloader, imperfections, strict and so on.
 
         Raises:
-            BoebotError: the image or the robot is none, or the arena is not there.
+            CallError: there is no such board.
+            BoardError, RobotError, ArenaError: as of a run.
         """
-        described = bare() if robot is None else load_robot(robot) if isinstance(robot, str) else robot
-        request = BoardRequest(
-            robot=described, arena=arena, seed=seed, noise=noise, pins=True, image=None if image is None else str(image)
+        kinds = {kind.name: kind for kind in (AVR, NATIVE)}
+        if on not in kinds:
+            raise CallError(f"there is no board {on!r} for a bench; expected {' or '.join(kinds)}")
+        described = load_robot(robot) if isinstance(robot, str) else robot or bare("shieldbot")
+        self.session = open_on(
+            kinds[on],
+            BoardRequest(
+                robot=described,
+                image=None if image is None else str(image),
+                arena=arena,
+                noise=noise,
+                pins=True,
+                **request,
+            ),
         )
-        self.session = open_on(NATIVE if on == NATIVE.name else AVR, request)
-        self.pins, self.robot = self.session.board, self.session.robot
-        self.robot.handle.is_stamped = True
-        self.mark = 0
-        self._record = Record()
+        self.session.transport.stamp()
+        self.pins, self.robot, self.mark = self.session.board, self.session.robot, 0
+        self.board: EmulatedBoard = self.pins.board
+        self.edges, self.driven = EdgeLog(self._new_edges), EdgeLog(self._new_driven)
+        self.after_slice: list[Callable[[], None]] = []
+        self.sources: list[Source] = []
+        self._outside = self.board.extension("outside log", "board_outside_log")
+        self._frames: dict[str, list[NDArray[Any]]] = {"to_board": [], "from_board": []}
+        self._edge_count = self._queued = 0
+        self._record = Record()  # but for what is in the logs
+
+    # ---- time --------------------------------------------------------------------------------------------------------
 
     @property
     def now(self) -> int:
-        """Up to where it has run."""
-        return self.session.sim.cycle
+        """The cycle up to which the board has run; in a reaction that of the edge."""
+        board = self.board.handle
+        return int(board.op.now(board)) if self.board.reacts_at is None else self.board.reacts_at
 
-    def streams(self) -> Group:
-        """What its pins and its robot have done so far: "pins", "inputs", "line_in", "line_out", "truth"."""
-        self._record.put(self.session.drain())
-        return merged(list(self._record.groups()))
+    def run_until(self, cycle: int, *, edge_of: Collection[int] = ()) -> bool:
+        """Lets time pass up to that cycle, or to an edge of one of these pins, by firmware or outside: True then.
+        Time stands behind the instruction that it meets, at most 3 cycles later; its cycle is in the log. What is
+        to answer at once is a reaction (`on_edge`).
 
-    def run_until(self, cycle: int) -> None:
-        """Lets time pass up to that cycle."""
-        self.session.sim.run(max(0, cycle - self.now))
+        Raises:
+            BoardError: the program crashed, or a reaction lets time pass.
+        """
+        while (now := self.now) < cycle:
+            self.session.transport.do_due()
+            end = min(cycle, now + LONGEST_CYCLES, self.session.transport.next_due)
+            if self.sources:
+                end = min(end, now + SLICE_CYCLES)
+                if end + AHEAD_CYCLES > self._queued:
+                    self._queued = end + AHEAD_CYCLES
+                    for source in self.sources:
+                        source.queue(self, self._queued)
+            met = self.robot.run_to_edge(end, edge_of)
+            if self.session.recorder is not None:
+                self.session.recorder.collect()
+            for look in self.after_slice:
+                look()
+            if met:
+                return True
+        return False
 
-    def received(self) -> tuple[bytes, list[int]]:
-        """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
-        stamped = self.robot.receive_stamped()
-        return bytes(byte for _, byte in stamped), [cycle for cycle, _ in stamped]
+    def run(self, cycles: int) -> None:
+        """Lets `cycles` pass."""
+        self.mark = self.now + cycles
+        self.run_until(self.mark)
+
+    def at(self, cycle: int, action: Callable[[], object]) -> None:
+        """Calls `action` when that cycle has come; it may let no time pass."""
+        self.session.transport.at(cycle / CLOCK_HZ, action)
+
+    # ---- what the outside does ---------------------------------------------------------------------------------------
+
+    def on_edge(self, pin: int, react: Reaction) -> None:
+        """Calls `react(cycle, level)` at each edge that the firmware makes at a pin, at its cycle."""
+        self.board.on_edge(pin, react)
+
+    def ahead(self, source: Source) -> None:
+        """From now on a source queues what it does before each slice of time."""
+        self.sources.append(source)
+
+    def drive(self, pin: int, level: int, at: int = 0) -> None:
+        """From cycle `at` (or now) on the outside drives a pin to LOW 0, HIGH 1, or RELEASED 2, and no part does any
+        more; replaces what was queued for it from then on."""
+        if not (0 <= pin < PINS and 0 <= level <= Level.RELEASED and at >= 0):
+            self.pins.drive(pin, level, at)  # says what is wrong
+            return
+        lib.robot_drive(self.robot.handle, at, pin, level)  # directly: a reaction may be called at each edge of a bus
+
+    def wave(self, pin: int, cycles: Sequence[int] | NDArray[Any], level: int) -> None:
+        """Drives a pin to `level` (LOW, HIGH) at the first of these cycles, to the other one at the next, and so on."""
+        levels = (np.arange(len(cycles)) + int(level)) % 2
+        self.pins.drive_edges(pin, np.array(cycles, np.uint64), levels.astype(np.uint8))
 
     def send(self, data: bytes, at: int = 0) -> None:
         """Puts bytes on the line towards the board, back to back, not before cycle `at`."""
-        board = self.robot.board.handle
+        board = self.board.handle
         board.op.send(board, at, data, len(data))
+
+    # ---- what the board does -----------------------------------------------------------------------------------------
+
+    def received(self) -> tuple[bytes, list[int]]:
+        """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
+        return self.robot.received()
+
+    def streams(self) -> Group:
+        """The streams of a record that tell of its pins, its line and its robot, from the beginning."""
+        log = {"pins": self.edges.all(), "driven": self.driven.all()}
+        log |= {name: np.concatenate([np.empty(0, FRAME), *frames]) for name, frames in self._frames.items()}
+        self._record.put(self.session.drain())
+        return {**merged(list(self._record.groups())), **streams_of(log)}
+
+    def _new_edges(self) -> NDArray[Any]:
+        before, self._edge_count = self._edge_count, self.pins.edge_count
+        if self._edge_count == before or self.session.recorder is None:
+            return np.empty(0, EDGE)
+        return self.session.recorder.edges()
+
+    def _new_driven(self) -> NDArray[Any]:
+        logs = (self._outside.driven, self._outside.to_board, self._outside.from_board) if self._outside else ()
+        if all(log.first == log.end for log in logs):
+            return np.empty(0, EDGE)
+        found = self.pins.outside_log()
+        for name, pieces in self._frames.items():
+            pieces.append(found[name])
+        return found["driven"]
 
     def close(self) -> None:
         """Frees board and world. May be called twice."""
         self.session.close()
 
-    def __enter__(self) -> Bench:
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -56,6 +56,24 @@ void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level) {
   self->board->op->drive(self->board, at, pin, level);
 }
 
+void robot_drive_edges(robot *self, uint8_t pin, const uint64_t *at, const uint8_t *levels, size_t count) {
+  for (size_t i = 0; i < count; i++) robot_drive(self, at[i], pin, levels[i]);
+}
+
+void robot_release(robot *self, uint8_t pin) {
+  uint8_t level = BOARD_RELEASED;
+  for (int i = 0; i < self->part_count; i++) {
+    part *p = self->parts[i];
+    for (int k = 0; k < PART_PINS; k++) {
+      if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
+      p->overridden = 0;
+      if (!p->unplugged) level = p->level[k];
+    }
+  }
+  self->chassis.driven[pin] = level;
+  self->board->op->drive(self->board, 0, pin, level);
+}
+
 int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
   if (duration / half_cycles > WAVE_EDGES_MAXIMUM) return SIM_BAD_ARGUMENT;
   take_pin(self, pin);

@@ -129,7 +129,7 @@ int sim_add_robot(sim *self, int number, uintptr_t address, const body_parameter
   b->sink = robot_on_edge;
   b->sink_context = r;
   b->op->analog(b, robot_on_analog, r);
-  for (unsigned i = 0; i < BOARD_ANALOG_COUNT; i++) r->sampled[i] = NAN;
+  for (unsigned i = 0; i < BOARD_ANALOG_COUNT; i++) r->sampled[i] = r->held[i] = NAN;
   memset(r->outside, BOARD_RELEASED, sizeof r->outside);
   sim_insert(self, r, x, y, heading);
   return SIM_OK;

@@ -1,4 +1,6 @@
 /* run.c: see loop.h. Here: the loop itself. */
+#include <math.h>
+
 #include "parts/infrared.h"
 #include "state.h"
 
@@ -39,6 +41,7 @@ double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
   robot *self = context;
   if (channel == BOARD_ANALOG_SUPPLY) return self->chassis.supply * BOARD_NOMINAL_VOLTS;
   if (channel >= BOARD_ANALOG_COUNT) return 0.0;
+  if (!isnan(self->held[channel])) return self->sampled[channel] = self->held[channel];
   part *p = self->analog[channel];
   return self->sampled[channel] = p == NULL || p->unplugged ? 0.0 : p->op->analog(p, cycle);
 }

@@ -36,6 +36,7 @@ struct robot {
   uint8_t drives[BOARD_PIN_COUNT];                 /* role of the part that drives the pin, or 0 */
   part *analog[BOARD_ANALOG_COUNT];
   double sampled[BOARD_ANALOG_COUNT]; /* V, the converter's last ones; NAN: none yet */
+  double held[BOARD_ANALOG_COUNT];    /* V that a test holds there; NAN: none */
   brown_out brown_out;
   battery *battery;   /* NULL: a supply that never sags */
   double held_supply; /* share of the nominal voltage that a test holds, or 0 */

@@ -9,6 +9,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Mapping
+from itertools import count
 
 from boebot.boards import PinNow, TruthNow, WatchdogReset
 from boebot.description import robots
@@ -102,19 +103,30 @@ class SimTransport:
         self._sim = robot.sim
         self._wait = wait
         self._pins = pins
-        self.follows = False
+        self._stamps = False
+        self._numbers = count()
         self._due: list[tuple[int, int, Callable[[], object]]] = []  # cycle, number, what is done then
 
     def at(self, time_s: float, do: Callable[[], object]) -> None:
         """What is done at that time (s), or now where it is past."""
-        heapq.heappush(self._due, (round(time_s * CLOCK_HZ), len(self._due), do))
+        heapq.heappush(self._due, (round(time_s * CLOCK_HZ), next(self._numbers), do))
+
+    @property
+    def next_due(self) -> int:
+        """The cycle for which something is due next; NEVER."""
+        return self._due[0][0] if self._due else NEVER
+
+    def do_due(self) -> None:
+        """Does what is due by now."""
+        while self.next_due <= self._sim.cycle:
+            heapq.heappop(self._due)[2]()
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
         return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))
 
     def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
-        """As `read`, with the instant at which the last byte had come (s); byte by byte where it follows the board."""
+        """As `read`, with the instant at which the last byte had come (s); byte by byte after `stamp`."""
         # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
         cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
         quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
@@ -122,35 +134,38 @@ class SimTransport:
             self._wait(self._robot, cycles, quiet)
         if self._pins is not None:
             self._pins.collect()
-        if self.follows:
+        if self._stamps:
             return [(cycle / CLOCK_HZ, bytes([byte])) for cycle, byte in self._robot.receive_stamped()]
         data = self._robot.receive()
         return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
 
     def _wait_for_due(self, end: int, listen: int) -> bool:
         """As `read_stamped` waits, and does what is due. False: nothing is until `end`, and no time has passed."""
-        if self._due[0][0] > end:
+        if self.next_due > end:
             return False
-        while (now := self._sim.cycle) < end or (self._due and self._due[0][0] <= now):
-            until = min(end, self._due[0][0]) if self._due else end
+        while (now := self._sim.cycle) < end or self.next_due <= now:
+            until = min(end, self.next_due)
             if until > now:
                 self._wait(self._robot, until - now, min(max(listen - now, 0), until - now))
                 if self._sim.cycle < until:  # bytes have come
                     break
-            while self._due and self._due[0][0] <= self._sim.cycle:
-                heapq.heappop(self._due)[2]()
+            self.do_due()
         return True
 
     def set_baud(self, rate: int) -> None:
         """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
         self._robot.line_rate(rate)
         self.baud = rate
-        self._robot.receive()
+        self._robot.received()
 
     def follow(self) -> None:
         """From now on this side has the board's own bit rate, whatever that is."""
         self._robot.follow_line()
-        self.follows = True
+        self._stamps = True
+
+    def stamp(self) -> None:
+        """From now on `read_stamped` says of each byte when it had come."""
+        self._robot.handle.is_stamped = self._stamps = True
 
     def write(self, data: bytes) -> None:
         """Sends bytes, back to back from now on."""
@@ -172,14 +187,14 @@ class SimSession(InWorld):
         super().__init__(robot, shared=shared)
         self.description = f"{robot.board.description} in arena {self.arena.name}"
         self.board = BoardPins(robot)
-        self._pins = PinRecorder(self.board) if pins else None
-        self.transport = SimTransport(robot, kind, wait, self._pins)
+        self.recorder = PinRecorder(self.board) if pins else None
+        self.transport = SimTransport(robot, kind, wait, self.recorder)
         self.transport.set_baud(self.transport.baud)
         self._notes: list[str] = []
 
     def drain(self, *, ended: bool = False) -> Group:
         """See `boebot.boards.BoardSession`."""
-        edges = {} if self._pins is None else self._pins.drain()
+        edges = {} if self.recorder is None else self.recorder.drain()
         return {**super().drain(ended=ended), **edges}
 
     def counters(self) -> Mapping[str, float]:

@@ -59,10 +59,20 @@ COMMAND = np.dtype([("kind", "u1"), ("left", "<f8"), ("right", "<f8")])
 LINE_FRAME = np.dtype(
     [("bit_time", "<u8"), ("bits", "u1"), ("byte", "u1")]
 )  # cycles of 62.5 ns / 65536; with start, stop
+LOW, HIGH, RELEASED, PULLED_UP = range(4)  # what is done to a pin
 _COMMAND = Struct("<Bdd")
 _EVENT = Struct("<BIB")
 _CLOCK = Struct("<d")
 _READINGS = Struct("<IHdd")
+
+
+def net_level(board: int, outside: int, line_out: int = HIGH) -> int:
+    """Of a pin to which they do that, LOW or HIGH, or RELEASED where it hangs in the air: what the board does; where it
+    has let go of the pin, what the outside does, and else HIGH by its pull-up. `line_out`: what the transmitter does to
+    its pin."""
+    if board in (LOW, HIGH):
+        return min(board, line_out)
+    return outside if outside in (LOW, HIGH) else HIGH if board == PULLED_UP else RELEASED
 
 
 def readings_row(count: int) -> np.dtype[np.void]:

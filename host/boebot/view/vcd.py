@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from boebot.description.wiring import PINS, users_of_pins
 from boebot.devices.device import pin_name
 from boebot.errors import BoebotError
-from boebot.record.record import LINE_FRAME
+from boebot.record.record import HIGH, LINE_FRAME, LOW, RELEASED, net_level
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 TICK_PS, CLOCK_HZ, FRACTION = 100, 16_000_000, 1 << 16  # of LINE_FRAME
 TICKS = 10**12 // TICK_PS // CLOCK_HZ  # 625 in a cycle
-LOW, HIGH, RELEASED, PULLED_UP = range(4)
+VALUES = "01z"  # by LOW, HIGH, RELEASED
 RX, TX = 0, 1  # pins of the serial line
 BOARD, OUTSIDE, LINE_OUT = range(3)  # who does something to a pin
 AT_ONCE = 100_000  # changes that Python looks at
@@ -113,16 +113,9 @@ def values(record: Record) -> Iterator[tuple[int, int, str]]:
     for some in np.array_split(order, len(order) // AT_ONCE + 1):
         for tick, pin, who, level in zip(*(column[some].tolist() for column in all_of), strict=True):
             state[pin][who] = level
-            if (value := _value(*state[pin])) != shown[pin]:
+            if (value := VALUES[net_level(*state[pin])]) != shown[pin]:
                 shown[pin] = value
                 yield tick, pin, value
-
-
-def _value(board: int, outside: int, line_out: int) -> str:
-    """Of a pin to which they do that."""
-    if board in (LOW, HIGH):
-        return str(min(board, line_out))
-    return str(outside) if outside in (LOW, HIGH) else "1" if board == PULLED_UP else "z"
 
 
 def _edges(block: Block, who: int) -> Changes:

@@ -1,0 +1,295 @@
+"""One pin of a bench, for tests: driven, looked at and waited for, in seconds of the board's time unless it says so.
+
+What is looked at is the level that a logic analyser shows: what the firmware does, and where that has let go of the
+pin, what the outside does. Every answer follows from the log of edges and from the bench's `mark`, the last event that
+was waited for or that the test made itself; how far the board has run since does not matter. Keep one Pin per pin: it
+sorts out the log as it grows.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import merge
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boebot.arguments import number, shown, whole
+from boebot.devices.device import pin_name, pin_number
+from boebot.errors import CallError
+from boebot.record.record import net_level
+from sim_bridge.bench.bench import Bench
+from sim_bridge.bench.waiting import Cannot, WaitError
+from sim_bridge.boards.board import CLOCK_HZ, PINS, Level
+
+NET = np.dtype([("cycle", "<u8"), ("level", "u1")])  # RELEASED: it hangs in the air
+LEVELS = (Level.LOW, Level.HIGH, Level.RELEASED)
+WITHIN_S = 1.0  # that a wait takes at most, unless it says otherwise
+EDGES_MAXIMUM = 10_000_000  # of a wave
+UCSR0B, LINE_PINS = 0xC1, {0: 1 << 4, 1: 1 << 3}  # RXEN0, TXEN0: pins of the serial line (ATmega328P, 20.11.3)
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Pulse:
+    """A stretch of one level, from the edge that began it to the one that ended it."""
+
+    start: int
+    """cycle"""
+    cycles: int
+    level: int
+
+    @property
+    def start_s(self) -> float:
+        """When it began, s since power-on."""
+        return self.start / CLOCK_HZ
+
+    @property
+    def us(self) -> float:
+        """How long it is."""
+        return self.cycles * 1e6 / CLOCK_HZ
+
+
+class Square:
+    """A square wave without end, as a source: edge k comes k half periods after the first one, to the nearest cycle."""
+
+    def __init__(self, pin: int, half: float, first: int, level: int) -> None:
+        self.pin, self._half, self._first, self._level, self._count = pin, half, first, level, 0
+
+    def queue(self, bench: Bench, until: int) -> None:
+        """See Source."""
+        if (end := max(self._count, math.ceil((until - self._first) / self._half))) > self._count:
+            cycles = self._first + np.round(np.arange(self._count, end) * self._half)
+            bench.wave(self.pin, cycles, (self._level + self._count) % 2)
+            self._count = end
+
+
+class Pin:
+    """A pin by its number, 0..13 or "A0".."A5". Pins 0 and 1 are the serial line's while the program uses that."""
+
+    def __init__(self, bench: Bench, name: int | str) -> None:
+        """Raises CallError where there is no such pin."""
+        try:
+            self.number = name if isinstance(name, int) and 14 <= name < PINS else pin_number(name)
+        except ValueError as refused:
+            raise CallError(str(refused)) from None
+        self.bench = bench
+        self._cycles, self._levels = [0], [int(Level.RELEASED)]  # of its changes
+        self._does = [int(Level.RELEASED), int(Level.RELEASED)]  # the firmware, the outside
+        self._seen = [0, 0]
+
+    def __str__(self) -> str:
+        return f"pin {pin_name(self.number)}"
+
+    # ---- driven ------------------------------------------------------------------------------------------------------
+
+    def drive(self, level: int, after: float = 0.0) -> None:
+        """Drives it to 0 or 1 from `after` seconds from now on, until `release`; no part drives it any more."""
+        level = whole(f"{self}: the level", level, CallError, least=0, most=1)
+        self._drive(np.array([self._cycle(after)]), np.array([level]))
+
+    def release(self) -> None:
+        """Gives it back to the part that drives it; lets go of it where none does."""
+        self._begin()
+        self.bench.pins.release(self.number)
+
+    def square(self, hz: float, count: int | None = None, after: float = 0.0) -> None:
+        """Drives a square wave: `count` whole periods that begin high, and then low; without end where it is None."""
+        hz = number(f"{self}: the frequency", hz, CallError, least=1e-3, most=CLOCK_HZ / 2)
+        first, half = self._cycle(after), CLOCK_HZ / hz / 2
+        if count is None:
+            self._begin()
+            self.bench.ahead(Square(self.number, half, first, Level.HIGH))
+            return
+        count = whole(f"{self}: the count", count, CallError, least=1, most=EDGES_MAXIMUM // 2)
+        edges = np.arange(2 * count)
+        self._drive(first + np.round(edges * half), (edges + 1) % 2)
+
+    def bounce(self, level: int, count: int = 5, over: float = 2e-3, seed: int = 1, after: float = 0.0) -> None:
+        """Drives it to `level` as a contact does: it flicks back `count` times, at random within `over` seconds."""
+        level = whole(f"{self}: the level", level, CallError, least=0, most=1)
+        cycles = round(number(f"{self}: the bouncing time", over, CallError, least=1e-6, most=10.0) * CLOCK_HZ)
+        count = whole(f"{self}: the count", count, CallError, least=0, most=min(EDGES_MAXIMUM, cycles // 4))
+        flicks = sorted(random.Random(seed).sample(range(1, cycles + 1), 2 * count))
+        edges = np.array([0, *flicks])
+        self._drive(self._cycle(after) + edges, (level + np.arange(len(edges))) % 2)
+
+    def wave(self, rows: NDArray[Any], after: float = 0.0) -> None:
+        """Drives it as the rows say, shape (n, 2): time (s, counted from `after` seconds from now on, never less than
+        before) and level (0, 1, or 2 for let go of)."""
+        try:
+            times, levels = np.asarray(rows, float).reshape(-1, 2).T
+        except (TypeError, ValueError):
+            raise CallError(f"{self}: the wave is {shown(rows)}; expected rows of a time and a level") from None
+        in_order = np.all(np.isfinite(times)) and np.all(np.diff(times, prepend=0.0) >= 0)
+        if not in_order or not np.all(np.isin(levels, LEVELS)) or not 0 < len(times) <= EDGES_MAXIMUM:
+            raise CallError(
+                f"{self}: the wave has a time that is less than one before, a level that is not 0, 1 or 2, or no row"
+            )
+        self._drive(self._cycle(after) + np.round(times * CLOCK_HZ), levels)
+
+    def _cycle(self, after: float) -> int:
+        after = number(f"{self}: after", after, CallError, least=0.0, most=1e6)
+        return self.bench.now + round(after * CLOCK_HZ)
+
+    def _drive(self, cycles: NDArray[Any], levels: NDArray[Any]) -> None:
+        self._begin()
+        self.bench.pins.drive_edges(self.number, cycles.astype(np.uint64), levels.astype(np.uint8))
+
+    def _begin(self) -> None:
+        """The test does something to the pin: the bench's mark, but in a reaction, which is a part's; a wave ends."""
+        self._expect_no_line()
+        bench = self.bench
+        if bench.board.reacts_at is None:
+            bench.mark = bench.now
+        bench.sources[:] = [one for one in bench.sources if not (isinstance(one, Square) and one.pin == self.number)]
+
+    # ---- looked at ---------------------------------------------------------------------------------------------------
+
+    @property
+    def level(self) -> Level:
+        """As it is now: LOW, HIGH, or RELEASED where it hangs in the air."""
+        self._look()
+        return Level(self._levels[-1])
+
+    def edges(self, since: int | None = None) -> NDArray[Any]:
+        """Its changes (dtype NET: cycle and level from then on) from a cycle on, or from the mark."""
+        self._look()
+        first = bisect_left(self._cycles, self.bench.mark if since is None else since)
+        return np.array(list(zip(self._cycles[first:], self._levels[first:], strict=True)), NET)
+
+    def _look(self) -> None:
+        """Takes the edges that are new. What comes and goes within one cycle is no change."""
+        self._expect_no_line()
+        logs = [self.bench.edges[self.number], self.bench.driven[self.number]]
+        found = merge(*([(e.cycle, who, e.level) for e in logs[who][self._seen[who] :]] for who in (0, 1)))
+        self._seen = [len(log) for log in logs]
+        for cycle, who, level in found:
+            self._does[who] = level
+            if (net := net_level(*self._does)) == self._levels[-1]:
+                continue
+            if cycle > self._cycles[-1] or len(self._cycles) == 1:
+                self._cycles.append(cycle)
+                self._levels.append(net)
+            else:
+                self._levels[-1] = net
+                if net == self._levels[-2]:
+                    del self._cycles[-1], self._levels[-1]
+
+    def _expect_no_line(self) -> None:
+        if (bit := LINE_PINS.get(self.number)) is None:
+            return
+        if self.bench.board.extension("data", "uint8_t") is None or self.bench.pins.read_memory(UCSR0B, 1)[0] & bit:
+            raise Cannot(f"{self} is the serial line's while the program uses that; expected the line itself")
+
+    # ---- waited for --------------------------------------------------------------------------------------------------
+
+    def wait(self, level: int, within: float = WITHIN_S) -> float:
+        """Waits until it is at that level, 0 or 1, at the mark or later. That instant is the mark then, and returned: s
+        since power-on, exact to the cycle.
+
+        Raises:
+            WaitError: it did not come to that, for `within` seconds from now.
+        """
+        level = whole(f"{self}: the level", level, CallError, least=0, most=1)
+
+        def found(mark: int) -> int | None:
+            at = max(0, bisect_right(self._cycles, mark) - 1)
+            levels = self._levels[at:]
+            return max(mark, self._cycles[at + levels.index(level)]) if level in levels else None
+
+        cycle = self._wait(found, lambda cycle: cycle, within, f"to be {level}")
+        return cycle / CLOCK_HZ
+
+    def pulse(self, within: float = WITHIN_S, level: int = 1) -> Pulse:
+        """Waits for the first pulse of that level that begins at the mark or later, and for its end, the mark then.
+
+        Raises:
+            WaitError: none has come and gone `within` seconds from now.
+        """
+        return self.pulses(1, within, level)[0]
+
+    def pulses(self, count: int, within: float = WITHIN_S, level: int = 1) -> list[Pulse]:
+        """Waits for that many of them, one after another. Raises as `pulse`."""
+        count = whole(f"{self}: the count", count, CallError, least=1, most=EDGES_MAXIMUM)
+        level = whole(f"{self}: the level", level, CallError, least=0, most=1)
+
+        def found(mark: int) -> list[Pulse] | None:
+            some = self.all_pulses(mark, level) if self._has(2 * count, mark) else ()
+            return [Pulse(int(at), int(cycles), level) for at, cycles in some[:count]] if len(some) >= count else None
+
+        return self._wait(found, lambda some: some[-1].start + some[-1].cycles, within, f"for {_many(count, level)}")
+
+    def all_pulses(self, since: int = 0, level: int = 1) -> NDArray[np.int64]:
+        """Start and length, in cycles, of each pulse that has ended and began at `since` or later: shape (n, 2)."""
+        changes = self.edges(since)
+        cycles, begins = changes["cycle"].astype(np.int64), np.flatnonzero(changes["level"][:-1] == level)
+        return np.column_stack((cycles[begins], cycles[begins + 1] - cycles[begins]))
+
+    def frequency(self, periods: int = 8, within: float = WITHIN_S) -> float:
+        """Hz, over that many whole periods, from rise to rise, from the mark on. Raises as `pulse`."""
+        return self._over(periods, within)[0]
+
+    def duty(self, periods: int = 8, within: float = WITHIN_S) -> float:
+        """Share of the time, 0 to 1, for which it is high, over that many whole periods. Raises as `pulse`."""
+        return self._over(periods, within)[1]
+
+    def _over(self, periods: int, within: float) -> tuple[float, float]:
+        """Frequency (Hz) and duty."""
+        periods = whole(f"{self}: the periods", periods, CallError, least=1, most=EDGES_MAXIMUM)
+
+        def found(mark: int) -> tuple[int, int, int] | None:
+            changes = self.edges(mark if self._has(2 * periods + 1, mark) else self.bench.now)
+            rises = np.flatnonzero(changes["level"] == Level.HIGH)[: periods + 1]
+            if len(rises) <= periods:
+                return None
+            inside = changes[rises[0] : rises[-1] + 1]
+            lengths = np.diff(inside["cycle"].astype(np.int64))
+            high = int(lengths[inside["level"][:-1] == Level.HIGH].sum())
+            return high, int(lengths.sum()), int(inside["cycle"][-1])
+
+        what = f"for {periods} periods"
+        high, in_all, _ = self._wait(found, lambda some: some[2], within, what)
+        return periods * CLOCK_HZ / in_all, high / in_all
+
+    def _has(self, changes: int, since: int) -> bool:
+        """It has had that many changes from that cycle on."""
+        return len(self._cycles) - bisect_left(self._cycles, since) >= changes
+
+    def _wait(self, found: Callable[[int], T | None], event: Callable[[T], int], within: float, what: str) -> T:
+        """What is found at last; its event's cycle is then the mark."""
+        within = number(f"{self}: within", within, CallError, least=0.0, most=1e6)
+        bench = self.bench
+        mark, begin, end = bench.mark, bench.now, bench.now + round(within * CLOCK_HZ)
+        self._look()
+        while (some := found(mark)) is None or event(some) > end:
+            if bench.now >= end:
+                raise WaitError(f"{self}: waited {within:g} s {what}; {self._seen_since(begin)}")
+            bench.run_until(end, edge_of=(self.number,))
+            self._look()
+        bench.mark = event(some)
+        return some
+
+    def _seen_since(self, begin: int) -> str:
+        """In words: what it did since a cycle."""
+        names = {Level.LOW: "0", Level.HIGH: "1", Level.RELEASED: "in the air"}
+        count = len(self._cycles) - bisect_right(self._cycles, begin)
+        native = "" if self.bench.board.extension("outside log", "board_outside_log") else NATIVE
+        return (
+            f"it had {count} edges meanwhile, and has been {names[Level(self._levels[-1])]} since "
+            f"{self._cycles[-1] / CLOCK_HZ:.6f} s; now it is {self.bench.now / CLOCK_HZ:.6f} s{native}"
+        )
+
+
+NATIVE = " (of the native board only what the firmware drives is seen)"
+
+
+def _many(count: int, level: int) -> str:
+    """Pulses, in words."""
+    kind = "high" if level else "low"
+    return f"a {kind} pulse" if count == 1 else f"{count} {kind} pulses"
