@@ -1,5 +1,6 @@
 """What is left of a test that failed: what happened at the board, in a folder with the test's name: pins.vcd for
-GTKWave and PulseView, serial.txt, and again.txt, the command that repeats it."""
+GTKWave and PulseView, serial.txt, run with its record where there is a robot, and again.txt, the command that repeats
+it."""
 
 from __future__ import annotations
 
@@ -26,3 +27,4 @@ def keep(uno: Uno, folder: Path, again: str) -> None:
     (folder / "again.txt").write_text(f"{again}\n", encoding="utf-8")
     (folder / "serial.txt").write_bytes(uno.serial.heard)
     uno.save_pins(folder / "pins.vcd")
+    uno.save_record(folder / "run")

@@ -10,6 +10,7 @@ standard library until the fixture is used.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shlex
 import shutil
@@ -23,13 +24,22 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from sim_bridge.bench.cover import Coverage
+    from sim_bridge.bench.cycles import Baseline
     from sim_bridge.bench.uno import Uno, Wanted
 
 MARK = "uno"
-MEASURED, CANNOT = "uno.measured.", "uno.cannot"  # of the properties of a test's report, which reach JUnit's file
+PASSED = pytest.StashKey[bool]()
+MEASURED, CANNOT, CYCLES = (
+    "uno.measured.",
+    "uno.cannot",
+    "uno.cycles",
+)  # of the properties of a test's report, which reach JUnit's file
 DEFAULT_BOARD = "avr"
+BASELINE, UPDATE = "uno-baseline.json", "update"
 UNO: pytest.StashKey[Uno] = pytest.StashKey()
-KEYWORDS = ("image", "robot", "arena", "seed", "noise", "baud", "motors")
+SESSION: pytest.StashKey[Session] = pytest.StashKey()
+KEYWORDS = ("image", "robot", "arena", "seed", "noise", "baud", "motors", "cycles", "faults")
 
 
 # ---- options and marks -----------------------------------------------------------------------------------------------
@@ -44,6 +54,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--uno-flash", action="store_true", help="write the tests' programs into the board at the port")
     group.addoption("--uno-motors", action="store_true", help="the motors at a board behind a port may turn")
     group.addoption(
+        "--uno-baseline",
+        metavar="FILE|update",
+        help="cycles of functions as they were: a change fails (uno-baseline.json, if it is there); update writes that",
+    )
+    group.addoption("--uno-cover", action="store_true", help="lines and conditional jumps that the tests have executed")
+    group.addoption(
         "--uno-keep",
         metavar="DIR",
         default=".uno",
@@ -53,11 +69,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Its mark; and refuses a port that several processes would open."""
-    config.addinivalue_line(
-        "markers", "uno(image=, robot=, arena=, seed=, noise=, baud=, motors=): what the fixture `uno` has in it"
-    )
-    if not hasattr(config, "workerinput"):  # a process of xdist's
-        config.pluginmanager.register(Session(config), "uno-session")
+    config.addinivalue_line("markers", f"uno({'=, '.join(KEYWORDS)}=): what the fixture `uno` has in it")
+    config.stash[SESSION] = Session(config)
+    config.pluginmanager.register(config.stash[SESSION], "uno-session")
     ports = [board for board in boards(config) if board not in ("avr", "native")]
     if ports and (getattr(config.option, "numprocesses", None) or hasattr(config, "workerinput")):
         raise pytest.UsageError(f"--uno-on={ports[0]}: one process at a time can have it open; expected no -n")
@@ -97,7 +111,13 @@ def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
         pytest.fail(failure, pytrace=False)
     request.node.stash[UNO] = opened
     yield opened
-    opened.close()
+    try:
+        request.config.stash[SESSION].take_cover(opened)
+        failure = opened.unfired() if request.node.stash.get(PASSED, False) else ""
+    finally:
+        opened.close()
+    if failure:
+        pytest.fail(f"uno: {failure}", pytrace=False)
 
 
 def _wanted(item: pytest.Item) -> Wanted:
@@ -115,6 +135,10 @@ def _wanted(item: pytest.Item) -> Wanted:
             hint = did_you_mean(unknown, KEYWORDS)
             raise CallError(f"@pytest.mark.uno({unknown}=...): expected one of {', '.join(KEYWORDS)}{hint}")
         asked |= mark.kwargs
+    for name in ("cycles", "faults"):
+        asked[name] = (given,) if isinstance(given := asked.get(name, ()), str) else tuple(given)
+    session = item.config.stash[SESSION]
+    asked |= {"cover": session.covers, "cycles": tuple(dict.fromkeys((*asked["cycles"], *session.functions(item))))}
     if asked.get("image") is None and asked.get("robot") is None:
         raise CallError(
             f"{item.name} says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot="
@@ -159,11 +183,14 @@ def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
-    """What the board cannot do is skipped; values beyond their limits fail the test when it has ended."""
+    """What the board cannot do is skipped; values beyond their limits, and cycles that are not as they were, fail the
+    test when it has ended."""
     result = yield from _judged(item)
-    opened = item.stash.get(UNO, None)
-    if opened is not None and (wrong := [str(one) for one in opened.measured if one.verdict == "fail"]):
-        pytest.fail("\n".join(wrong), pytrace=False)
+    if (opened := item.stash.get(UNO, None)) is not None:
+        wrong = [str(one) for one in opened.measured if one.verdict == "fail"]
+        if wrong := wrong + item.config.stash[SESSION].changes(item, opened):
+            pytest.fail("\n".join(wrong), pytrace=False)
+    item.stash[PASSED] = True
     return result
 
 
@@ -198,6 +225,8 @@ def pytest_runtest_makereport(
     opened = item.stash.get(UNO, None)
     if opened is not None and call.when == "call":
         item.user_properties += [(MEASURED + one.name, json.dumps(one.as_dict())) for one in opened.measured]
+        if opened.recorded is not None and (seen := opened.recorded.seen()):
+            item.user_properties.append((CYCLES, json.dumps([dataclasses.asdict(one) for one in seen])))
     report = yield
     if opened is not None and call.when != "teardown":
         _keep(item, opened, report)
@@ -229,37 +258,126 @@ def _command(config: pytest.Config, name: str) -> str:
 
 
 class Session:
-    """What the tests of a session have measured and what boards could not do, from the reports of all processes."""
+    """What the tests of a session have found, from the reports of all processes, and what is said of it at the end."""
 
     def __init__(self, config: pytest.Config) -> None:
-        self._folder = config.rootpath / config.getoption("--uno-keep")
+        self._config, self._root = config, config.rootpath
+        self._folder = Path(config.rootpath, config.getoption("--uno-keep"))
         self._measured: dict[str, list[dict[str, Any]]] = {}
         self._cannot: Counter[str] = Counter()
+        self._cycles: dict[str, list[dict[str, Any]]] = {}
+        self.covers: bool = config.getoption("--uno-cover")
+        self._coverage: Coverage | None = None
+        self._not_covered: set[str] = set()
+
+    # ---- cycles, as they were before -----------------------------------------------------------------------------
+
+    @property
+    def _updates(self) -> bool:
+        return bool(self._config.getoption("--uno-baseline") == UPDATE)
+
+    def _baseline(self) -> Baseline:
+        from sim_bridge.bench.cycles import Baseline
+
+        given = self._config.getoption("--uno-baseline")
+        return Baseline(self._root / (BASELINE if given in (None, UPDATE) else given), new=self._updates)
+
+    def functions(self, item: pytest.Item) -> list[str]:
+        """Those that the baseline has for a test."""
+        return [] if self._updates or not self._has_baseline() else self._baseline().functions(item.nodeid)
+
+    def _has_baseline(self) -> bool:
+        given = self._config.getoption("--uno-baseline")
+        return given is not None or (self._root / BASELINE).exists()
+
+    def changes(self, item: pytest.Item, opened: Uno) -> list[str]:
+        """What took other cycles than before, in sentences."""
+        if opened.recorded is None or self._updates or not self._has_baseline():
+            return []
+        return self._baseline().changes(item.nodeid, opened.recorded.rows())
+
+    # ---- coverage ------------------------------------------------------------------------------------------------
+
+    def take_cover(self, opened: Uno) -> None:
+        """What a test's program has executed."""
+        if not self.covers:
+            return
+        from boebot.errors import BoebotError
+        from sim_bridge.bench.cover import Coverage
+
+        self._coverage = self._coverage or Coverage()
+        try:
+            self._coverage.add(opened.elf(), opened.avr("coverage").cover())
+        except BoebotError as error:
+            self._not_covered.add(str(error))
+
+    def pytest_sessionfinish(self) -> None:
+        """A process of xdist's sends what it has."""
+        if hasattr(self._config, "workeroutput"):
+            covered = self._coverage.as_dict() if self._coverage else {}
+            self._config.workeroutput["uno_cover"] = [covered, sorted(self._not_covered)]
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        """Takes it."""
+        covered, not_covered = getattr(node, "workeroutput", {}).get("uno_cover", ({}, ()))
+        self._not_covered.update(not_covered)
+        if covered:
+            from sim_bridge.bench.cover import Coverage
+
+            self._coverage = self._coverage or Coverage()
+            self._coverage.merge(covered)
+
+    # ---- reports -------------------------------------------------------------------------------------------------
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Collects, of each test once."""
         for name, value in report.user_properties if report.when == "teardown" else ():
             if name == CANNOT:
                 self._cannot[str(value)] += 1
+            elif name == CYCLES:
+                self._cycles[report.nodeid] = json.loads(str(value))
             elif name.startswith(MEASURED):
                 self._measured.setdefault(report.nodeid, []).append(json.loads(str(value)))
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Prints it, and writes what was measured."""
+        """Prints it, and writes its files."""
+        say = terminalreporter.write_line
         if self._measured:
             terminalreporter.section("measured")
             for name, values in self._measured.items():
-                terminalreporter.write_line(name)
+                say(name)
                 for row in values:
-                    terminalreporter.write_line(f"  {_in_words(row)}")
-            self._folder.mkdir(parents=True, exist_ok=True)
-            file = self._folder / "measured.json"
-            file.write_text(json.dumps(self._measured, indent=1) + "\n", encoding="utf-8")
-            terminalreporter.write_line(f"also in {file}")
+                    say(f"  {_in_words(row)}")
+            say(f"also in {self._write('measured.json', json.dumps(self._measured, indent=1))}")
+        if self._cycles:
+            from sim_bridge.bench.cycles import FunctionCycles, table_of
+
+            terminalreporter.section("cycles of functions")
+            seen = {name: [FunctionCycles(**row) for row in rows] for name, rows in self._cycles.items()}
+            say(table_of(seen))
+            if self._updates:
+                baseline = self._baseline()
+                for name, found in seen.items():
+                    baseline.put(name, {one.name: (one.shortest, one.longest) for one in found})
+                baseline.write()
+                say(f"written to {baseline.path}")
+        if self._coverage is not None:
+            terminalreporter.section("executed")
+            say(self._coverage.table(self._root))
+            say(f"also in {self._write('cover.info', self._coverage.lcov(self._root))}")
+        for sentence in sorted(self._not_covered):
+            say(f"not counted: {sentence}")
         if self._cannot:
             terminalreporter.section(f"skipped, as the board cannot do it: {self._cannot.total()}")
             for reason, count in self._cannot.items():
-                terminalreporter.write_line(f"{count} x {reason}")
+                say(f"{count} x {reason}")
+
+    def _write(self, name: str, text: str) -> Path:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        file = self._folder / name
+        file.write_text(f"{text.rstrip()}\n", encoding="utf-8")
+        return file
 
 
 def _in_words(row: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from boebot.arguments import number, shown
@@ -11,7 +11,7 @@ from boebot.errors import CallError
 from boebot.link.transport import Stamping, Transport
 from sim_bridge.bench.waiting import WaitError
 
-SLICE_S = 0.000_25  # of waiting, between two looks at what has come
+SLICE_S = 0.000_5  # of waiting, between two looks at what has come
 PORTION_S = 0.25  # of time that only passes
 NOTHING_S = 1e-9
 SHOWN = 200  # bytes of what came, in the text of an error
@@ -54,6 +54,10 @@ class Serial:
     def heard(self) -> bytes:
         """All that has come so far, where no time passes any more."""
         return bytes(self._text)
+
+    def stamped(self) -> Iterator[tuple[float, bytes]]:
+        """The same byte by byte, with the end of its stop bit."""
+        return zip(self._ends_s, (bytes([byte]) for byte in self._text), strict=True)
 
     @property
     def text(self) -> bytes:

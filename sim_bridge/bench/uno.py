@@ -7,28 +7,41 @@ Times are the board's (s), and a wait is over when what it waits for has happene
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from boebot import flashing
 from boebot.arguments import number
 from boebot.boards import is_live, open_port
 from boebot.description.robots import load_robot
+from boebot.devices.readings import Readings
 from boebot.devices.uart import Uart
-from boebot.errors import BoardError, CallError
+from boebot.errors import BoardError, BoebotError, CallError
 from boebot.image.program import read_program
+from boebot.link.bad_line import BadLine
+from boebot.record.blocks import merged
+from boebot.record.record import Record
 from sim_bridge.bench.bench import Bench
+from sim_bridge.bench.buses import I2c, Spi
 from sim_bridge.bench.measured import Measurement
+from sim_bridge.bench.pins import Pin
 from sim_bridge.bench.serial import Line, Serial
 from sim_bridge.bench.waiting import Cannot
+from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_image
+from sim_bridge.sessions.session import SimTransport
 
 if TYPE_CHECKING:
     from boebot.boards import TruthNow
+    from boebot.image.data import Variables
+    from sim_bridge.bench.cycles import Cycles, FunctionCycles
+    from sim_bridge.bench.symbols import Symbol
     from sim_bridge.sim import SimRobot
 
 AVR, NATIVE = "avr", "native"
@@ -36,7 +49,7 @@ UCSR0B, RXEN0 = 0xC1, 0x10  # of the data space: the receiver is on (ATmega328P 
 START_S = 2.0  # from a real board's reset to its program, at most: boot loaders wait for 1.4 s and less
 ALLOWANCE_S = 0.1  # of a wait on a port: USB, and a computer that has more to do (chosen)
 LONGEST_S = 86_400.0
-BOARD_GUARD_CYCLES = 64  # that what comes to a board is ahead of it (boards/board.h)
+TICK_S, TICK_CYCLES = 0.01, 160_000  # of the record
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +62,8 @@ class Wanted:
         seed, noise: of that world.
         baud: of this end of the serial line; None: always the board's own rate, at a port the robot's.
         motors: whether the program may turn motors, of which those of a real robot are kept still.
+        cycles: functions of the program whose calls are measured. faults: what fails, as `Uno.fault` has it.
+        cover: which instructions are executed is kept.
     """
 
     image: Path | None = None
@@ -58,6 +73,9 @@ class Wanted:
     noise: bool = False
     baud: int | None = None
     motors: bool = True
+    cycles: Sequence[str] = ()
+    faults: Sequence[str] = ()
+    cover: bool = False
 
 
 class Uno:
@@ -66,6 +84,7 @@ class Uno:
     Attributes:
         serial: its serial line.
         measured: what `measure` was told, oldest first.
+        recorded: cycles of the functions that the mark names; None: of none.
     """
 
     def __init__(self, on: str, wanted: Wanted, line: Line, bench: Bench | None) -> None:
@@ -73,6 +92,30 @@ class Uno:
         self._on, self._wanted, self._bench_or_none = on, wanted, bench
         self.serial = Serial(line)
         self.measured: list[Measurement] = []
+        self._pins: dict[int | str, Pin] = {}
+        self._robot = load_robot(wanted.robot or "shieldbot") if bench is None else bench.robot.description
+        self._fired: dict[str, Callable[[], int]] = {}
+        self._record = Record()
+        if bench is not None and wanted.robot is not None:
+            bench.after_slice.append(self._put_aside)
+        self.recorded: Cycles | None = None
+
+    def begin(self) -> Uno:
+        """Before time passes: what is to fail and to be recorded. Raises as `open_uno`, and is closed then."""
+        wanted = self._wanted
+        try:
+            for fault in wanted.faults:
+                self.fault(fault)
+            if wanted.cycles:
+                from sim_bridge.bench.cycles import Cycles
+
+                self.recorded = Cycles(self.avr("cycles"), self.elf(), wanted.cycles)
+            if wanted.cover and self._bench_or_none is not None and self._on == AVR:
+                self.avr("coverage").cover()
+        except BoebotError:
+            self.close()
+            raise
+        return self
 
     def bench(self, what: str) -> Bench:
         """The bench that the board is on.
@@ -84,11 +127,19 @@ class Uno:
             raise Cannot(f"a test cannot reach the {what} of a board at a port")
         return self._bench_or_none
 
-    def _memory(self, what: str) -> Bench:
-        bench = self.bench(what)
-        if self._on != AVR:
-            raise Cannot(f"the {self._on} board has no {what}: its program is this computer's")
-        return bench
+    def avr(self, what: str) -> AvrBoard:
+        """The emulated ATmega328P. Raises Cannot where the board is another, of which `what` is not known."""
+        board = self.bench(what).robot.board
+        if not isinstance(board, AvrBoard):
+            raise Cannot(f"the {self._on} board shows no {what}: its program is one of this computer")
+        return board
+
+    def elf(self) -> Path:
+        """The file that says what lies where in the program. Raises CallError: it is a HEX file, which does not."""
+        if (elf := self.avr("symbols").elf) is None:
+            name = self._wanted.image.name if self._wanted.image else "the program"
+            raise CallError(f"{name} has no symbols; expected the ELF file that it was made from")
+        return elf
 
     # ---- time --------------------------------------------------------------------------------------------------------
 
@@ -108,6 +159,31 @@ class Uno:
         self.bench("reset line").pins.reset(cause)
 
     # ---- what is at the board ----------------------------------------------------------------------------------------
+
+    def pin(self, pin: int | str) -> Pin:
+        """A pin, by its name on the board's print: 0..13, "A0".."A5"; driven, looked at and waited for (pins.py).
+
+        Raises:
+            CallError: there is no such pin.
+            Cannot: the board is behind a port.
+        """
+        return self._pins.setdefault(pin, Pin(self.bench("pins"), pin))
+
+    def analog(self, channel: int) -> Analog:
+        """An analog input, 0..5: `uno.analog(0).set(2.5)`, in volts."""
+        return Analog(self.bench("analog inputs"), channel)
+
+    @cached_property
+    def i2c(self) -> I2c:
+        """The two-wire bus, for devices in Python (buses.py)."""
+        self.avr("I2C bus")
+        return I2c(self.bench("I2C bus"))
+
+    @cached_property
+    def spi(self) -> Spi:
+        """The SPI, likewise."""
+        self.avr("SPI")
+        return Spi(self.bench("SPI"))
 
     @property
     def robot(self) -> SimRobot:
@@ -129,6 +205,58 @@ class Uno:
             raise CallError(f"uno.{what}: the board is on no robot; expected one in the mark: robot='shieldbot'")
         return bench
 
+    # ---- what is in the program --------------------------------------------------------------------------------------
+
+    def symbol(self, name: str) -> Symbol:
+        """A variable of the program: `.value`, read or set, `[index]` of an array, `["member"]` of a structure.
+
+        Raises:
+            CallError: the image has no symbols. AnalysisError: it has no such variable.
+        """
+        from sim_bridge.bench.symbols import Symbol
+
+        elf = self.elf()
+        return Symbol(self.bench("memory").pins, _variables(elf).find(name))
+
+    def cycles(self, function: str) -> FunctionCycles:
+        """What calls of a function took so far: `.shortest`, `.longest`, and the `.bound` where there is one.
+
+        Raises:
+            CallError: the mark does not name it. BoardError: no call of it has ended.
+        """
+        self.avr("cycles")
+        if self.recorded is None:
+            raise CallError(f"cycles of {function} are not recorded; expected cycles=({function!r},) in the mark")
+        return self.recorded[function]
+
+    # ---- what fails --------------------------------------------------------------------------------------------------
+
+    def fault(self, what: str) -> None:
+        """Lets something fail, in words as of `boebot run --fault`: NAME[=VALUE]@START[..END], by the board's time.
+
+        Raises:
+            CallError: there is no such fault here.
+            Cannot: the board is behind a port, where only the line and the host can fail.
+        """
+        from boebot.running.faults import HOST, inject, read
+
+        fault = read(what, self._robot)
+        hosts = fault.name.partition(".")[0] in HOST and fault.name != "serial.rate"
+        session: Any = None if hosts else self.bench("parts").session
+        self._fired[what] = inject(fault, self._robot, session, self._bad_line)
+
+    def _bad_line(self) -> BadLine:
+        line = self.serial.line
+        if not isinstance(line.transport, BadLine):
+            line.transport = BadLine(line.transport, self._wanted.seed)
+        return line.transport
+
+    def unfired(self) -> str:
+        """In a sentence: those that changed nothing so far; or ""."""
+        from boebot.running.faults import unfired
+
+        return str(unfired({name: fired() for name, fired in self._fired.items()}) or "")
+
     # ---- what was measured -------------------------------------------------------------------------------------------
 
     def measure(
@@ -149,13 +277,55 @@ class Uno:
         """Writes what all pins did so far, for viewers of logic signals; False: of this board that is not known."""
         if self._bench_or_none is None:
             return False
-        from boebot.record.record import Record
         from boebot.view import vcd
 
         bench = self._bench_or_none
         record, what = Record.of(bench.streams()), str(self._wanted.image or self._wanted.robot)
         vcd.write_boards([(bench.robot.description, record)], what, path)
         return True
+
+    def _put_aside(self) -> None:
+        """What the robot's parts show, every 10 ms."""
+        bench = self.bench("robot")
+        if (tick := bench.now // TICK_CYCLES) > self._record.count("readings"):
+            values = bench.session.readings()
+            readings = Readings(tick, 0, (0.0,) * len(values), values)
+            self._record.append_readings(bench.now / CLOCK_HZ, readings, 0.0, 0.0)
+
+    def save_record(self, folder: Path) -> None:
+        """Writes the record of the test as that of a run, for `boebot report`, where there is a robot."""
+        if self._bench_or_none is None or self._wanted.robot is None:
+            return
+        from boebot.record.recording import Recording
+        from boebot.record.run import Run
+        from boebot.record.run_folder import RunFolder
+
+        bench, image = self._bench_or_none, self._wanted.image
+        recording = Recording(1)
+        (record,) = recording.records
+        record.put(merged([*self._record.groups(), bench.streams(), bench.robot.drain()]))
+        for time_s, byte in self.serial.stamped():
+            record.append("to_host", time_s, byte)
+        run = Run(
+            brain=image.name if image else "the kit's firmware",
+            robot=self._robot,
+            board=self._on,
+            description=bench.session.description,
+            arena=bench.session.arena.name,
+            seed=self._wanted.seed,
+            period=TICK_S,
+            tick=TICK_S,
+            record=record,
+            world=bench.session.arena,
+            run_time=self.now,
+            layout=bench.session.layout,
+            program=hashlib.sha256((image or self.elf()).read_bytes()).hexdigest(),
+        )
+        with RunFolder(folder) as run_folder:
+            recording.begin(run_folder, [run], {}, {}, waits=True)
+            record.keep(self.now)
+            if (error := recording.end([run])) is not None:
+                raise error
 
     # ---- its end -----------------------------------------------------------------------------------------------------
 
@@ -175,35 +345,23 @@ class Uno:
         self.close()
 
 
-class BenchLine:
-    """The serial line of a board on a bench, as a transport."""
+@dataclass(frozen=True)
+class Analog:
+    """An analog input of a board."""
 
-    name, realtime = "bench", False
+    bench: Bench
+    channel: int
 
-    def __init__(self, bench: Bench) -> None:
-        self._bench = bench
+    def set(self, volts: float) -> None:
+        """The voltage there from now on."""
+        self.bench.pins.analog(self.channel, volts)
 
-    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
-        """What comes in that time."""
-        return b"".join(data for _, data in self.read_stamped(wait_s, quiet_s))
 
-    def read_stamped(self, wait_s: float, quiet_s: float = 0.0) -> list[tuple[float, bytes]]:
-        """The same, byte by byte with the end of its stop bit (s)."""
-        del quiet_s
-        self._bench.run_until(self._bench.now + round(wait_s * CLOCK_HZ))
-        data, cycles = self._bench.received()
-        return [(cycle / CLOCK_HZ, bytes([byte])) for cycle, byte in zip(cycles, data, strict=True)]
+@cache
+def _variables(elf: Path) -> Variables:
+    from boebot.image.data import read_variables
 
-    def write(self, data: bytes) -> None:
-        """Sends bytes from now on."""
-        self._bench.send(data, self._bench.now + BOARD_GUARD_CYCLES)
-
-    def now(self) -> float:
-        """Since power-on (s)."""
-        return self._bench.now / CLOCK_HZ
-
-    def close(self) -> None:
-        """It ends with its bench."""
+    return read_variables(elf)
 
 
 # ---- opening ---------------------------------------------------------------------------------------------------------
@@ -237,18 +395,25 @@ def open_uno(on: str, wanted: Wanted, *, flash: bool = False, motors: bool = Fal
         bench.robot.line_rate(wanted.baud)
     elif on == AVR:
         bench.robot.follow_line()
-    line = Line(BenchLine(bench), waited_for=_marks(bench))
+    line = _line(bench)
     if on == AVR:
         line.is_heard = lambda: bool(bench.pins.read_memory(UCSR0B, 1)[0] & RXEN0)
         line.not_heard = "the program has not switched its receiver on (Serial.begin)"
-    return Uno(on, wanted, line, bench)
+    return Uno(on, wanted, line, bench).begin()
 
 
-def _marks(bench: Bench) -> Callable[[float], None]:
+def _line(bench: Bench) -> Line:
+    """The serial line of a board on a bench: while somebody waits there, whatever else is on the bench goes on."""
+
+    def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
+        bench.run_until(bench.now + cycles)
+
     def mark(at_s: float) -> None:
         bench.mark = round(at_s * CLOCK_HZ)
 
-    return mark
+    transport = SimTransport(bench.robot, "bench", wait)
+    transport.stamp()
+    return Line(transport, waited_for=mark)
 
 
 _holds: dict[str, bytes] = {}
@@ -275,4 +440,4 @@ def _at_port(url: str, wanted: Wanted, may_flash: bool) -> Uno:
     line = Line(transport, allowance_s=ALLOWANCE_S)
     uno = Uno(url, wanted, line, None)
     line.is_heard = lambda: bool(uno.serial.heard) or transport.now() > opened_s + START_S
-    return uno
+    return uno.begin()

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from boebot.result import RunResult, read_run
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytest_plugins = ["pytester"]
@@ -85,7 +86,24 @@ def test_waits_in_vain(uno):
     assert (kept / "again.txt").read_text() in text and f"kept in {kept}" in text
     assert (kept / "serial.txt").read_bytes() == b"ready\r\n"
     vcd = (kept / "pins.vcd").read_text()
-    assert "D9" in vcd and "#" in vcd
+    assert "D9" in vcd and "#" in vcd and not (kept / "run").exists()
+
+
+def test_a_failure_in_a_world_leaves_a_record(users: pytest.Pytester) -> None:
+    result = run(
+        users,
+        """
+@pytest.mark.uno(image="own.elf", robot="shieldbot-basic", arena="room")
+def test_it(uno):
+    uno.run(0.2)
+    assert False
+""",
+    )
+    result.assert_outcomes(failed=1)
+    (kept,) = (users.path / ".uno").iterdir()
+    read = read_run(kept / "run")
+    assert isinstance(read, RunResult) and read.record.count("readings") == 20 and len(read.record.block("truth")) > 15
+    assert read.run_time == pytest.approx(0.2) and read.record.count("pins") > 0
 
 
 def test_what_is_measured_is_in_all_reports(users: pytest.Pytester) -> None:
@@ -154,3 +172,191 @@ def test_nothing_is_imported_before_the_fixture_is_used() -> None:
     code = "import sys, sim_bridge.bench.plugin; print([name for name in sys.modules if name in ('numpy', 'boebot')])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+# ---- pins, variables, cycles, coverage, faults -----------------------------------------------------------------------
+
+WORK = r"""
+#include <avr/io.h>
+volatile int count;
+static void put(char letter) {
+  while (!(UCSR0A & 1 << UDRE0)) {
+  }
+  UDR0 = letter;
+}
+/* Four cycles a turn (SBIW 2, BRNE 2, the last one 1 less): instruction set manual. */
+__attribute__((noinline)) void work(void) {
+  __asm__ volatile("ldi r24, lo8(TURNS)\n ldi r25, hi8(TURNS)\n 1: sbiw r24, 1\n brne 1b" : : : "r24", "r25");
+}
+int main(void) {
+  UBRR0 = 103;
+  UCSR0B = 1 << RXEN0 | 1 << TXEN0;
+  put('>');
+  for (;;) {
+    if (!(UCSR0A & 1 << RXC0)) continue;
+    if (UDR0 == 'a') {
+      work();
+      count++;
+    }
+    put('.');
+  }
+}
+"""
+TURNS = 100
+WORK_CYCLES = 2 + 4 * TURNS - 1 + 4  # LDI twice, the turns, RET
+
+
+def worker(folder: Path, turns: int = TURNS) -> Path:
+    return compiled(WORK.replace("TURNS", str(turns)), folder / "work.elf")
+
+
+@pytest.mark.parametrize("suffix", [".elf", ".hex"])
+def test_the_example_of_the_docs(users: pytest.Pytester, suffix: str) -> None:
+    subprocess.run(["avr-objcopy", "-O", "ihex", "own.elf", "own.hex"], cwd=users.path, check=True)
+    result = run(
+        users,
+        f"""
+@pytest.mark.uno(image="own{suffix}")
+def test_servo(uno):
+    uno.serial.expect(b"ready", within=1)
+    uno.serial.send(b"+")
+    uno.serial.expect(b"+", within=0.01)
+    assert uno.pin(9).pulse().us == 1700
+
+@pytest.mark.uno(image="own{suffix}")
+def test_no_pin(uno):
+    uno.pin(20)
+
+@pytest.mark.uno(image="own.hex")
+def test_no_symbols(uno):
+    uno.symbol("count")
+""",
+    )
+    result.assert_outcomes(passed=1, failed=2)
+    result.stdout.fnmatch_lines_random([
+        "E * there is no pin 20; expected 0..13 or 'A0'..'A5'",
+        "E * own.hex has no symbols; expected the ELF file that it was made from",
+    ])  # fmt: skip
+
+
+def test_a_sketch_is_built_and_tested_in_a_world(users: pytest.Pytester) -> None:
+    """The bundled sketch, whose servos turn back where a whisker touches: 1500 us less 200."""
+    from boebot.sketches import FOLDER
+
+    shutil.copytree(FOLDER / "whiskers", users.path / "whiskers")
+    result = run(
+        users,
+        """
+@pytest.mark.uno(image="whiskers", robot="shieldbot-basic", arena="room")
+def test_backs_off(uno):
+    uno.pin(13).pulses(3)
+    assert abs(uno.pin(13).pulse().us - 1700) < 5
+    uno.pin(5).drive(0)
+    uno.run(0.1)
+    assert abs(uno.pin(13).pulse().us - 1300) < 5
+    assert uno.world.pose is not None
+""",
+    )
+    result.assert_outcomes(passed=1)
+
+
+def test_variables_and_cycles_against_a_baseline(users: pytest.Pytester) -> None:
+    worker(users.path)
+    tests = """
+@pytest.mark.uno(image="work.elf", cycles="work")
+def test_work(uno):
+    uno.serial.expect(b">")
+    uno.symbol("count").value = 41
+    uno.serial.send(b"a")
+    uno.serial.expect(b".")
+    assert uno.symbol("count").value == 42
+    assert uno.cycles("work").longest {comparison}
+"""
+    run(users, tests.format(comparison=f"== {WORK_CYCLES}"), "--uno-baseline=update").assert_outcomes(passed=1)
+    saved = json.loads((users.path / "uno-baseline.json").read_text())["cycles"]
+    assert list(saved.values()) == [{"work": [WORK_CYCLES, WORK_CYCLES]}]
+    worker(users.path, TURNS + 1)
+    result = run(users, tests.format(comparison="> 0"))
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines([f"work took {WORK_CYCLES + 4} cycles; in *uno-baseline.json {WORK_CYCLES} cycles"])
+
+
+def test_coverage_from_a_process_of_xdist(users: pytest.Pytester) -> None:
+    worker(users.path)
+    result = run(
+        users,
+        """
+@pytest.mark.uno(image="work.elf")
+@pytest.mark.parametrize("letter", [b"a", b"b"])
+def test_work(uno, letter):
+    uno.serial.expect(b">")
+    uno.serial.send(letter)
+    uno.serial.expect(b".")
+""",
+        *("--uno-cover", "-n", "1"),
+    )
+    result.assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(["work.c * 100.0 %*"])
+    assert "SF:work.c" in (users.path / ".uno" / "cover.info").read_text()
+
+
+def test_a_fault_that_did_not_fire_is_an_error_of_its_test(users: pytest.Pytester) -> None:
+    result = run(
+        users,
+        """
+@pytest.mark.uno(image="own.elf", faults="board.reset@10ms")
+def test_reset(uno):
+    uno.serial.expect(b"ready")
+    uno.serial.expect(b"ready")
+
+@pytest.mark.uno(robot="shieldbot", faults="whisker_left.stuck=open@0s")
+def test_nothing_touches(uno):
+    uno.run(0.1)
+
+@pytest.mark.uno(image="own.elf", faults="ping.missing@0s")
+def test_no_ping(uno):
+    pass
+""",
+    )
+    result.assert_outcomes(passed=2, errors=2)
+    result.stdout.fnmatch_lines_random([
+        "uno: fault whisker_left.stuck=open@0s did not fire*",
+        "uno: fault 'ping.missing@0s': robot 'bare' has no 'ping.missing'*",
+    ])  # fmt: skip
+
+
+METER = """
+#include <avr/io.h>
+int main(void) {
+  UBRR0 = 1;
+  UCSR0B = 1 << TXEN0;
+  ADMUX = 1 << REFS0 | 1 << ADLAR | 2;
+  for (;;) {
+    ADCSRA = 1 << ADEN | 1 << ADSC | 4;
+    while (ADCSRA & 1 << ADSC) {
+    }
+    while (!(UCSR0A & 1 << UDRE0)) {
+    }
+    UDR0 = ADCH;
+  }
+}
+"""
+
+
+def test_a_voltage_is_what_the_converter_reads(users: pytest.Pytester) -> None:
+    """256 V / Vref, the left-adjusted upper byte (data sheet 24.7): 2.5 V of 5 V are 128."""
+    compiled(METER, users.path / "meter.elf")
+    result = run(
+        users,
+        """
+@pytest.mark.uno(image="meter.elf")
+def test_meter(uno):
+    uno.analog(2).set(2.51)
+    uno.serial.expect(bytes([128]) * 3)
+    uno.analog(2).set(1.26)
+    uno.serial.expect(bytes([64]) * 3)
+    with pytest.raises(Exception, match="expected a whole number from 0 to 5"):
+        uno.analog(6).set(1)
+""",
+    )
+    result.assert_outcomes(passed=1)
