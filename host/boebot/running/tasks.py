@@ -290,8 +290,9 @@ def _faults(request: Request, task: Task) -> list[Fault]:
     found = faults_of(request.faults, task.board.robot, task.number, len(request.members), request.seconds)
     for fault in found:
         owner = fault.name.partition(".")[0]
-        if owner == "host" and task.brain.is_program:
-            raise CallError(f"fault {fault}: {task.brain.name} is a program, which has no host")
+        if task.brain.is_program and (owner == "host" or fault.name == "serial.rate"):
+            has = "no host" if owner == "host" else "the bit rate that it sets"
+            raise CallError(f"fault {fault} is of a brain's link; {task.brain.name} is a program, which has {has}")
         if is_live(task.on) and (owner not in HOST or fault.name == "serial.rate"):
             raise CallError(f"fault {fault} is of a simulated robot; {task.on!r} is a port")
     return found

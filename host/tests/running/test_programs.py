@@ -200,11 +200,25 @@ def test_standard_input_and_a_script_type_beside_each_other(program: Path) -> No
         ("--type x@-1", "'x' at -1 s is never; expected a time from 0 s on"),
         ("--type x@2 --seconds 1", "'x' at 2 s is never; expected a time from 0 s on, and before the run's end at 1 s"),
         ("--expect-text=", "--expect-text or --fail-text is empty; expected a text"),
+        ("--fault host.slow@1", "host.slow=0.1@1s is of a brain's link; talk.elf is a program, which has no host"),
+        ("--fault serial.rate@1", "talk.elf is a program, which has the bit rate that it sets"),
     ],
 )
 def test_what_a_program_cannot_have_is_refused(program: Path, options: str, sentence: str) -> None:
     refused = CliRunner().invoke(app, ["run", str(program), *options.split()])
     assert isinstance(refused.exception, CallError) and sentence in str(refused.exception)
+
+
+def test_what_is_on_a_programs_line_may_be_lost_late_or_twice(program: Path) -> None:
+    def heard(*faults: str) -> bytes:
+        return printed(boebot.run(program, seconds=0.4, typed=[("ab", 0.2)], faults=list(faults)))
+
+    assert heard() == b"ready\r\nAB"
+    assert heard("serial.doubled=1@0..0.1") == b"rreeaaddyy\r\r\n\nAB"
+    assert heard("cable.out@0.1..0.3") == b"ready\r\n"
+    late = boebot.run(program, seconds=0.4, typed=[("ab", 0.2)], faults=["serial.delayed=0.05@0.1..0.3"])
+    (first, _), *_ = [row for row in late.record.rows("to_host") if row[1] == b"A"]
+    assert first == pytest.approx(0.2 + 2 * 0.05 + 2 * 10 / 9600, abs=0.01)
 
 
 def test_a_program_has_no_commands_to_replay(program: Path, tmp_path: Path) -> None:
