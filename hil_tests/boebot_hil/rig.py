@@ -62,12 +62,13 @@ class Rig:
         url: str,
         robot: str | RobotDescription = "shieldbot",
         arena: str = "empty",
-        seed: int = 1,
         noise: bool = False,
+        **request: Any,
     ) -> Rig:
-        """A rig around the board at `url`, by default in an empty field and without noise."""
+        """A rig around the board at `url`, by default in an empty field and without noise; `request`: what else a
+        BoardRequest has."""
         described = load_robot(robot) if isinstance(robot, str) else robot
-        return cls(open_board(url, BoardRequest(robot=described, arena=arena, seed=seed, noise=noise)))
+        return cls(open_board(url, BoardRequest(robot=described, arena=arena, noise=noise, **request)))
 
     def __enter__(self) -> Rig:
         return self

@@ -84,14 +84,14 @@ class Surroundings:
 
         self.each(first, period, other)
 
-    def run(self, seconds: float, advance: Callable[[int], None] | None = None) -> None:
+    def run(self, seconds: float) -> None:
         """Lets time pass."""
         end = self.bench.now + round(seconds * 16e6)
         while self._due and self._due[0][0] < end:
             cycle, _, action = heapq.heappop(self._due)
-            (advance or self.bench.run_until)(cycle)
+            self.bench.run_until(cycle)
             action()
-        (advance or self.bench.run_until)(end)
+        self.bench.run_until(end)
 
     def ages(self, name: str, kind: type, shows: Callable[[Any, bool], bool]) -> Ages:
         """Of all changes of a stimulus, by the telemetry of that kind. `shows(message, state)`: it is of that state

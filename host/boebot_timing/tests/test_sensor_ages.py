@@ -20,7 +20,7 @@ from boebot_timing.emulated.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_
 from boebot_timing.table import read_table
 from boebot_timing.tests.sensor_bench import Ages, Held, LightSensor, RangeFinder, Receiver, Surroundings
 from sim_bridge.boards.board import Level
-from sim_bridge.tests.boards.device_bench import SLICE, TwoWireDevice
+from sim_bridge.tests.boards.devices import TwoWireDevice
 
 IMAGE = resources.folder("images") / "boebot.elf"  # every sensor but the encoders
 ENCODER_IMAGE = resources.folder("images") / "shieldbot-quad.elf"
@@ -28,6 +28,7 @@ ROWS = {row.name: row for row in read_table(IMAGE).sensors}
 
 SECONDS = 8.0  # of the board's time
 TELEMETRY_US = TICK_CYCLES // CYCLES_PER_US  # from one telemetry to the next
+SLICE = 32  # cycles: how often a test looks at the converter
 JITTER_US = 1_000  # of a telemetry's first byte: what else its slot does, more in one tick than in the next
 WHISKER, RECEIVER, PING = 5, 10, 8
 LEDS = (9, 2)  # left and right, infra-red
@@ -194,27 +195,15 @@ def test_compass() -> None:
         device = TwoWireDevice(around.board, 0x1E)
         told_x = (100, 1000)
 
-        def advance(until: int) -> None:
-            """In the steps that the bus needs where it may be at work: from slot 3 of a tick on."""
-            begin, end = 113_000, 145_000
-            while bench.now < until:
-                into = (bench.now - reported) % TICK_CYCLES
-                if begin <= into < end:
-                    around.board.run(SLICE)
-                    device.step()
-                else:
-                    bench.run_until(min(until, bench.now + (begin - into) % TICK_CYCLES))
-
         def hold(on: bool) -> None:
             device.registers[3:5] = told_x[on].to_bytes(2, "big")
 
         around.begin(Devices.COMPASS | Devices.BATTERY)
-        reported = around.line.telemetry[-1].first
         start = bench.now + 20 * TICK_CYCLES
         around.change("compass", start + 1, 8 * COMPASS_RUNS + 1, lambda on: None)
         Held(around, "compass", start, (COMPASS_RUNS, 0), hold)
         hold(False)
-        around.run(2.5, advance)
+        around.run(2.5)
         found = around.ages("compass", DevicesTelemetry, lambda reported, on: bool(reported.compass_x == told_x[on]))
     finally:
         bench.close()

@@ -13,10 +13,9 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.link import Link
-from boebot_hil.rig import CYCLES_PER_US, HOST_NONCE, TICK_S
+from boebot_hil.rig import CYCLES_PER_US, HOST_NONCE, TICK_S, Rig
 from boebot_timing.board import measure
-from sim_bridge.boards.board import ResetCause
-from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
+from sim_bridge.bench.bench import bare
 from sim_bridge.tests.firmware.test_planted_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted
 
 FRAME_S = 2 * TICK_S  # of the servos: the turret's task runs once in each
@@ -28,13 +27,18 @@ READING_CYCLES = 160  # from the first reading of the timer to the call, and fro
 LONGEST = 0xFFFF
 
 
-def session(image: str | None = None) -> DeviceRig:
-    host = DeviceRig(power_on("avr", image=image))
+def alone(image: str | None = None) -> Rig:
+    """A board with nothing at its pins."""
+    return Rig.open("avr", robot=bare("shieldbot"), image=image)
+
+
+def session(image: str | None = None) -> Rig:
+    host = alone(image)
     host.open_session()
     return host
 
 
-def next_time(host: DeviceRig, task: messages.Task) -> int:
+def next_time(host: Rig, task: messages.Task) -> int:
     """The next time that the board sends of a task; meanwhile the session is kept open."""
     host.send(messages.ClockProbe(0))
     return host.first(
@@ -106,17 +110,16 @@ def test_the_longest_times_start_anew_with_each_session(closes: bool) -> None:
 @pytest.mark.parametrize("task", ["turret", "counters"])
 def test_the_task_that_hung_is_told_by_the_next_hello(tmp_path: Path, task: str, deaf: bool) -> None:
     """The first hello comes before these have run, the next one after the reset."""
-    board = power_on("avr", image=planted(tmp_path, f"{task}_task", (CLI if deaf else b"") + JUMP_TO_ITSELF))
-    host = DeviceRig(board)
+    host = alone(planted(tmp_path, f"{task}_task", (CLI if deaf else b"") + JUMP_TO_ITSELF))
     assert host.next_hello().reset_cause == messages.ResetCause.POWER
     assert host.next_hello().reset_cause == messages.ResetCause[f"WATCHDOG_IN_{task.upper()}"]
-    assert board.counters()["resets"] == 1
-    board.reset(ResetCause.EXTERNAL)
+    assert host.board.counters()["resets"] == 1
+    host.board.reset("external")
     host.listen(0.001)
     assert host.next_hello().reset_cause == messages.ResetCause.EXTERNAL, "reported once"
 
 
-def after_reset(host: DeviceRig) -> int:
+def after_reset(host: Rig) -> int:
     """The cause in the first hello after a reset."""
     return host.first(
         messages.Hello, lambda hello: hello.reset_cause != messages.ResetCause.POWER, 1.0, "a hello after a reset"
@@ -134,7 +137,7 @@ def test_a_link_that_hung_is_told_as_outside_of_the_tasks(tmp_path: Path, deaf: 
 
 def test_an_interrupt_that_hung_is_told_as_what_it_interrupted(tmp_path: Path) -> None:
     """Of a byte."""
-    host = DeviceRig(power_on("avr", image=planted(tmp_path, "__vector_18", JUMP_TO_ITSELF)))
+    host = alone(planted(tmp_path, "__vector_18", JUMP_TO_ITSELF))
     assert host.next_hello().reset_cause == messages.ResetCause.POWER
     host.send(messages.Identify())
     assert after_reset(host) >= messages.ResetCause.WATCHDOG
@@ -197,7 +200,7 @@ def test_on_a_slow_line_telemetry_is_not_left_out_for_the_times_of_tasks() -> No
     baud = messages.PARAMETERS["baud_rate"]
     for request in ((messages.SetParameter, baud.id, 96), (messages.SaveParameters,)):
         assert host.request(*request, within_s=1.0).status == messages.AnswerStatus.OK
-    host.board.reset(ResetCause.EXTERNAL)
+    host.board.reset("external")
     host.board.line_rate(9600)
     assert host.open_session().telemetry_period == 10
     before = len(host.heard)

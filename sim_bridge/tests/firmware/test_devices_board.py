@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,45 +10,33 @@ import pytest
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.messages import CompassStatus, Devices
-from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S, Rig
+from sim_bridge.bench.bench import bare
 from sim_bridge.boards.board import Level
-from sim_bridge.tests.boards.device_bench import Capacitor, DeviceRig, Receiver, TwoWireDevice, power_on
+from sim_bridge.tests.boards.devices import Capacitor, Receiver, TwoWireDevice
 
 pytestmark = [pytest.mark.unsanitized, pytest.mark.soak_on_native]
 
 COMPASS_ADDRESS = 0x1E
-LIGHT_LEFT, LIGHT_RIGHT, TURRET, BUZZER, SDA, SCL = 15, 6, 11, 4, 18, 19
+LIGHT_LEFT, LIGHT_RIGHT, TURRET, BUZZER = 15, 6, 11, 4
 STAMP_LATE_US = 3530 / CYCLES_PER_US  # at most, of port D's changes in overload (docs/reference/timing.md)
 
 
 @pytest.fixture
-def bench(board_url: str) -> Iterator[DeviceRig]:
-    with DeviceRig(power_on(board_url, "boebot")) as rig:
+def bench(board_url: str) -> Iterator[Rig]:
+    with Rig.open(board_url, robot=bare("boebot")) as rig:
         rig.start()
-        rig.bench.access.log()
         yield rig
 
 
-def pulses_of(rig: DeviceRig, pin: int) -> np.ndarray:
-    """Start and width of each whole pulse on `pin` since the last look, in cycles."""
-    pulses, rise = [], None
-    for edge in rig.bench.access.log():
-        if edge.pin == pin and edge.level == Level.HIGH:
-            rise = edge.cycle
-        elif edge.pin == pin and rise is not None:
-            pulses.append((rise, edge.cycle - rise))
-            rise = None
-    return np.array(pulses, dtype=np.int64).reshape(-1, 2)
+def pulses_since(rig: Rig, pin: int, cycle: int) -> np.ndarray:
+    """Start and width of each whole pulse on `pin` that began since then, in cycles."""
+    pulses = rig.pulses(pin)
+    return pulses[pulses[:, 0] >= cycle]
 
 
-def compass(rig: DeviceRig) -> TwoWireDevice:
-    device = TwoWireDevice(rig.bench.access, COMPASS_ADDRESS)
-    rig.bench.devices.append(device)
-    return device
-
-
-def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: DeviceRig) -> None:
-    device = compass(bench)
+def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: Rig) -> None:
+    device = TwoWireDevice(bench.board, COMPASS_ADDRESS)
     for x, y, z in ((1, -2, 3), (-4096, 2047, -2048), (255, 256, -256)):
         device.registers[3:9] = b"".join(value.to_bytes(2, "big", signed=True) for value in (x, z, y))
         reported = bench.devices(after_s=0.12)
@@ -59,28 +46,26 @@ def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: DeviceRig)
     assert device.registers[:3] == bytes([0x78, 0x20, 0x00])
 
 
-def test_compass_without_a_device_a_held_bus_and_a_recovery(bench: DeviceRig) -> None:
-    device = compass(bench)
+def test_compass_without_a_device_a_held_bus_and_a_recovery(bench: Rig) -> None:
+    device = TwoWireDevice(bench.board, COMPASS_ADDRESS)
     device.plugged = False
     assert bench.devices(after_s=0.1).compass_status == CompassStatus.NO_ANSWER
     device.plugged = True
     assert bench.devices(after_s=0.1).compass_status == CompassStatus.OK
-    device.holds = True
+    device.hold(True)
     assert bench.devices(after_s=0.15).compass_status == CompassStatus.BUS_STUCK
-    device.holds = False
+    device.hold(False)
     reported = bench.devices(after_s=0.4)
     assert reported.compass_status == CompassStatus.OK and reported.compass_age <= 6
     assert bench.latest().overruns == 0
 
 
 @pytest.mark.parametrize("us", [20, 600, 1500, 4200, 9000])
-def test_light_is_the_decay_time(bench: DeviceRig, us: int) -> None:
-    bench.bench.devices += [
-        Capacitor(bench.bench.access, LIGHT_LEFT, us),
-        Capacitor(bench.bench.access, LIGHT_RIGHT, us + 1000),
-    ]
+def test_light_is_the_decay_time(bench: Rig, us: int) -> None:
+    Capacitor(bench.board, LIGHT_LEFT, us)
+    Capacitor(bench.board, LIGHT_RIGHT, us + 1000)
     reported = bench.devices(after_s=0.08)
-    assert abs(reported.light_left - us) <= 6  # a slice is 2 us
+    assert abs(reported.light_left - us) <= 6
     assert abs(reported.light_right - (us + 1000)) <= 6
     assert reported.light_age <= 2
 
@@ -88,19 +73,20 @@ def test_light_is_the_decay_time(bench: DeviceRig, us: int) -> None:
 @pytest.mark.parametrize("us", [7, 400, 2_500, 13_000, 20_000])
 def test_light_sensors_of_the_basic_shieldbot(board_url: str, us: int) -> None:
     """The left one on Timer1's capture pin, where others have the Ping."""
-    with DeviceRig(power_on(board_url, "shieldbot-basic")) as rig:
+    with Rig.open(board_url, robot=bare("shieldbot-basic")) as rig:
         rig.start()
-        rig.bench.devices += [Capacitor(rig.bench.access, 8, us), Capacitor(rig.bench.access, LIGHT_RIGHT, us + 500)]
+        Capacitor(rig.board, 8, us)
+        Capacitor(rig.board, LIGHT_RIGHT, us + 500)
         reported = rig.devices(after_s=0.08)
         assert abs(reported.light_left - min(us, 14_000)) <= 6
         assert abs(reported.light_right - min(us + 500, 14_000)) <= 6
         assert reported.light_age <= 2
 
 
-def test_analog_inputs_are_ratios_of_the_supply(bench: DeviceRig) -> None:
+def test_analog_inputs_are_ratios_of_the_supply(bench: Rig) -> None:
     for battery, sharp in ((3.1, 0.42), (2.2, 2.9), (0.0, 4.9)):
-        bench.bench.access.analog(0, battery)
-        bench.bench.access.analog(2, sharp)
+        bench.board.analog(0, battery)
+        bench.board.analog(2, sharp)
         reported = bench.devices(after_s=0.08)
         assert abs(reported.battery - battery / 5.0 * 1024) <= 1
         assert abs(reported.analog_infrared - sharp / 5.0 * 1024) <= 1
@@ -109,29 +95,29 @@ def test_analog_inputs_are_ratios_of_the_supply(bench: DeviceRig) -> None:
 
 
 @pytest.mark.parametrize("angle", [-1.2, -0.3, 0.0, 0.7, 1.5])
-def test_turret_turns_and_is_released_by_a_stop(bench: DeviceRig, angle: float) -> None:
+def test_turret_turns_and_is_released_by_a_stop(bench: Rig, angle: float) -> None:
     bench.send(messages.Turret(round(angle * 1e4), 1))
     bench.listen(0.05)
-    bench.bench.access.log()
+    since = bench.board.cycle
     bench.listen(0.2)
-    pulses = pulses_of(bench, TURRET)
+    pulses = pulses_since(bench, TURRET, since)
     expected = np.clip(24000 + 9168 * angle, 9600, 38400)
     assert len(pulses) >= 8
     assert np.all(np.abs(pulses[:, 1] - expected) <= 16)
     assert np.all(np.abs(np.diff(pulses[:, 0]) - FRAME_CYCLES) <= 16)
     bench.stop()
     bench.listen(0.05)
-    bench.bench.access.log()
+    since = bench.board.cycle
     bench.listen(0.1)
-    assert len(pulses_of(bench, TURRET)) == 0
+    assert len(pulses_since(bench, TURRET, since)) == 0
     assert bench.devices().turret_pulse == 0
 
 
 @pytest.mark.parametrize("frequency", [60, 440, 2000, 8000])
-def test_buzzer_has_its_frequency_and_ends(bench: DeviceRig, frequency: int) -> None:
+def test_buzzer_has_its_frequency_and_ends(bench: Rig, frequency: int) -> None:
     bench.send(messages.Buzzer(frequency, 20, 1))
     bench.listen(0.4)
-    pulses = pulses_of(bench, BUZZER)
+    pulses = bench.pulses(BUZZER)
     seconds = (pulses[-1].sum() - pulses[0, 0]) / CYCLES_PER_S
     assert 0.18 <= seconds <= 0.20
     measured = CYCLES_PER_S / np.mean(np.diff(pulses[:, 0]))
@@ -139,18 +125,17 @@ def test_buzzer_has_its_frequency_and_ends(bench: DeviceRig, frequency: int) -> 
     assert bench.devices().buzzer_token == 1
 
 
-def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: DeviceRig) -> None:
+def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: Rig) -> None:
     for receiver in (10, 3):
-        bench.bench.access.drive(receiver, Level.HIGH)
+        bench.board.drive(receiver, Level.HIGH)
     bench.set("infrared_sweep", 1)
     assert bench.devices(after_s=0.15).infrared_zone_left == 0
-    bench.bench.devices.append(Receiver(bench.bench.access, led=9, pin=10))
+    Receiver(bench.board, led=9, pin=10)
     reported = bench.devices(after_s=0.15)
     assert (reported.infrared_zone_left, reported.infrared_zone_right) == (5, 0)
-    bench.bench.access.log()
+    since = bench.board.cycle
     bench.listen(0.1)
-    rises = np.array([e.cycle for e in bench.bench.access.log() if e.pin == 9 and e.level == Level.HIGH])
-    periods = np.diff(rises)
+    periods = np.diff(pulses_since(bench, 9, since)[:, 0])
     found = {
         round(CYCLES_PER_S / np.median(burst)) for burst in np.split(periods, np.where(periods > 10_000)[0] + 1)[1:-1]
     }
@@ -158,7 +143,7 @@ def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: Device
         assert sum(abs(frequency - expected) <= 300 for frequency in found) >= 1
 
 
-def saturate(rig: DeviceRig, seconds: float) -> None:
+def saturate(rig: Rig, seconds: float) -> None:
     """All that the line carries to the board; back come answers (15 bytes for 11), telemetry (46 bytes a tick) and that
     of the slow devices (39 bytes a tick): 480 of 500 bytes."""
     wire, request = bytearray(), rig.numbered(messages.GetParameter, 0)
@@ -175,11 +160,11 @@ def saturate(rig: DeviceRig, seconds: float) -> None:
 def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, pin_map: str) -> None:
     """Every device of the map at work, encoders at 1.5 kHz, the UART saturated both ways: ±4 cycles, no tick missed,
     no byte lost."""
-    with DeviceRig(power_on(board_url, pin_map)) as rig:
+    with Rig.open(board_url, robot=bare(pin_map)) as rig:
         rig.start()
-        access = rig.bench.access
-        device = compass(rig)
-        rig.bench.devices += [Capacitor(access, LIGHT_LEFT, 1300.0), Capacitor(access, LIGHT_RIGHT, 2100.0)]
+        device = TwoWireDevice(rig.board, COMPASS_ADDRESS)
+        Capacitor(rig.board, LIGHT_LEFT, 1300.0)
+        Capacitor(rig.board, LIGHT_RIGHT, 2100.0)
         on = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in load_robot(pin_map).device)
         rig.set("devices", on)
         rig.set("encoder_gap", 0)
@@ -189,28 +174,25 @@ def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(boar
         rig.send(messages.Buzzer(8000, 255, 3))
         rig.listen(0.1)
         for i, pin in enumerate((16, 17) if on & Devices.ENCODER else ()):
-            start = access.now + 1000
+            start = rig.board.cycle + 1000
             for edge in range(1100):
-                access.drive(pin, Level(edge % 2), start + edge * (CYCLES_PER_S // 3000 + 7 * i))
+                rig.board.drive(pin, edge % 2, start + edge * (CYCLES_PER_S // 3000 + 7 * i))
         rig.answers.clear()
-        before, first, moved = access.counters(), len(rig.telemetry) + 1, device.bytes_moved
-        access.log()
+        before, first, moved = rig.board.counters(), len(rig.telemetry) + 1, device.bytes_moved
+        since = rig.board.cycle
         saturate(rig, seconds=0.3)
-        after = access.counters()
-        log = access.log()
+        after = rig.board.counters()
         frames = rig.telemetry[first:]
         assert [f.tick - frames[0].tick for f in frames] == list(range(len(frames))) and len(frames) >= 27
         assert frames[-1].overruns == frames[0].overruns
         assert (after["bytes_in"] - before["bytes_in"]) >= 0.95 * 0.3 * 50_000
         for pin in (13, 12):
-            rises = [e.cycle for e in log if e.pin == pin and e.level == Level.HIGH][2:-1]
-            falls = [e.cycle for e in log if e.pin == pin and e.level != Level.HIGH]
-            widths = np.array([next(f for f in falls if f > rise) - rise for rise in rises])
+            rises, widths = pulses_since(rig, pin, since)[2:].T
             assert len(widths) >= 10
             assert np.all(np.abs(widths - 1560 * CYCLES_PER_US) <= 16), widths - 1560 * CYCLES_PER_US
             assert np.all(np.abs(np.diff(rises) - FRAME_CYCLES) <= 16)
-        turret = [e for e in log if e.pin == TURRET]
-        widths = np.array([b.cycle - a.cycle for a, b in itertools.pairwise(turret) if a.level == Level.HIGH])
+        widths = pulses_since(rig, TURRET, since)[:, 1]
+        assert len(widths) >= (10 if on & Devices.TURRET else 0)
         assert np.all(np.abs(widths - (24000 + 4584)) <= 16)
         slow = [answer for answer in rig.answers if isinstance(answer, messages.DevicesTelemetry)]
         assert len(slow) >= 20

@@ -11,10 +11,10 @@ from elftools.elf.elffile import ELFFile
 
 from boebot import resources
 from boebot.link import messages
-from boebot_hil.rig import CYCLES_PER_S
-from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
+from boebot_hil.rig import CYCLES_PER_S, Rig
+from sim_bridge.bench.bench import bare
+from sim_bridge.boards.board import Damage
 from sim_bridge.tests.boards.avr.bootloader import KITS
-from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
 from sim_bridge.tests.boards.symbols import DATA_BASE, entry_of
 from tools.avr_program import IMAGES
 
@@ -36,22 +36,26 @@ OK, SUPPLY_LOW = messages.AnswerStatus.OK, messages.AnswerStatus.SUPPLY_LOW
 
 
 @pytest.fixture
-def board(board_url: str) -> Iterator[BoardAccess]:
-    board = power_on(board_url)
-    yield board
-    board.close()
+def host(board_url: str) -> Iterator[Rig]:
+    with Rig.open(board_url, robot=bare("shieldbot")) as rig:
+        yield rig
 
 
-def choose(host: DeviceRig, values: dict[int, int]) -> None:
+def run(host: Rig, cycles: int) -> None:
+    """Lets time pass in which the host says nothing."""
+    host.session.sim.run(cycles)  # type: ignore[attr-defined]
+
+
+def choose(host: Rig, values: dict[int, int]) -> None:
     for parameter, value in values.items():
         assert host.request(messages.SetParameter, parameter, value).status == OK
 
 
-def in_force(host: DeviceRig) -> dict[int, int]:
+def in_force(host: Rig) -> dict[int, int]:
     return {parameter: host.request(messages.GetParameter, parameter).value for parameter in VALUES[0]}
 
 
-def restart(host: DeviceRig, cause: ResetCause) -> messages.Hello:
+def restart(host: Rig, cause: str) -> messages.Hello:
     """Resets the board and opens a session with it; returns what it says of itself."""
     host.board.reset(cause)
     return host.open_session()
@@ -59,10 +63,9 @@ def restart(host: DeviceRig, cause: ResetCause) -> messages.Hello:
 
 @pytest.mark.soak_on_avr
 @pytest.mark.parametrize("damage", list(Damage))
-def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -> None:
+def test_power_cut_at_every_cell_of_a_save(host: Rig, damage: Damage) -> None:
     """Cuts 3 ms apart meet each write of 3.4 ms; after each one the values are all old or all new."""
-    host = DeviceRig(board)
-    board.eeprom_damage(damage, garbage=0x33)
+    host.board.eeprom_damage(damage, garbage=0x33)
     host.open_session()
     choose(host, VALUES[0])
     assert host.request(messages.SaveParameters, within_s=1.0).status == OK
@@ -71,13 +74,13 @@ def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -
     outcomes = []
     for cut in range(round((SAVED_BYTES * WRITE_S + STEPS_S) / 0.003)):
         choose(host, VALUES[1 - now])
-        before = board.read_eeprom()
+        before = host.board.read_eeprom()
         host.send(host.numbered(messages.SaveParameters))
         host.listen(cut * 0.003)
-        written = board.read_eeprom()
-        board.reset(ResetCause.POWER)
-        board.run(100)
-        after = board.read_eeprom()
+        written = host.board.read_eeprom()
+        host.board.reset("power")
+        run(host, 100)
+        after = host.board.read_eeprom()
         hit |= {i for i in range(len(after)) if after[i] != written[i]}
         assert host.open_session().parameters_saved == 1
         found = in_force(host)
@@ -95,26 +98,25 @@ def test_power_cut_at_every_cell_of_a_save(board: BoardAccess, damage: Damage) -
 
 
 @pytest.mark.soak_on_avr
-def test_power_cut_in_the_boot_counter(board: BoardAccess) -> None:
+def test_power_cut_in_the_boot_counter(host: Rig) -> None:
     """Started again and again, cut in mid-write: it goes up by one or stays, and never anything else."""
-    board.eeprom_damage(Damage.GARBAGE, garbage=0xA5)
-    host = DeviceRig(board)
+    host.board.eeprom_damage(Damage.GARBAGE, garbage=0xA5)
     counter = host.next_hello().boot_counter
     assert counter == 1
     went_up = 0
     for cut in range(18):
-        board.run(9_700 * CYCLES_PER_MS)
-        before = board.read_eeprom()
+        run(host, 9_700 * CYCLES_PER_MS)
+        before = host.board.read_eeprom()
         for _ in range(600):
-            if board.read_eeprom() != before:
+            if host.board.read_eeprom() != before:
                 break
-            board.run(CYCLES_PER_MS)
+            run(host, CYCLES_PER_MS)
         else:
             raise AssertionError("the start was not counted after 10 s")
-        board.run(3 * cut * CYCLES_PER_MS)  # the first cell is written: into each of the others, and beyond
-        board.reset(ResetCause.POWER)
-        board.run(100)
-        assert {i for i, cell in enumerate(board.read_eeprom()) if cell != before[i]} <= set(BOOT_RING)
+        run(host, 3 * cut * CYCLES_PER_MS)  # the first cell is written: into each of the others, and beyond
+        host.board.reset("power")
+        run(host, 100)
+        assert {i for i, cell in enumerate(host.board.read_eeprom()) if cell != before[i]} <= set(BOOT_RING)
         host.heard.clear()
         found = host.next_hello().boot_counter
         assert found in (counter, counter + 1)
@@ -122,15 +124,14 @@ def test_power_cut_in_the_boot_counter(board: BoardAccess) -> None:
         counter = found
     assert 1 <= went_up <= 9
     for _ in range(2):
-        board.run(10_300 * CYCLES_PER_MS)
-        board.reset(ResetCause.EXTERNAL)
+        run(host, 10_300 * CYCLES_PER_MS)
+        host.board.reset("external")
         host.heard.clear()
         counter += 1
         assert host.next_hello().boot_counter == counter
 
 
-def test_nothing_is_written_while_the_supply_is_low(board: BoardAccess) -> None:
-    host = DeviceRig(board)
+def test_nothing_is_written_while_the_supply_is_low(host: Rig) -> None:
     host.open_session()
     choose(host, VALUES[0])
     assert host.request(messages.SaveParameters, within_s=1.0).status == OK
@@ -138,27 +139,26 @@ def test_nothing_is_written_while_the_supply_is_low(board: BoardAccess) -> None:
     request = host.numbered(messages.SaveParameters)
     host.send(request)
     host.listen(0.05)
-    board.supply(3.9)
+    host.board.supply(3.9)
     answer = host.first(messages.Answer, lambda answer: answer.number == request.number, 0.1, "the end of the save")
     assert answer.status == SUPPLY_LOW
     host.listen(0.01)  # the cell under way
-    before = board.read_eeprom()
+    before = host.board.read_eeprom()
     assert host.request(messages.SaveParameters, within_s=1.0).status == SUPPLY_LOW
     host.listen(0.3)
-    assert board.read_eeprom() == before
-    board.supply(5.0)
-    restart(host, ResetCause.POWER)
+    assert host.board.read_eeprom() == before
+    host.board.supply(5.0)
+    restart(host, "power")
     assert in_force(host) == VALUES[0]
 
 
 # ---- resets ----------------------------------------------------------------------------------------------------------
 
 
-def test_nonce_is_another_one_after_each_reset(board: BoardAccess) -> None:
-    host = DeviceRig(board)
+def test_nonce_is_another_one_after_each_reset(host: Rig) -> None:
     nonces = [host.next_hello().board_nonce]
     for i in range(40):
-        board.reset(ResetCause.EXTERNAL if i % 2 else ResetCause.WATCHDOG)
+        host.board.reset("external" if i % 2 else "watchdog")
         nonces.append(host.next_hello().board_nonce)
     assert len(set(nonces)) == len(nonces)
     assert all(0 < nonce < 1 << 21 for nonce in nonces)
@@ -202,16 +202,16 @@ def test_a_hang_is_told(
     """The watchdog warns after 125 ms and resets 16 ms later, or another 125 ms later if nobody heard it; then nobody
     marks the record, either, by which a program behind a bootloader knows it."""
     image = patched(tmp_path, HANG_AT, code)
-    board = power_on("avr", image=str(image), bootloader=KITS if bootloader else None)
-    host = DeviceRig(board)
+    loader = str(KITS) if bootloader else None
+    host = Rig.open("avr", robot=bare("shieldbot"), image=str(image), bootloader=loader)
     host.next_hello()
     host.send(messages.Identify())
     host.listen(reset_s - 0.003)
-    assert board.counters()["resets"] == 0
+    assert host.board.counters()["resets"] == 0
     cause = messages.ResetCause(host.next_hello().reset_cause)
     assert cause.name.partition("_IN_")[0] == reported.name  # it may say in which task
-    assert board.counters()["resets"] == 1
-    board.reset(ResetCause.EXTERNAL)
+    assert host.board.counters()["resets"] == 1
+    host.board.reset("external")
     assert host.next_hello(2.0).reset_cause == EXTERNAL
 
 
@@ -219,15 +219,15 @@ def test_a_hang_is_told(
 def test_behind_a_bootloader_the_memory_tells_the_cause(pin_map: str) -> None:
     """It leaves nothing of the chip's own answer. RAM holds something else whenever the power comes; a brown-out that
     leaves it whole looks like an external reset."""
-    host = DeviceRig(power_on("avr", pin_map, bootloader=KITS))
+    host = Rig.open("avr", robot=bare(pin_map), bootloader=str(KITS))
     assert host.next_hello().reset_cause == POWER
     for cause, reported in [
-        (ResetCause.EXTERNAL, EXTERNAL),
-        (ResetCause.EXTERNAL, EXTERNAL),
-        (ResetCause.POWER, POWER),
-        (ResetCause.BROWN_OUT, EXTERNAL),
-        (ResetCause.POWER, POWER),
-        (ResetCause.POWER, POWER),
+        ("external", EXTERNAL),
+        ("external", EXTERNAL),
+        ("power", POWER),
+        ("brown_out", EXTERNAL),
+        ("power", POWER),
+        ("power", POWER),
     ]:
         host.board.reset(cause)
         assert host.next_hello(2.0).reset_cause == reported
@@ -257,7 +257,7 @@ def crc16(data: bytes) -> int:
     return crc
 
 
-def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(board: BoardAccess) -> None:
+def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(host: Rig) -> None:
     """Up to now a record began at address 0 and one at 128; the ring of the boot counter has its old place."""
     values = b"".join((1000 + i).to_bytes(2, "little") for i in range(24))
     content = b"\x05\x34\x12" + values
@@ -265,24 +265,22 @@ def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(board:
     boots = b"\x00" + (41).to_bytes(4, "little")
     entry = b"\xa5" + boots + crc16(boots).to_bytes(2, "little")
     for address, data in ((0, record), (128, record), (256, entry)):
-        board.write_eeprom(address, data)
-    host = DeviceRig(board)
+        host.board.write_eeprom(address, data)
     hello = host.open_session()
     assert (hello.parameters_saved, hello.boot_counter) == (0, 42)
     choose(host, VALUES[0])
     assert host.request(messages.SaveParameters, within_s=1.0).status == OK
-    assert restart(host, ResetCause.POWER).parameters_saved == 1
+    assert restart(host, "power").parameters_saved == 1
     assert in_force(host) == VALUES[0]
-    assert board.read_eeprom()[: len(record)] == record
+    assert host.board.read_eeprom()[: len(record)] == record
 
 
-def test_what_becomes_of_the_first_cell_does_not_matter(board: BoardAccess) -> None:
+def test_what_becomes_of_the_first_cell_does_not_matter(host: Rig) -> None:
     """When the supply fails it is address 0 that is written (data sheet, 8.4.2)."""
-    host = DeviceRig(board)
     host.open_session()
     choose(host, VALUES[0])
     assert host.request(messages.SaveParameters, within_s=1.0).status == OK
     for byte in (0x00, 0xA5, 0xFF):
-        board.write_eeprom(0, [byte])
-        assert restart(host, ResetCause.POWER).parameters_saved == 1
+        host.board.write_eeprom(0, [byte])
+        assert restart(host, "power").parameters_saved == 1
         assert in_force(host) == VALUES[0]

@@ -11,10 +11,10 @@ from boebot.description.robots import load_robot
 from boebot.devices.servo import ContinuousServo
 from boebot.devices.uart import Uart
 from boebot.link import messages
-from boebot_hil.rig import CYCLES_PER_S
-from sim_bridge.boards.board import Level, ResetCause
+from boebot_hil.rig import CYCLES_PER_S, Rig
+from sim_bridge.bench.bench import bare
+from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.avr.bootloader import KITS
-from sim_bridge.tests.boards.device_bench import DeviceRig, power_on
 from tools.avr_program import IMAGES
 
 pytestmark = pytest.mark.unsanitized
@@ -29,20 +29,21 @@ def device_pins(pin_map: str) -> dict[str, list[int]]:
     return {name: sorted(d.pins().values()) for name, d in devices if not isinstance(d, ContinuousServo | Uart)}
 
 
-def levels(host: DeviceRig, seconds: float) -> dict[int, set[Level]]:
+def levels(host: Rig, seconds: float) -> dict[int, set[Level]]:
     """What the board does to each pin within that time."""
-    host.board.edges()
+    begun = host.board.cycle
     seen = {pin: {host.board.output(pin)} for pin in range(20)}
     host.listen(seconds)
-    for edge in host.board.log():
-        seen[edge.pin].add(edge.level)
+    for cycle, pin, level in host.board.pin_log().tolist():
+        if cycle >= begun:
+            seen[pin].add(Level(level))
     return seen
 
 
 @pytest.mark.parametrize("kind", [pytest.param("native", marks=pytest.mark.soak), "avr"])
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: str) -> None:
-    host = DeviceRig(power_on(kind, pin_map))
+    host = Rig.open(kind, robot=bare(pin_map))
     host.open_session()
     assert host.request(messages.SetParameter, messages.PARAMETERS["devices"].id, 0).status == messages.AnswerStatus.OK
     host.listen(0.1)
@@ -56,7 +57,7 @@ def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: s
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) -> None:
     """All devices on: an echo is awaited for 20 ms, a decay for 14 ms; what an analog sensor gives is not pulled at."""
-    host = DeviceRig(power_on(kind, pin_map))
+    host = Rig.open(kind, robot=bare(pin_map))
     host.open_session()
     built = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in load_robot(pin_map).device)
     host.request(messages.SetParameter, messages.PARAMETERS["devices"].id, built)
@@ -73,7 +74,7 @@ def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) ->
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> None:
     """Who knows what is wired to the board before anyone says so?"""
-    host = DeviceRig(power_on(kind, pin_map))
+    host = Rig.open(kind, robot=bare(pin_map))
     seen = levels(host, 1.5)
     for device, pins in device_pins(pin_map).items():
         for pin in pins:
@@ -85,13 +86,12 @@ def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> No
 
 def low_after_ms(pin_map: str, bootloader: Path | None = None) -> float:
     """From the reset until the servos' lines are low, where they stay."""
-    board = power_on("avr", pin_map, bootloader=bootloader)
-    board.run(2 * CYCLES_PER_S)
-    board.edges()
-    start = board.now
-    board.reset(ResetCause.POWER)
-    board.run(2 * CYCLES_PER_S)
-    log = board.edges()
+    host = Rig.open("avr", robot=bare(pin_map), bootloader=bootloader and str(bootloader))
+    host.listen(2.0)
+    start = host.board.cycle
+    host.board.reset("power")
+    host.listen(2.0)
+    log = host.board.pin_log()
     of_servos = log[np.isin(log["pin"], SERVOS) & (log["cycle"] > start + 10)]  # without those of the reset itself
     assert of_servos["level"].tolist() == [Level.LOW, Level.LOW]
     return float(of_servos["cycle"].max() - start) / CYCLES_PER_S * 1e3

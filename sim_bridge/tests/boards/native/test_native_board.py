@@ -11,10 +11,10 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
+from boebot_hil.rig import CYCLES_PER_S, Rig
 from sim_bridge import _core
 from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
 from sim_bridge.boards.emulated import native_board, native_library
-from sim_bridge.tests.boards.device_bench import DeviceRig
 
 MS = 16_000  # cycles
 TICK = 10 * MS
@@ -41,9 +41,30 @@ def make() -> Iterator[Maker]:
         board.close()
 
 
-def drive(board: BoardAccess, left: int, right: int) -> DeviceRig:
+class Alone:
+    """A board with nothing around it, as a session that a Rig speaks with."""
+
+    realtime = False
+
+    def __init__(self, board: BoardAccess) -> None:
+        self.board, self.transport, self.write = board, self, board.send
+
+    def now(self) -> float:
+        return self.board.now / CYCLES_PER_S
+
+    def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
+        del quiet_s
+        self.board.run(round(wait_s * CYCLES_PER_S))
+        return self.board.received()[0]
+
+
+def rig_of(board: BoardAccess) -> Rig:
+    return Rig(Alone(board))  # type: ignore[arg-type]
+
+
+def drive(board: BoardAccess, left: int, right: int) -> Rig:
     """Opens a session, arms the motors and sends one set-point that lives for 2 s."""
-    host = DeviceRig(board)
+    host = rig_of(board)
     host.open_session()
     known = host.first(messages.Telemetry, lambda now: now.supply > 0, 0.2, "a measured supply")
     assert host.request(messages.Arm, known.latches).status == messages.AnswerStatus.OK
@@ -57,14 +78,14 @@ def said(sent: list[SentByte]) -> list[tuple[int, int, bytes]]:
     return frame.Decoder().feed(b"\0" + bytes(byte.byte for byte in sent))
 
 
-def telemetry(host: DeviceRig, seconds: float) -> messages.Telemetry:
+def telemetry(host: Rig, seconds: float) -> messages.Telemetry:
     """The last telemetry of the seconds to come."""
     return host.listen(seconds)[-1]
 
 
 def test_boards_do_not_share_state(make: Maker) -> None:
     one, other = make(), make()
-    moving, still = drive(one, 5000, 5000), DeviceRig(other)
+    moving, still = drive(one, 5000, 5000), rig_of(other)
     still.open_session()
     assert telemetry(moving, 0.1).pulse_left == 1600 * 16
     assert telemetry(still, 0.1).pulse_left == 0
@@ -157,7 +178,7 @@ def test_wrong_line_rate_is_framing_errors_and_garbage(make: Maker) -> None:
 
 def test_drive_replaces_what_was_queued_later(make: Maker) -> None:
     board = make()
-    host = DeviceRig(board)
+    host = rig_of(board)
     host.open_session()
     host.request(messages.SetParameter, messages.PARAMETERS["encoder_gap"].id, 0)
     board.drive(ENCODER_LEFT, Level.LOW)
