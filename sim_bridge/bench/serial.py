@@ -27,6 +27,7 @@ class Line:
         is_heard: whether the board's receiver is on, so that a byte would not be lost.
         not_heard: why it would, in words.
         waited_for: is called with the instant of what was waited for: the end of a byte's stop bit (s).
+        starts_s: when a program that has said nothing yet has begun at the latest: a wait does not begin before.
         allowance_s: by which a wait is longer, as the way to a real board takes time that is not the board's.
     """
 
@@ -34,6 +35,7 @@ class Line:
     is_heard: Callable[[], bool] = lambda: True
     not_heard: str = ""
     waited_for: Callable[[float], object] = lambda at_s: None
+    starts_s: float = 0.0
     allowance_s: float = 0.0
 
 
@@ -106,7 +108,8 @@ class Serial:
         if not isinstance(what, bytes | re.Pattern) or not what or isinstance(getattr(what, "pattern", b""), str):
             hint = f", as in b{what!r}" if what and isinstance(what, str) else ""
             raise CallError(f"expect: got {shown(what)}; expected bytes or a compiled pattern of bytes{hint}")
-        end_s = self.line.transport.now() + _seconds("expect", within) + self.line.allowance_s
+        begin_s = self.line.transport.now() if self._text else max(self.line.transport.now(), self.line.starts_s)
+        end_s = begin_s + _seconds("expect", within) + self.line.allowance_s
         looked = self._begin
         while (found := self._find(what, looked)) is None:
             left_s = end_s - self.line.transport.now()

@@ -436,8 +436,7 @@ def _at_port(url: str, wanted: Wanted, may_flash: bool) -> Uno:
             raise BoardError(f"the board at {url} has another program than {image.name}; expected it, or --uno-flash")
         _holds[url] = flash
     transport = open_port(url, baud)
-    opened_s = transport.now()
-    line = Line(transport, allowance_s=ALLOWANCE_S)
+    line = Line(transport, starts_s=transport.now() + START_S, allowance_s=ALLOWANCE_S)
     uno = Uno(url, wanted, line, None)
-    line.is_heard = lambda: bool(uno.serial.heard) or transport.now() > opened_s + START_S
+    line.is_heard = lambda: bool(uno.serial.heard) or transport.now() > line.starts_s
     return uno.begin()

@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.wall_clock, pytest.mark.unsanitized]
 TESTS = """
 @pytest.mark.uno(image="own.elf", baud=9600, motors=False)
 def test_answers(uno):
-    uno.serial.expect(b"ready", within=3)
+    uno.serial.expect(b"ready", within=0.1)  # from when the boot loader has begun the program
     uno.serial.send(b"+")
     uno.serial.expect(b"+", within=0.01)
 
