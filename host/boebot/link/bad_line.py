@@ -45,6 +45,29 @@ class _Chance:
         return found
 
 
+def _dropped(data: bytes, hits: Sequence[int]) -> bytes:
+    return bytes(byte for i, byte in enumerate(data) if i not in hits)
+
+
+def _doubled(data: bytes, hits: Sequence[int]) -> bytes:
+    return b"".join(data[i : i + 1] * (1 + (i in hits)) for i in range(len(data)))
+
+
+def _flipped(data: bytes, hits: Sequence[int]) -> bytes:
+    damaged = bytearray(data)
+    for bit in hits:
+        damaged[bit // 8] ^= 1 << bit % 8
+    return bytes(damaged)
+
+
+_DAMAGE: dict[str, tuple[int, Callable[[bytes, Sequence[int]], bytes]]] = {
+    "serial.dropped": (1, _dropped),
+    "serial.doubled": (1, _doubled),
+    "serial.flipped": (8, _flipped),
+}
+"""Units in a byte, and what becomes of bytes of which some units are hit."""
+
+
 class _Fault:
     """One of them, with its span by the transport's clock. `fired`: how much it has changed so far."""
 
@@ -53,9 +76,9 @@ class _Fault:
     ) -> None:
         self.name, self.value, self.begin_s, self.end_s, self.ways = name, value, begin_s, end_s, ways
         self.fired = 0
-        share = value if name in _DAMAGE else 0.0
-        self.chances = {way: _Chance(share, random.Random(f"{name} {way} {begin_s:.6f} {seed}")) for way in ways}
-        self.frames = {way: bytearray() for way in ways}  # that have begun
+        share = value if name in _DAMAGE or name == "serial.repeated" else 0.0
+        self._chances = {way: _Chance(share, random.Random(f"{name} {way} {begin_s:.6f} {seed}")) for way in ways}
+        self._frames = {way: bytearray() for way in ways}  # that have begun
 
     def holds(self, time_s: float) -> bool:
         """It is on."""
@@ -63,53 +86,28 @@ class _Fault:
 
     def through(self, way: str, data: bytes) -> bytes:
         """What comes of bytes that pass."""
-        if (damage := _DAMAGE.get(self.name)) is not None:
-            return damage(self, way, data)
-        if self.name != "host.slow":
-            self.fired += len(data)
+        if self.name == "serial.repeated":
+            return self._repeated(self._chances[way], self._frames[way], data)
+        if self.name in _DAMAGE:
+            units, damage = _DAMAGE[self.name]
+            hits = self._chances[way].hits(units * len(data))
+            self.fired += len(hits)
+            return damage(data, hits)
+        self.fired += len(data) if self.name != "host.slow" else 0
         return b"" if self.name in ("cable.out", "host.killed") else data
 
-
-def _dropped(fault: _Fault, way: str, data: bytes) -> bytes:
-    hits = set(fault.chances[way].hits(len(data)))
-    fault.fired += len(hits)
-    return bytes(byte for i, byte in enumerate(data) if i not in hits)
-
-
-def _doubled(fault: _Fault, way: str, data: bytes) -> bytes:
-    hits = set(fault.chances[way].hits(len(data)))
-    fault.fired += len(hits)
-    return b"".join(data[i : i + 1] * (1 + (i in hits)) for i in range(len(data)))
-
-
-def _flipped(fault: _Fault, way: str, data: bytes) -> bytes:
-    hits, damaged = fault.chances[way].hits(8 * len(data)), bytearray(data)
-    for bit in hits:
-        damaged[bit // 8] ^= 1 << bit % 8
-    fault.fired += len(hits)
-    return bytes(damaged)
-
-
-def _repeated(fault: _Fault, way: str, data: bytes) -> bytes:
-    """Frames end with a byte of 0."""
-    frame, passed = fault.frames[way], bytearray()
-    for byte in data:
-        frame.append(byte)
-        passed.append(byte)
-        if byte == 0:
-            if fault.chances[way].hits(1):
-                passed += frame
-                fault.fired += 1
-            frame.clear()
-    return bytes(passed)
-
-
-_DAMAGE: dict[str, Callable[[_Fault, str, bytes], bytes]] = {
-    "serial.dropped": _dropped,
-    "serial.doubled": _doubled,
-    "serial.flipped": _flipped,
-    "serial.repeated": _repeated,
-}
+    def _repeated(self, chance: _Chance, frame: bytearray, data: bytes) -> bytes:
+        """Frames end with a byte of 0."""
+        passed = bytearray()
+        for byte in data:
+            frame.append(byte)
+            passed.append(byte)
+            if byte == 0:
+                again = len(chance.hits(1))
+                passed += frame * again
+                self.fired += again
+                frame.clear()
+        return bytes(passed)
 
 
 class BadLine:

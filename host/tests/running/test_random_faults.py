@@ -91,7 +91,7 @@ def examples(count: int) -> settings:
     )
 
 
-@examples(15)
+@examples(10)
 @given(schedules(4))
 def test_random_schedules(schedule: list[Fault]) -> None:
     obeys("native", schedule)
