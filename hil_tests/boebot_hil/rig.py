@@ -27,6 +27,7 @@ FRAME_CYCLES = 320_000  # 20 ms servo frame
 
 MOVING = (messages.Arm, messages.SetpointSignal, messages.SetpointSpeed, messages.Turret)
 KEPT = (messages.SaveParameters, messages.ResetParameters)
+FALLBACK = tuple(messages.PARAMETERS[name].id for name in ("fallback_after", "fallback_at_start"))
 LINE_BYTES_PER_TICK = 500  # at 500,000 baud
 PROBE_S = 0.15  # a session lives as long as it hears of us; the least patience of a board is 0.2 s
 HOST_NONCE = 0x0A5A5A
@@ -95,10 +96,12 @@ class Rig:
         """The message's frame, with the next sequence number and the session's seed.
 
         Raises:
-            Cannot: it would move a real robot that has to stand still, or change the parameters that it keeps.
+            Cannot: it would move a real robot that has to stand still, let it drive by itself, or change the parameters
+                that it keeps.
         """
-        if self.transport.realtime and isinstance(message, KEPT):
-            raise Cannot("it changes what a real robot keeps in its EEPROM; expected an emulated board")
+        drives = isinstance(message, messages.SetParameter) and message.parameter in FALLBACK
+        if self.transport.realtime and (drives or isinstance(message, KEPT)):
+            raise Cannot("it changes what a real robot does by itself or keeps; expected an emulated board")
         if not self._may_move and isinstance(message, MOVING):
             raise Cannot("it may move the robot; expected --motors, with the robot on blocks")
         wire = frame.encode(message.ID, self._sequence, message.pack(), self.seed)

@@ -8,12 +8,11 @@ import pytest
 from boebot.link import messages
 from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
 
-pytestmark = pytest.mark.emulated
-
 LEFT, RIGHT = 13, 12
 EDGE_TOLERANCE = 16  # cycles: 1 us
 
 
+@pytest.mark.emulated
 @pytest.mark.promise(
     "Motor signals: -1 full backward, 0 hold still, +1 full forward.", "servo pulse in force; 0: no pulses"
 )
@@ -33,6 +32,7 @@ def test_signal_becomes_pulse_width_at_the_pin(rig: Rig, left: float, right: flo
     assert now.pulse_right == round((1500 - 200 * right) * CYCLES_PER_US)
 
 
+@pytest.mark.emulated
 @pytest.mark.promise("edges of one encoder line in one tick above which the line is masked")
 def test_width_holds_while_the_line_is_saturated_and_encoders_fire(rig: Rig) -> None:
     """With a line that is too full and both encoder lines at 1.5 kHz."""
@@ -58,6 +58,7 @@ def test_speed_setpoint_scales_with_the_stored_maximum(rig: Rig) -> None:
     assert now.pulse_right == 1550 * CYCLES_PER_US
 
 
+@pytest.mark.emulated
 @pytest.mark.promise(
     "A set-point lives from the start of the tick that it answers for its `time_to_live`",
     "When the set-point in force has outlived itself the motors stop (*dead-man*) until the next valid one",
@@ -80,6 +81,7 @@ def test_e67_dead_man_stops_the_pulses_after_the_time_to_live(rig: Rig, time_to_
     assert now.pulse_left and not now.status & messages.Status.DEAD_MAN, "a fresh set-point ends a dead-man stop"
 
 
+@pytest.mark.emulated
 @pytest.mark.promise("no more pulses, from the next servo frame (20 ms) on. A pulse is sent whole or not at all")
 def test_stop_stops_at_once_and_pulses_are_whole(rig: Rig) -> None:
     """The stop comes at 21 phases of the servo frame: no pulse is ever cut."""
@@ -97,6 +99,7 @@ def test_stop_stops_at_once_and_pulses_are_whole(rig: Rig) -> None:
     assert np.all(np.abs(widths[RIGHT] - 1300 * CYCLES_PER_US) <= EDGE_TOLERANCE)
 
 
+@pytest.mark.emulated
 @pytest.mark.promise("a fresh set-point is in force")
 def test_no_pulse_before_the_first_setpoint(rig: Rig) -> None:
     rig.listen(0.5)
@@ -111,6 +114,7 @@ def test_setpoint_out_of_range_is_refused(rig: Rig, signal: int) -> None:
     assert rig.latest().pulse_left == 0
 
 
+@pytest.mark.emulated
 @pytest.mark.promise("A latch discards the set-point in force. Only `arm` ends it")
 def test_latched_motors_do_not_move_until_they_are_armed(board_url: str) -> None:
     with Rig.open(board_url) as rig:
@@ -138,6 +142,7 @@ def test_arm_that_does_not_know_of_the_latest_stop_is_refused(rig: Rig) -> None:
     rig.arm()
 
 
+@pytest.mark.emulated
 @pytest.mark.promise("The session ends, and the motors are latched off")
 def test_end_of_the_session_stops_and_latches(rig: Rig) -> None:
     rig.drive(0.5, 0.5, 2000)
@@ -151,6 +156,7 @@ def test_end_of_the_session_stops_and_latches(rig: Rig) -> None:
     assert rig.latest().latch == messages.Latch.SESSION_ENDED
 
 
+@pytest.mark.emulated
 @pytest.mark.promise("silence of the host after which the session ends and the motors are latched off")
 def test_silence_of_the_host_ends_the_session(rig: Rig) -> None:
     """Though the set-point would live on: the board's patience ends first."""
@@ -164,6 +170,7 @@ def test_silence_of_the_host_ends_the_session(rig: Rig) -> None:
     assert 0.28 <= stopped_after <= 0.34
 
 
+@pytest.mark.emulated
 @pytest.mark.promise("the board was reset, or has not heard it. It opens a new one")
 def test_reset_in_mid_run_stops_the_motors_and_the_link_comes_back(rig: Rig) -> None:
     for cause in ("external", "brown_out"):
