@@ -106,6 +106,7 @@ class EmulatedBoard:
         debugger: what is closed before it.
         ended: why a debugger or a reaction has ended its run.
         reacts_at: cycle of the edge to which something reacts just now.
+        called_by_c: what else C calls within a run, and so has to live as long.
         is_strict: what a bench does not show of a program ends its run.
         stood_still_s: how long the program has stood still in a debugger, by the wall clock.
     """
@@ -125,6 +126,7 @@ class EmulatedBoard:
         self.reacts_at: int | None = None
         self._reactions: dict[int, list[Reaction]] = {}
         self._in_c: Any = None  # what C calls at an edge
+        self.called_by_c: list[Any] = []
         self.is_strict = False
         self.stood_still_s = 0.0
 
@@ -173,7 +175,7 @@ class EmulatedBoard:
         board = self.handle
         self._reactions.setdefault(checked_pin("on_edge", pin), []).append(react)
         if self._in_c is None:
-            self._in_c = self.ffi.callback("board_reaction", self._react, error=1, onerror=self._failed)
+            self._in_c = self.ffi.callback("board_reaction", self._react, error=1, onerror=self.failed)
             board.react = self._in_c
         board.reacts |= 1 << pin
 
@@ -186,8 +188,9 @@ class EmulatedBoard:
         self.reacts_at = None
         return 0
 
-    def _failed(self, _: object, error: BaseException, trace: TracebackType) -> None:
-        self.reacts_at, self.ended = None, error.with_traceback(trace)
+    def failed(self, _: object, error: BaseException, trace: TracebackType) -> None:
+        """What C has called, from within the run, has raised: the run ends."""
+        self.reacts_at, self.ended, self.handle.paused = None, error.with_traceback(trace), True
 
     def stop_at(self, pins: Collection[int]) -> None:
         """From now on an edge of one of these pins ends a run, behind the instruction in which it happens."""

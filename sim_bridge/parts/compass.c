@@ -113,10 +113,12 @@ static compass *of_device(two_wire_device *device) {
   return (compass *)(void *)((char *)device - offsetof(compass, device));
 }
 
-static void begin(two_wire_device *device, int reading, uint64_t cycle) {
+static int begin(two_wire_device *device, uint8_t address, int reading, uint64_t cycle) {
+  if (address != COMPASS_ADDRESS) return 0;
   compass *self = of_device(device);
   settle(self, cycle);
   self->expects_pointer = !reading;
+  return 1;
 }
 
 static void advance_pointer(compass *self) {
@@ -162,7 +164,7 @@ static int init(part *base, const part_place *place, const uint8_t *pins, const 
   compass *self = (compass *)base;
   const hmc5883l_parameters *p = parameters;
   two_wire_init(&self->bus, &OPERATIONS, place, pins, &self->device);
-  self->device = (two_wire_device){.op = &CHIP, .address = COMPASS_ADDRESS};
+  self->device = (two_wire_device){.op = &CHIP};
   self->parameters = *p;
   self->registers[CONFIGURATION_A] = 0x10;
   self->registers[CONFIGURATION_B] = 0x20;

@@ -9,14 +9,10 @@ static void pull(two_wire *self, int low, uint64_t cycle) {
 
 /* The eight bits of an address are in: 1 if somebody has it. */
 static int take_address(two_wire *self, uint64_t cycle) {
-  if (self->device->address != self->shift >> 1) {
-    self->phase = TWO_WIRE_IGNORE;
-    return 0;
-  }
   const int reading = self->shift & 1;
-  self->phase = reading ? TWO_WIRE_READ : TWO_WIRE_WRITE;
-  self->device->op->begin(self->device, reading, cycle);
-  return 1;
+  const int is_its = self->device->op->begin(self->device, self->shift >> 1, reading, cycle);
+  self->phase = !is_its ? TWO_WIRE_IGNORE : reading ? TWO_WIRE_READ : TWO_WIRE_WRITE;
+  return is_its;
 }
 
 static void next_byte(two_wire *self, uint64_t cycle) {

@@ -15,8 +15,8 @@ typedef struct two_wire_device two_wire_device;
 
 /* What a chip does when it is spoken to; `cycle`: when. */
 typedef struct {
-  /* It was addressed, to be read or written. */
-  void (*begin)(two_wire_device *self, int reading, uint64_t cycle);
+  /* Somebody is addressed (seven bits), to be read or written. Returns 1 if that is the chip. */
+  int (*begin)(two_wire_device *self, uint8_t address, int reading, uint64_t cycle);
   /* It got a byte. Returns 1 to acknowledge it. */
   int (*write)(two_wire_device *self, uint8_t byte, uint64_t cycle);
   /* It is to send a byte. */
@@ -25,7 +25,6 @@ typedef struct {
 
 struct two_wire_device {
   const two_wire_operations *op;
-  uint8_t address; /* seven bits */
 };
 
 typedef enum { TWO_WIRE_IDLE, TWO_WIRE_ADDRESS, TWO_WIRE_WRITE, TWO_WIRE_READ, TWO_WIRE_IGNORE } two_wire_phase;
