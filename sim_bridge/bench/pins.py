@@ -14,6 +14,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import merge
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -119,9 +120,13 @@ class Pin:
         edges = np.array([0, *flicks])
         self._drive(self._cycle(after) + edges, (level + np.arange(len(edges))) % 2)
 
-    def wave(self, rows: NDArray[Any], after: float = 0.0) -> None:
+    def wave(self, rows: NDArray[Any] | str | Path, after: float = 0.0, signal: str | None = None) -> None:
         """Drives it as the rows say, shape (n, 2): time (s, counted from `after` seconds from now on, never less than
-        before) and level (0, 1, or 2 for let go of)."""
+        before) and level (0, 1, or 2 for let go of); or as a signal of a value change dump (.vcd) does."""
+        if isinstance(rows, str | Path):
+            from sim_bridge.bench.waves import read_wave
+
+            rows = read_wave(Path(rows), signal)
         try:
             times, levels = np.asarray(rows, float).reshape(-1, 2).T
         except (TypeError, ValueError):
