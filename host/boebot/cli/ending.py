@@ -93,13 +93,12 @@ def five_rows(result: RunResult) -> list[tuple[str, str]]:
         way.append(f"odometry off by {error_m:.2f} m at the end")
     if (charge := result.battery_charge) is not None:
         way.append(f"battery {charge:.0%} full at the end")
-    faults = ", ".join(f"{name} fired {figures.counted(n, 'time', 'times')}" for name, n in result.faults.items())
     return [
         ("run", f"{result.brain} on {result.robot.name} ({result.board}){where}, seed {result.seed}{_changed(table)}"),
         ("time", f"{result.run_time:g} s{faster}"),
         ("way", ", ".join(way)),
         ("program", f"SHA-256 {result.program[:16]}...") if result.program else ("brain", _brain(result)),
-        *([("faults", faults)] if faults else []),
+        *([("faults", table["faults"])] if table["faults"] else []),
         ("ended", table["ended"] + _touched(result)),
     ]
 

@@ -34,8 +34,6 @@ def text(value: Any) -> str:
         return f"{value:,.10g}" if abs(value) >= 1000 else f"{value:.10g}"
     if isinstance(value, int) and not isinstance(value, bool):
         return f"{value:,}"
-    if isinstance(value, Mapping):
-        return ", ".join(f"{name} {text(item)}" for name, item in value.items())
     if isinstance(value, list):
         return ", ".join(str(item) for item in value)
     return str(value)

@@ -328,7 +328,7 @@ class Run:
             "sessions_lost": self.sessions_lost,
             "touched": self.touched,
             "hung_at": figures.hang_places(self.watchdog_resets),
-            "faults": self.faults or None,
+            "faults": ", ".join(f"{name} fired {count}" for name, count in self.faults.items()) or None,
             "firmware": None if identity is None else text(identity.firmware_version),
             "compiler": None if identity is None else text(identity.compiler),
             "image_hash": None if identity is None or identity.image_size == 0 else f"{identity.image_hash:08x}",
