@@ -48,7 +48,7 @@ def test_the_analysis_of_machine_code_knows_no_robot() -> None:
         for source in (ROOT / "host" / "avr_timing").rglob("*.py")
         if "tests" not in source.parts
         for name in imported(source)
-        if name.split(".")[0] in ("boebot", "boebot_timing", "sim_bridge", "hil_tests", "tools")
+        if name.split(".")[0] in ("boebot", "boebot_timing", "sim_bridge", "boebot_hil", "tools")
         and not name.startswith(("boebot.image", "boebot.errors"))
     ]
     assert not guilty
