@@ -136,6 +136,11 @@ class Bench:
         self._edge_count = self._queued = 0
         self._record = Record()  # but for what is in the logs
 
+    @property
+    def name(self) -> str:
+        """Of its program's file."""
+        return self.board.elf.name if self.board.elf else self.board.description
+
     # ---- time --------------------------------------------------------------------------------------------------------
 
     @property
@@ -154,13 +159,12 @@ class Bench:
         """
         while (now := self.now) < cycle:
             self.session.transport.do_due()
-            end = min(cycle, now + LONGEST_CYCLES, self.session.transport.next_due)
-            if self.sources:
-                end = min(end, now + SLICE_CYCLES)
-                if end + AHEAD_CYCLES > self._queued:
-                    self._queued = end + AHEAD_CYCLES
-                    for source in self.sources:
-                        source.queue(self, self._queued)
+            longest = SLICE_CYCLES if self.sources or self.after_slice else LONGEST_CYCLES
+            end = min(cycle, now + longest, self.session.transport.next_due)
+            if end + AHEAD_CYCLES > self._queued:
+                self._queued = end + AHEAD_CYCLES
+                for source in self.sources:
+                    source.queue(self, self._queued)
             met = self.robot.run_to_edge(end, edge_of)
             if self.session.recorder is not None:
                 self.session.recorder.collect()

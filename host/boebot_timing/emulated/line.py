@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from boebot_timing.emulated.loads import TICK_CYCLES, Bench
+from boebot_timing.emulated.loads import TICK_CYCLES
+from sim_bridge.bench.bench import Bench
 
 BYTE_CYCLES = 320  # 10 bits at 500,000 baud
 HOST_NONCE = 0x0A5A5A
@@ -50,7 +51,7 @@ class Line:
         wire = frame.encode(message.ID, self._sequence, message.pack(), self.seed or frame.SEED)
         self._sequence = (self._sequence + 1) & 0xFF
         begin = max(at, self.free, self.bench.now)
-        self.bench.access.send(wire, at=begin)
+        self.bench.send(wire, at=begin)
         self.free = begin + len(wire) * BYTE_CYCLES
         return self.free
 
@@ -62,7 +63,7 @@ class Line:
     # ---- from the board ----------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        data, cycles = self.bench.access.received()
+        data, cycles = self.bench.received()
         if not data:
             return
         *frames, rest = (self._bytes + data).split(b"\0")
@@ -93,7 +94,7 @@ class Line:
                     return heard.message
             since = len(self.heard)
             self.bench.run(TICK_CYCLES // 8)
-        raise BoardError(f"{self.bench.elf.name} says nothing: waited {PATIENCE_TICKS} ticks for {kind.__name__}")
+        raise BoardError(f"{self.bench.name} says nothing: waited {PATIENCE_TICKS} ticks for {kind.__name__}")
 
     @property
     def telemetry(self) -> list[Heard]:

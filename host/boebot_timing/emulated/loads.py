@@ -1,4 +1,4 @@
-"""Loads at the pins: an emulated board by itself, and what drives its lines: encoder wheels, echoes, contacts.
+"""Loads at the pins of a bench: what drives its lines: encoder wheels, echoes, contacts.
 
 A source queues its edges some time ahead, at exact cycles; periods share no factor with the control tick, so that
 phases are swept. Bytes are in line.py.
@@ -6,113 +6,20 @@ phases are swept. Bytes are in line.py.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, Protocol
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from boebot_timing.emulated.world_access import WorldAccess
-from sim_bridge.boards import avr
-from sim_bridge.boards.board import LEVELS, BoardAccess, Edge, Level
+from sim_bridge.bench.bench import Bench
+from sim_bridge.boards.board import Level
 
 CYCLES_PER_US = 16
 TICK_CYCLES = 160_000
-SLICE_CYCLES = 8_000  # 0.5 ms: shorter than the time from a Ping's trigger to its echo
-AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
 ECHO_DELAY_CYCLES = 750 * CYCLES_PER_US  # from the trigger's end to the echo (Parallax #28015, hold-off)
 ECHO_SHORTEST, ECHO_LONGEST = 2_000, 290_000  # cycles: 0.125 to 18.1 ms (ibid.: 0.115 to 18.5 ms)
 
 
 NOISE_PERIOD = 159  # cycles from edge to edge: 100,000 a second, in step with nothing
-
-
-class Source(Protocol):
-    """Whatever acts on a board from outside."""
-
-    def queue(self, bench: Bench, until: int) -> None:
-        """Queues what it does up to that cycle; what happened up to now is known."""
-
-
-class PinEdges:
-    """All that the firmware did to each pin; sorted out where somebody asks for a pin."""
-
-    def __init__(self) -> None:
-        self._pieces: list[NDArray[Any]] = []
-        self._found: dict[int, tuple[int, list[Edge]]] = {}
-
-    def add(self, edges: NDArray[Any]) -> None:
-        """Takes edges (dtype EDGE) that are newer than all before."""
-        if len(edges):
-            self._pieces.append(edges)
-
-    def __getitem__(self, pin: int) -> list[Edge]:
-        seen, found = self._found.get(pin, (0, []))
-        if seen == len(self._pieces):
-            return found
-        for piece in self._pieces[seen:]:
-            of_pin = piece[piece["pin"] == pin]
-            found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]
-        self._found[pin] = (len(self._pieces), found)
-        return found
-
-
-class Bench:
-    """A board with an image, powered on. Time passes in slices; before each, all sources queue what they do in it."""
-
-    def __init__(self, elf: Path, access: BoardAccess | WorldAccess | None = None) -> None:
-        """`access`: to a board that runs the image, in place of a new one by itself. Raises BoardError where the image
-        cannot be loaded."""
-        self.elf = elf
-        self.access: BoardAccess | WorldAccess = avr.create(elf).access() if access is None else access
-        self.sources: list[Source] = []
-        self.edges = PinEdges()
-        self.after_slice: list[Callable[[], None]] = []
-        self._queued = 0
-
-    @property
-    def now(self) -> int:
-        """The cycle up to which the board has run."""
-        return self.access.now
-
-    def run_until(self, until: int) -> None:
-        """Lets time pass. A crash raises BoardError."""
-        while self.now < until:
-            end = min(self.now + SLICE_CYCLES, until)
-            if end + AHEAD_CYCLES > self._queued:
-                self._queued = end + AHEAD_CYCLES
-                for source in self.sources:
-                    source.queue(self, self._queued)
-            self.access.advance(end)
-            self.edges.add(self.access.edges())
-            for look in self.after_slice:
-                look()
-
-    def run(self, cycles: int) -> None:
-        """Lets `cycles` pass."""
-        self.run_until(self.now + cycles)
-
-    def pulses(self, pin: int, since: int = 0) -> np.ndarray:
-        """Start and width, in cycles, of every high pulse on `pin` that began after `since`: shape (n, 2)."""
-        found, rise = [], None
-        for edge in self.edges[pin]:
-            if edge.level == Level.HIGH:
-                rise = edge.cycle
-            elif rise is not None:
-                found.append((rise, edge.cycle - rise))
-                rise = None
-        return np.array([pulse for pulse in found if pulse[0] > since], dtype=np.int64).reshape(-1, 2)
-
-    def close(self) -> None:
-        """Lets go of the board."""
-        self.access.close()
-
-    def __enter__(self) -> Bench:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class PulseTrain:
@@ -128,7 +35,7 @@ class PulseTrain:
         due = range(self.edges.stop, until, self.period)
         if due:
             level = Level.HIGH if len(self.edges) % 2 else Level.LOW
-            bench.access.wave(self.pin, self.period, due.start, len(due), level)
+            bench.wave(self.pin, due, level)
             self.edges = range(self.first, due[-1] + self.period, self.period)
 
 
@@ -171,8 +78,8 @@ class Contact:
     def queue(self, bench: Bench, until: int) -> None:
         """See Source. Both ends of a closing are queued at once: the later one replaces nothing earlier."""
         while self._next < until:
-            bench.access.drive(self.pin, Level.LOW, at=self._next)
-            bench.access.drive(self.pin, Level.HIGH, at=self._next + self.closed)
+            bench.drive(self.pin, Level.LOW, at=self._next)
+            bench.drive(self.pin, Level.HIGH, at=self._next + self.closed)
             self.closings.append(self._next)
             self._next += self.period
 
@@ -188,7 +95,7 @@ class Bursts:
         """See Source. A burst is queued at once."""
         while self._next < until:
             level = Level.LOW if self._begun * self.count % 2 else Level.HIGH
-            bench.access.wave(self.pin, self.half, self._next, self.count, level)
+            bench.wave(self.pin, range(self._next, self._next + self.count * self.half, self.half), level)
             self._begun += 1
             self._next += self.period
 
@@ -217,6 +124,6 @@ class Ping:
             return  # the level that the board's pin had before it let go of it
         length = ECHO_SHORTEST + len(self.echoes) * self.step % (ECHO_LONGEST - ECHO_SHORTEST)
         rise = triggered + ECHO_DELAY_CYCLES + len(self.echoes) * 7 % 61
-        bench.access.drive(self.pin, Level.HIGH, at=rise)
-        bench.access.drive(self.pin, Level.LOW, at=rise + length)
+        bench.drive(self.pin, Level.HIGH, at=rise)
+        bench.drive(self.pin, Level.LOW, at=rise + length)
         self.echoes.append((rise, rise + length))

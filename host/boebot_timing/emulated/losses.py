@@ -36,7 +36,7 @@ def losses(line: Line, wheels: Sequence[Sequence[PulseTrain]]) -> Losses:
     are masked, and not counted as lost.
     """
     bench = line.bench
-    board, since = bench.access.counters(), len(line.heard)
+    board, since = bench.pins.counters(), len(line.heard)
     bench.run(COUNTERS_TICKS * TICK_CYCLES)
     counted = line.wait(messages.Counters, since)
     telemetry = [heard.message for heard in line.telemetry]

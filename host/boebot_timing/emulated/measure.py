@@ -9,25 +9,52 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
+import msgspec
+
 from boebot.description import robots
 from boebot.description.robots import RobotDescription
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot_timing.emulated.line import Line
-from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Ping, PulseTrain
+from boebot_timing.emulated.loads import TICK_CYCLES, Ping, PulseTrain
 from boebot_timing.emulated.losses import losses as losses_of
 from boebot_timing.emulated.scenarios import SILENCE, load, numbers_of, prepare
 from boebot_timing.emulated.watched import Run, watched
-from boebot_timing.emulated.world_access import WorldAccess
 from boebot_timing.measured import Measurement, merged
 from boebot_timing.realisable import CLOCK_HZ
-from sim_bridge.boards import avr
+from sim_bridge.bench.bench import Bench
+from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import watchdog_resets
 
+GUARD_CYCLES = 64
 SCENARIOS = ("figures", "overload", "faults", "everything")
 DRAIN_TICKS = 3  # after a run, for what is under way
 
 Progress = Callable[[float], None]
+
+
+def with_all_devices(robot: RobotDescription) -> RobotDescription:
+    """The robot with every device of its pin map built and on."""
+    device = {name: msgspec.structs.replace(one, on=True) for name, one in robot.device.items()}
+    return msgspec.structs.replace(robot, device=device)
+
+
+class WorldBench(Bench):
+    """A board whose host lives by the world's clock: its bytes begin BOARD_GUARD_CYCLES after they are written."""
+
+    @property
+    def now(self) -> int:
+        """The cycle up to which the world has run."""
+        return self.session.sim.cycle
+
+    def send(self, data: bytes, at: int = 0) -> None:
+        """See Bench."""
+        super().send(data, at + GUARD_CYCLES)
+
+
+def everything(image: Path, robot: RobotDescription) -> Bench:
+    """An image on a robot with all that it can have, in a room."""
+    return WorldBench(image, robot=with_all_devices(robot), arena="room", record=False)
 
 
 def robot_of(image: Path) -> RobotDescription:
@@ -37,7 +64,7 @@ def robot_of(image: Path) -> RobotDescription:
         BoardError: it does not run, or says nothing.
         RobotError: there is no such robot.
     """
-    with Bench(image) as bench:
+    with Bench(image, record=False) as bench:
         hello = Line(bench).wait(messages.Hello, 0)
     return robots.load_robot(hello.robot.rstrip(b"\0").decode("ascii", "replace"))
 
@@ -59,16 +86,16 @@ def run(image: Path, robot: RobotDescription, scenario: str, seconds: float, see
     if not least < seconds <= 3600:
         raise BoardError(f"scenario {scenario} for {seconds:g} s; expected more than {least:g} s and at most 3600 s")
     what = watched(image)
-    board = avr.create(image)
-    board.record(what.watch)
-    access = WorldAccess(board, robot, seed=1) if scenario == "everything" else board.access()
-    with Bench(image, access) as bench:
+    with everything(image, robot) if scenario == "everything" else Bench(image, record=False) as bench:
+        board = bench.board
+        assert isinstance(board, AvrBoard)
+        board.record(what.watch)
         line = prepare(bench, robot, scenario)
-        loaded_from, before = bench.now, bench.access.counters()
+        loaded_from, before = bench.now, bench.pins.counters()
         wheels = load(bench, line, robot, scenario, numbers_of(seed), round(seconds * CLOCK_HZ))
         bench.run(round(seconds * CLOCK_HZ))
-        after = bench.access.counters()
-        if resets := watchdog_resets(bench.access.watchdog_log(), image):
+        after = bench.pins.counters()
+        if resets := watchdog_resets(bench.pins.watchdog_log(), image):
             raise BoardError(f"{image.name}, {scenario}, seed {seed}: {resets[0]}")
         record = board.spans()
         lowest_stack = board.lowest_stack

@@ -24,8 +24,9 @@ from boebot.devices.ping import PingSensor
 from boebot.devices.whisker import WhiskerSwitch
 from boebot.link import frame, messages
 from boebot_timing.emulated.line import BYTE_CYCLES, Line
-from boebot_timing.emulated.loads import Bench, Bursts, Contact, Ping, PulseTrain, Source, wheels, with_noise
+from boebot_timing.emulated.loads import Bursts, Contact, Ping, PulseTrain, wheels, with_noise
 from boebot_timing.emulated.traffic import EachTick, FullLine
+from sim_bridge.bench.bench import Bench, Source
 
 EDGES_PER_S = {"figures": 1500, "overload": 4000, "faults": 1500, "everything": 1500}
 BURSTS = ((10, 120, 101_009), (110, 300, 397_001))  # edges, cycles apart and to the next burst: too close; too many
@@ -101,7 +102,7 @@ class AllSorts:
         wire = bytearray(frame.encode(messages.SetParameter.ID, 0, payload, self._line.seed))
         wire[self._random.randrange(1, len(wire) - 1)] ^= 1 << self._random.randrange(8)
         begin = max(self._next, self._line.free, bench.now)
-        bench.access.send(bytes(wire), at=begin)
+        bench.send(bytes(wire), at=begin)
         self._line.free = begin + len(wire) * BYTE_CYCLES
 
     def _endless(self) -> Iterator[object]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from boebot.link import messages
 from boebot_timing.emulated.line import Line
-from boebot_timing.emulated.loads import Bench
+from sim_bridge.bench.bench import Bench
 
 SETPOINT_PERIOD = 159_001  # cycles: a prime below the tick, so at least one each tick, at each of its phases
 TIME_TO_LIVE_MS = 250

@@ -18,6 +18,7 @@ from boebot_timing.emulated.losses import Losses, losses
 from boebot_timing.tests import latency_limits as limits
 from boebot_timing.tests.jitter_run import CENTRE, GAIN, MIRROR, Run
 from boebot_timing.tests.latency_limits import SERVO_FRAME_CYCLES, Limits
+from sim_bridge.bench.pins import Pin
 
 CYCLES_PER_US = 16
 SAME_WIDTH = 16  # cycles by which a pulse may differ from the set-point's
@@ -71,7 +72,7 @@ def servo_pulses(run: Run) -> list[Distribution]:
     widths = {side: [width_of(side, change.signals) for change in run.traffic.changes] for side in MIRROR}
     for side in MIRROR:
         pin = run.pins[f"servo {side}"]
-        pulses = run.bench.pulses(pin, run.begun)
+        pulses = Pin(run.bench, pin).all_pulses(run.begun + 1)
         pulses = pulses[pulses[:, 0] < run.ended]
         allowed = np.array(sorted(set(widths[side])) or [CENTRE])
         errors = [int(width - allowed[np.argmin(np.abs(allowed - width))]) for width in pulses[:, 1]]
@@ -113,7 +114,7 @@ def reactions(run: Run) -> list[Distribution]:
         _of("byte in to reaction", probes, limits.BYTE_TO_REACTION)  # to the first byte of the answer to a probe
     ]
     for slot, side in enumerate(MIRROR):
-        pulses = run.bench.pulses(run.pins[f"servo {side}"])
+        pulses = Pin(run.bench, run.pins[f"servo {side}"]).all_pulses(1)
         delays = []
         for change in run.traffic.changes[1:]:  # with the first one pulses begin
             off = np.abs(pulses[:, 1] - width_of(side, change.signals))

@@ -14,9 +14,10 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import pin_number
 from boebot.link import messages
 from boebot_timing.emulated.line import Line
-from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Contact, Ping, PulseTrain, wheels, with_noise
+from boebot_timing.emulated.loads import TICK_CYCLES, Contact, Ping, PulseTrain, wheels, with_noise
 from boebot_timing.emulated.scenarios import EDGES_PER_S
 from boebot_timing.emulated.traffic import SETPOINT_PERIOD, EachTick, FullLine
+from sim_bridge.bench.bench import Bench
 from sim_bridge.boards.board import Level
 
 Progress = Callable[[float], None]
@@ -112,7 +113,7 @@ def drive(bench: Bench, load: str, seconds: float, seed: int, share: Progress, e
     robot = load_robot(line.open().robot.split(b"\0", 1)[0].decode())
     pins = pins_of(robot)
     for pin in (pin for name, pin in pins.items() if name.startswith(("whisker", "ir"))):  # nothing is seen
-        bench.access.drive(pin, Level.HIGH)
+        bench.drive(pin, Level.HIGH)
     prepare(line)
     first = bench.now + TICK_CYCLES + seed * PHASE_STEP % TICK_CYCLES
     lines = [tuple(pin for name, pin in pins.items() if name.startswith(f"encoder {side}")) for side in MIRROR]

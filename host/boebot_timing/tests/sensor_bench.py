@@ -15,9 +15,9 @@ import numpy as np
 from boebot.link import messages
 from boebot.link.messages import Devices
 from boebot_timing.emulated.line import Line
-from boebot_timing.emulated.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, Bench, Ping
-from sim_bridge.boards import avr
-from sim_bridge.boards.board import BoardAccess, Level
+from boebot_timing.emulated.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, Ping
+from sim_bridge.bench.bench import Bench
+from sim_bridge.boards.board import Level
 
 PROBE_CYCLES = 1_600_000  # 0.1 s: a session lives as long as it hears of us
 
@@ -42,8 +42,7 @@ class Surroundings:
     """A board on a bench, and what is around it; everything happens at the cycle for which it is due."""
 
     def __init__(self, elf: Path) -> None:
-        self.board: BoardAccess = avr.create(elf).access()
-        self.bench = Bench(elf, self.board)
+        self.bench = Bench(elf, record=False)
         self.line = Line(self.bench)
         self.stimuli: dict[str, Stimulus] = {}
         self._due: list[tuple[int, int, Callable[[], None]]] = []
@@ -131,8 +130,8 @@ class RangeFinder(Ping):
             return
         rise = triggered + ECHO_DELAY_CYCLES
         fall = rise + self.lengths[self.stimulus.at(triggered)] * CYCLES_PER_US
-        bench.access.drive(self.pin, Level.HIGH, at=rise)
-        bench.access.drive(self.pin, Level.LOW, at=fall)
+        bench.drive(self.pin, Level.HIGH, at=rise)
+        bench.drive(self.pin, Level.LOW, at=fall)
         self.echoes.append((rise, fall))
 
 
@@ -151,8 +150,8 @@ class Receiver:
             if edge.level == Level.HIGH and edge.cycle > self._until:
                 self._until = edge.cycle + 1300 * CYCLES_PER_US
                 if self.stimulus.at(edge.cycle):
-                    bench.access.drive(self.pin, Level.LOW)
-                    bench.access.drive(self.pin, Level.HIGH, at=self._until)
+                    bench.drive(self.pin, Level.LOW)
+                    bench.drive(self.pin, Level.HIGH, at=self._until)
 
 
 class LightSensor:
@@ -172,7 +171,7 @@ class LightSensor:
             self._seen += 1
             if edge.level == Level.HIGH:
                 self._falls = None
-                bench.access.drive(self.pin, Level.HIGH)
+                bench.drive(self.pin, Level.HIGH)
             else:
                 self._left, self._since = 1.0, edge.cycle
                 self._fall(bench)
@@ -188,7 +187,7 @@ class LightSensor:
 
     def _fall(self, bench: Bench) -> None:
         self._falls = self._since + round(self._left * self.decays[self.bright])
-        bench.access.drive(self.pin, Level.LOW, at=self._falls)
+        bench.drive(self.pin, Level.LOW, at=self._falls)
 
 
 class Held:

@@ -14,12 +14,14 @@ import pytest
 from boebot import resources
 from boebot.link import messages
 from boebot_timing.emulated.line import Line
-from boebot_timing.emulated.loads import TICK_CYCLES, Bench, Ping, wheels
+from boebot_timing.emulated.loads import TICK_CYCLES, Ping, wheels
 from boebot_timing.emulated.scenarios import EDGES_PER_S
 from boebot_timing.emulated.traffic import TIME_TO_LIVE_MS
 from boebot_timing.tests.jitter import Distribution, distributions, lost, servo_pulses
 from boebot_timing.tests.jitter_run import Asking, Run, drive, prepare
 from boebot_timing.tests.latency_limits import SERVO_FRAME_CYCLES, SLOT_CYCLES
+from sim_bridge.bench.bench import Bench
+from sim_bridge.bench.pins import Pin
 from sim_bridge.boards.board import Edge, Level
 
 # Of the board's time, for each load; seeds begin at other phases.
@@ -49,7 +51,7 @@ def image() -> Path:
 def run(request: pytest.FixtureRequest) -> Iterator[Run]:
     """What happened in each case."""
     load, seed, seconds = request.param
-    with Bench(image()) as bench:
+    with Bench(image(), record=False) as bench:
         yield drive(bench, load, seconds, seed, lambda share: None)
 
 
@@ -114,7 +116,7 @@ def test_the_loads_are_what_they_are_said_to_be(run: Run) -> None:
     """Overload: 50,000 bytes/s arrive; three lines at 4 kHz, noise on the fourth."""
     seconds = seconds_of(run)
     if run.load == "overload":
-        assert run.bench.access.counters()["bytes_in"] >= 50_000 * seconds
+        assert run.bench.pins.counters()["bytes_in"] >= 50_000 * seconds
         assert [len(wheel) for wheel in run.encoders] == [0, 2]
     for train in (train for wheel in run.encoders for train in wheel):
         counted = bisect_right(train.edges, run.ended) - bisect_right(train.edges, run.begun)
@@ -148,7 +150,7 @@ def test_a_pulse_of_another_width_is_found(run: Run) -> None:
 def test_all_is_normal_100_ms_after_an_overload() -> None:
     """Its line and its noise end together. 100 ms later set-points move the servos, telemetry says that all is well,
     and nothing more is lost."""
-    with Bench(image()) as bench:
+    with Bench(image(), record=False) as bench:
         run = drive(bench, "overload", 0.2, 5, lambda share: None)
         line, since = run.line, len(run.line.heard)
         trains = wheels(ENCODER_PINS, EDGES_PER_S["figures"], bench.now + TICK_CYCLES)
@@ -165,25 +167,25 @@ def test_all_is_normal_100_ms_after_an_overload() -> None:
         assert np.all(np.diff([message.tick for message in reported]) == 1) and len(reported) > 80
         assert not any(message.status & (MASKED | messages.Status.TICK_OVERRUN) for message in reported)
         assert (after.bad, after.dropped, after.overrun) == (before.bad, before.dropped, before.overrun)
-        assert len(bench.pulses(LEFT, begun + 5 * TICK_CYCLES)) > 30
+        assert len(Pin(bench, LEFT).all_pulses(begun + 5 * TICK_CYCLES + 1)) > 30
 
 
 def test_frames_that_are_dropped_renew_no_time_to_live() -> None:
     """In an overload that goes on without set-points the pulses end with the life of the last one that was sent."""
-    with Bench(image()) as bench:
+    with Bench(image(), record=False) as bench:
         run = drive(bench, "overload", 0.2, 6, lambda share: None)
         run.traffic.muted = True
         trains = wheels(ENCODER_PINS, EDGES_PER_S["overload"], bench.now)
         bench.sources[:] = [run.ping, *(train for wheel in trains for train in wheel), run.traffic]
         bench.run(40 * TICK_CYCLES)
-        last = max(int(bench.pulses(pin)[-1, 0]) for pin in (LEFT, RIGHT))
+        last = max(int(Pin(bench, pin).all_pulses(1)[-1, 0]) for pin in (LEFT, RIGHT))
         life = run.traffic.newest + TIME_TO_LIVE_MS * CYCLES_PER_MS
         assert last <= life + SERVO_FRAME_CYCLES + 2 * TICK_CYCLES
 
 
 @pytest.mark.parametrize("edges_per_s", [130, 900, 2500, 3300])
 def test_no_edge_of_four_lines_is_lost(edges_per_s: int) -> None:
-    with Bench(image()) as bench:
+    with Bench(image(), record=False) as bench:
         run = drive(bench, "figures", 0.4, edges_per_s, lambda share: None, edges_per_s)
         assert not any(asdict(lost(run)).values())
         assert all(len(train.edges) > 0.4 * edges_per_s for wheel in run.encoders for train in wheel)
@@ -192,7 +194,7 @@ def test_no_edge_of_four_lines_is_lost(edges_per_s: int) -> None:
 @pytest.fixture
 def driving() -> Iterator[tuple[Bench, Line, Asking]]:
     """An armed board with a set-point each tick and four encoder lines at 4 kHz."""
-    with Bench(image()) as bench:
+    with Bench(image(), record=False) as bench:
         line = Line(bench)
         line.open()
         prepare(line)
@@ -206,11 +208,11 @@ def driving() -> Iterator[tuple[Bench, Line, Asking]]:
 def check_whole(bench: Bench, begun: int) -> None:
     """Every pulse since then has one of the widths that were asked for: 24,000 + 3,200 x signal cycles, mirrored."""
     for pin, widths in ((LEFT, (24_960, 23_520)), (RIGHT, (24_960, 22_560))):
-        pulses = bench.pulses(pin, begun)
+        pulses = Pin(bench, pin).all_pulses(begun + 1)
         assert len(pulses) > 10
         off = np.min(np.abs(pulses[:, 1, None] - np.array(widths)), axis=1)
         assert np.all(off <= SERVO_TOLERANCE), pulses[off > SERVO_TOLERANCE]
-        assert bench.access.output(pin) == Level.LOW, "a pulse that does not end"
+        assert bench.pins.output(pin) == Level.LOW, "a pulse that does not end"
 
 
 def test_whatever_stops_the_pulses_leaves_them_whole_or_out(driving: tuple[Bench, Line, Asking]) -> None:
@@ -225,7 +227,7 @@ def test_whatever_stops_the_pulses_leaves_them_whole_or_out(driving: tuple[Bench
         elif number % 3 == 1:
             line.send(messages.Close(line.seed))
         bench.run(3 * TICK_CYCLES if number % 3 != 2 else 28 * TICK_CYCLES)  # or a time to live of 250 ms ends
-        last = max(int(bench.pulses(pin)[-1].sum()) for pin in (LEFT, RIGHT))
+        last = max(int(Pin(bench, pin).all_pulses(1)[-1].sum()) for pin in (LEFT, RIGHT))
         assert bench.now - last > SLOT_CYCLES, "pulses go on"
         if number % 3 == 1:
             line.open()

@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
-from boebot_timing.emulated.loads import Bench, Bursts, Contact, Source
+from boebot_timing.emulated.loads import Bursts, Contact
+from sim_bridge.bench.bench import Bench, Source
 from sim_bridge.boards.board import Level
 
 
 @dataclass
 class Pins:
-    """Stands for a bench and its access: keeps what is driven."""
+    """In place of a bench: keeps what is driven."""
 
     edges: list[tuple[int, Level]] = field(default_factory=list)
-
-    @property
-    def access(self) -> Any:
-        return self
 
     def drive(self, pin: int, level: Level, at: int = 0) -> None:
         assert pin == 7
         self.edges.append((at, level))
 
-    def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None:
-        for number in range(count):
-            self.drive(pin, Level(int(level) ^ number & 1), first + number * half)
+    def wave(self, pin: int, cycles: Sequence[int], level: Level) -> None:
+        for number, cycle in enumerate(cycles):
+            self.drive(pin, Level(int(level) ^ number & 1), cycle)
 
 
 def driven(source: Source, until: int, step: int) -> list[tuple[int, Level]]:

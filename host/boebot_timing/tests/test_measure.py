@@ -10,12 +10,13 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link.messages import Counters, Event, EventKind
-from boebot_timing.emulated.loads import TICK_CYCLES, Bench
+from boebot_timing.emulated.loads import TICK_CYCLES
 from boebot_timing.emulated.losses import COUNTERS_TICKS, MASKED
 from boebot_timing.emulated.measure import robot_of, run
 from boebot_timing.emulated.scenarios import RANGES, load, numbers_of, prepare
 from boebot_timing.emulated.watched import Run
 from boebot_timing.measured import as_json, merged, statistics
+from sim_bridge.bench.bench import Bench
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image
@@ -94,7 +95,7 @@ def test_an_overload_fills_the_line_and_masks_the_noise_without_a_late_tick() ->
 def test_faults_overflow_the_queue_of_events_and_mask_both_wheels() -> None:
     """The queue holds 4 (PROTOCOL.md); what comes then waits, one of a kind."""
     robot = robot_of(IMAGE)
-    with Bench(IMAGE) as bench:
+    with Bench(IMAGE, record=False) as bench:
         line = prepare(bench, robot, "faults")
         since = len(line.heard)
         load(bench, line, robot, "faults", numbers_of(1), TICK_CYCLES)

@@ -19,6 +19,7 @@ from boebot.link.messages import Devices, DevicesTelemetry, PingStatus, Telemetr
 from boebot_timing.emulated.loads import CYCLES_PER_US, ECHO_DELAY_CYCLES, TICK_CYCLES, wheels
 from boebot_timing.table import read_table
 from boebot_timing.tests.sensor_bench import Ages, Held, LightSensor, RangeFinder, Receiver, Surroundings
+from sim_bridge.bench.pins import Pin
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.devices import TwoWireDevice
 
@@ -63,9 +64,9 @@ BATTERY_V, SHARP_V, SUPPLY_V = (1.0, 3.0), (0.4, 2.4), (5.0, 4.6)
 def around() -> Iterator[Surroundings]:
     """All sensors of the map but the compass, each one's."""
     here = Surroundings(IMAGE)
-    bench, board = here.bench, here.board
+    bench, board = here.bench, here.bench.pins
     for pin in (WHISKER, 7, RECEIVER, 3):
-        board.drive(pin, Level.HIGH)
+        bench.drive(pin, Level.HIGH)
     here.begin(
         Devices.WHISKER | Devices.INFRARED | Devices.PING | Devices.BATTERY | Devices.LIGHT | Devices.ANALOG_INFRARED
     )
@@ -77,7 +78,7 @@ def around() -> Iterator[Surroundings]:
             one.shine(bench, bright)
 
     start = bench.now + 20 * TICK_CYCLES
-    here.change("whisker", start, 643_009, lambda on: board.drive(WHISKER, Level(not on)))
+    here.change("whisker", start, 643_009, lambda on: bench.drive(WHISKER, Level(not on)))
     here.change("receiver", start, 2_416_001, lambda on: None)
     here.change("ping", start, 1_620_947, lambda on: None)
     here.change("battery", start, 642_003, lambda on: board.analog(BATTERY_CHANNEL, BATTERY_V[on]))
@@ -192,7 +193,7 @@ def test_compass() -> None:
     around = Surroundings(IMAGE)
     bench = around.bench
     try:
-        device = TwoWireDevice(around.board, 0x1E)
+        device = TwoWireDevice(bench.pins, 0x1E)
         told_x = (100, 1000)
 
         def hold(on: bool) -> None:
@@ -232,7 +233,7 @@ def test_infrared_takes_two_bursts_and_a_zone_five_of_both(around: Surroundings)
 
 def test_ping_takes_trigger_hold_off_and_echo(around: Surroundings) -> None:
     """The longest echo is measured, not given up; that it is reported is in test_ping."""
-    triggers = around.bench.pulses(PING)
+    triggers = Pin(around.bench, PING).all_pulses(1)
     widths = triggers[triggers[:, 1] < 1_000, 1] / CYCLES_PER_US
     assert len(widths) >= SECONDS * 19
     whole = widths + ECHO_DELAY_CYCLES / CYCLES_PER_US + ECHO_LONGEST_US
@@ -248,8 +249,8 @@ def test_analog_conversions_take_13_of_the_converters_clocks() -> None:
         began, spans = None, []
         end = around.bench.now + 10 * TICK_CYCLES
         while around.bench.now < end:
-            around.board.run(SLICE)
-            busy = around.board.read_memory(ADCSRA, 1)[0] & ADSC
+            around.bench.robot.run_to_edge(around.bench.now + SLICE, ())
+            busy = around.bench.pins.read_memory(ADCSRA, 1)[0] & ADSC
             if busy and began is None:
                 began = around.bench.now
             elif not busy and began is not None:

@@ -7,11 +7,11 @@ import time
 
 from boebot.description.robots import load_robot
 from boebot_timing import budget, loads
-from boebot_timing.emulated.loads import Bench
 from boebot_timing.emulated.measure import run
 from boebot_timing.emulated.scenarios import load, numbers_of, prepare
 from boebot_timing.emulated.watched import Run
 from boebot_timing.realisable import CLOCK_HZ
+from sim_bridge.bench.bench import Bench
 from sim_bridge.boards.emulated import avr_image
 from tools.tests.bench.figures import Peer, figure, loop
 
@@ -33,7 +33,7 @@ def _speed(scenario: str) -> float:
 def _unrecorded(scenario: str) -> float:
     """Of the same run without a recorder."""
     robot, started = load_robot("shieldbot"), time.process_time()
-    with Bench(avr_image("shieldbot")) as bench:
+    with Bench(avr_image("shieldbot"), record=False) as bench:
         line = prepare(bench, robot, scenario)
         load(bench, line, robot, scenario, numbers_of(1), round(SECONDS * CLOCK_HZ))
         bench.run(round(SECONDS * CLOCK_HZ))
