@@ -42,7 +42,8 @@ def compiled(source: str, image: Path, *options: str) -> Path:
 
 
 class Machine:
-    """A board that runs a program: `avr` owns it, `board` has its operations."""
+    """A board that runs a program: `avr` owns it, `board` has its operations. No bench (sim_bridge/bench), whose world
+    lets time pass in steps: tests cut its runs anywhere, to prove that this changes nothing."""
 
     def __init__(self, source: str) -> None:
         """Powers on a board with the program in flash."""
