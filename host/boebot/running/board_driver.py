@@ -275,6 +275,8 @@ class BoardDriver(Driver):
         while True:
             received = meanwhile + poll(look_s, min(wait_until_s, now_s + nap_s))
             meanwhile = []
+            if (bad := link.line.bad) is not None and bad.is_killed:
+                break
             stood_s = _host_clock() - awake_s - (took_s if took_s <= self.step_limit.seconds else 0.0)
             if stood_s > (_NAPS - 1) * nap_s:
                 raise BoardError(
@@ -282,8 +284,6 @@ class BoardDriver(Driver):
                     f"{(_NAPS - 1) * nap_s:g} s at most: the board at {transport.name} had no host, its motors are off"
                 )
             now_s, took_s = link.polled_s, 0.0
-            if (bad := link.line.bad) is not None and bad.is_killed:
-                break
             if link.counts.sessions != self._session:
                 received = self._in_new_session(received)
                 equipment = self.equipment

@@ -11,7 +11,7 @@ import pytest
 
 import boebot
 from boebot.description.robots import load_robot
-from boebot.errors import BoebotError, CallError
+from boebot.errors import BoardError, BoebotError, CallError
 from boebot.record.interventions import Fault, happenings
 from boebot.result import read_run
 from boebot.robot import Robot
@@ -227,6 +227,8 @@ def test_a_real_port_can_fail_as_well() -> None:
             straight, on=served.path, seconds=0.8, faults=["serial.flipped=0.01@0.2..0.4", "cable.out@0.5..0.6"]
         )
         assert all(result.faults.values()) and result.bad_frames and result.lost_frames
+        with pytest.raises(BoardError, match="this program stood still for"):
+            boebot.run(straight, on=served.path, seconds=1.5, faults=["host.stopped@0.2..1.1"])
         for fault in ("board.reset@0.1", "serial.rate@0.1"):
             with pytest.raises(CallError, match="is of a simulated robot"):
                 boebot.run(straight, on=served.path, seconds=0.5, faults=[fault])
