@@ -6,15 +6,18 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from contextlib import closing
 
 import msgspec
 import numpy as np
 import pytest
 
+from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.devices.faults import BODY_FAULTS
 from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.sessions.world import AVR, open_on
 from sim_bridge.sim import NEVER
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
 
@@ -74,6 +77,18 @@ def test_a_fault_that_begins_after_the_end_changes_no_bit() -> None:
         return inputs, robot.sim.hash(), robot.robot.readings()
 
     assert run(faulty=True) == run(faulty=False)
+
+
+def test_the_emulated_uno_meets_them_at_their_cycles() -> None:
+    """In a world of the kit's firmware: its own log of what the outside does to its pins."""
+    request = BoardRequest(robot=load_robot("shieldbot"), arena="room", pins=True)
+    with closing(open_on(AVR, request)) as session:
+        for owner, kind in (("whisker_left", "stuck"), ("infrared_left", "blinded")):
+            session.fault(owner, kind, 1.0, BEGIN / CLOCK_HZ, END / CLOCK_HZ)
+        session.sim.run(300 * MS)
+        driven = session.board.outside_log()["driven"]
+    seen = [(int(cycle), int(pin), int(level)) for cycle, pin, level in driven[["cycle", "pin", "level"]] if cycle]
+    assert seen == [(BEGIN, WHISKER, 0), (BEGIN, RECEIVER, 0), (END, WHISKER, 1), (END, RECEIVER, 1)]
 
 
 # ---- whisker, infrared -----------------------------------------------------------------------------------------------
