@@ -61,17 +61,19 @@ void robot_drive_edges(robot *self, uint8_t pin, const uint64_t *at, const uint8
 }
 
 void robot_release(robot *self, uint8_t pin) {
-  uint8_t level = BOARD_RELEASED;
+  int is_shown = 0;
   for (int i = 0; i < self->part_count; i++) {
     part *p = self->parts[i];
     for (int k = 0; k < PART_PINS; k++) {
       if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
       p->overridden = 0;
-      if (!p->unplugged) level = p->level[k];
+      is_shown = 1;
+      part_show(p, k);
     }
   }
-  self->chassis.driven[pin] = level;
-  self->board->op->drive(self->board, 0, pin, level);
+  if (is_shown) return;
+  self->chassis.driven[pin] = BOARD_RELEASED;
+  self->board->op->drive(self->board, 0, pin, BOARD_RELEASED);
 }
 
 int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration) {

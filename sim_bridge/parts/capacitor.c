@@ -24,9 +24,7 @@ static void begin(capacitor *self, uint64_t cycle, int charging) {
 /* The board has let go: a constant current, so the voltage falls in a straight line. */
 static void decay(capacitor *self, uint64_t cycle, uint8_t pin) {
   begin(self, cycle, 0);
-  const fault *dirty = part_fires(&self->part, FAULT_DIRTY, cycle);
-  const double clean_s = self->decay_time(self, cycle);
-  const double decay_s = dirty == NULL ? clean_s : clean_s / (1.0 - dirty->value);
+  const double decay_s = self->decay_time(self, cycle) / part_light_left(&self->part, cycle);
   self->decay_per_s = (BOARD_NOMINAL_VOLTS - self->parameters.threshold_v) / decay_s;
   const double above = self->volts - self->parameters.threshold_v;
   part_drive(&self->part, cycle, pin, above > 0.0 ? BOARD_HIGH : BOARD_LOW);

@@ -81,11 +81,7 @@ static void before_step(part *base) {
   self->speed = wheel->speed / p->wheel_radius;
   wheel->torque = torque_of(self, self->flow.charge / dt, dt);
   wheel->is_bridged = 1;
-  fault *weak = part_fault(base, FAULT_WEAK, c->since);
-  if (weak != NULL) {
-    weak->fired += wheel->torque != 0.0;
-    wheel->torque *= weak->value;
-  }
+  part_weaken(base, wheel);
   c->bridges_a += p->idle_a + self->flow.drawn / dt;
   self->flow.charge = self->flow.drawn = 0.0;
 }

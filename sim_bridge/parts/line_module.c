@@ -14,10 +14,8 @@ typedef struct {
 /* Parts of the supply at the node. */
 static double share_at(line_module *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
-  const fault *dirty = part_fires(&self->part, FAULT_DIRTY, cycle);
-  double light = reflectance_read(&self->sensor, &from, &self->part.noise);
-  if (dirty != NULL) light *= 1.0 - dirty->value;
-  const double share = 1.0 - self->parameters.slope * light;
+  const double light = reflectance_read(&self->sensor, &from, &self->part.noise);
+  const double share = 1.0 - self->parameters.slope * (light * part_light_left(&self->part, cycle));
   return share < SATURATED ? SATURATED : share;
 }
 

@@ -84,18 +84,36 @@ int part_bounce(part *self, noise_source *noise, uint64_t at, uint8_t level, uin
   return flicks;
 }
 
-void part_unplug(part *self, int unplugged) {
+void part_show(part *self, int index) {
   const uint64_t now = self->chassis->board->op->now(self->chassis->board);
-  self->unplugged = unplugged;
-  if (self->overridden) return;
-  for (int i = 0; i < PART_PINS; i++) {
-    if (!(self->pins[i].role & PART_DRIVES) || self->pins[i].pin >= BOARD_PIN_COUNT) continue;
-    if (unplugged) {
-      put(self, now, self->pins[i].pin, BOARD_RELEASED);
-    } else {
-      drive(self, now, self->pins[i].pin, self->level[i]);
-    }
+  const uint8_t pin = self->pins[index].pin;
+  if (self->unplugged) {
+    put(self, now, pin, BOARD_RELEASED);
+    return;
   }
+  for (const fault *f = self->faults; f != NULL && f->begin <= now; f = f->next) {
+    if (f->pin == pin && now < f->end) put(self, now, pin, f->level);
+  }
+  drive(self, now, pin, self->level[index]);
+}
+
+void part_unplug(part *self, int unplugged) {
+  self->unplugged = unplugged;
+  for (int i = 0; i < PART_PINS && !self->overridden; i++) {
+    if ((self->pins[i].role & PART_DRIVES) && self->pins[i].pin < BOARD_PIN_COUNT) part_show(self, i);
+  }
+}
+
+void part_weaken(part *self, chassis_wheel *wheel) {
+  fault *weak = part_fault(self, FAULT_WEAK, self->chassis->since);
+  if (weak == NULL) return;
+  weak->fired += wheel->torque != 0.0;
+  wheel->torque *= weak->value;
+}
+
+double part_light_left(part *self, uint64_t cycle) {
+  const fault *dirty = part_fires(self, FAULT_DIRTY, cycle);
+  return dirty == NULL ? 1.0 : 1.0 - dirty->value;
 }
 
 /* The body that would carry the part, turned about the turret's axis by `angle`, in its place. */

@@ -178,6 +178,15 @@ static inline unsigned part_role(const part *self, uint8_t pin) {
   return role;
 }
 
+/* What it does to that of its pins goes out again, from now on; nothing, if its plug is out. */
+void part_show(part *self, int index);
+
+/* A motor's torque in the step that begins, as its fault leaves it: weak. */
+void part_weaken(part *self, chassis_wheel *wheel);
+
+/* The share of the light that a fault leaves an eye at `cycle`: dirty; 1 without it. */
+double part_light_left(part *self, uint64_t cycle);
+
 /* Pulls its plug out (1) or puts it in again (0). */
 void part_unplug(part *self, int unplugged);
 

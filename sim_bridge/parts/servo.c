@@ -18,10 +18,7 @@ static void before_step(part *base) {
   chassis_wheel *wheel = &base->chassis->wheel[self->side];
   wheel->powered = self->pulses > 0;
   wheel->torque = servo_motor_torque(&self->parameters, &self->motor, wheel->speed, base->chassis->servo_supply);
-  fault *weak = part_fault(base, FAULT_WEAK, base->chassis->since);
-  if (weak == NULL) return;
-  weak->fired += wheel->torque != 0.0;
-  wheel->torque *= weak->value;
+  part_weaken(base, wheel);
 }
 
 static const part_operations OPERATIONS = {

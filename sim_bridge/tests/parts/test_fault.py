@@ -123,6 +123,21 @@ def test_what_a_stuck_whisker_meets_shows_when_it_is_free_again() -> None:
     assert after and edges[2:] == after
 
 
+def test_a_pin_that_is_given_back_and_a_plug_put_in_again_meet_the_fault() -> None:
+    robot = scripted()
+    robot.robot.fault("whisker_left", "stuck", 1, BEGIN, END)
+    robot.pins.drive(WHISKER, 0)
+    robot.run(0.05)
+    robot.pins.release(WHISKER)
+    robot.run(0.1)
+    robot.pins.unplug("whisker_left")
+    robot.run(0.01)
+    robot.pins.plug("whisker_left")
+    robot.run(0.1)
+    out, again = 150 * MS, 160 * MS
+    assert robot.inputs(WHISKER)[-5:] == [(50 * MS, 1), (BEGIN, 0), (out, 2), (again, 0), (END, 1)]
+
+
 def test_a_bouncing_whisker_bounces_without_noise_too() -> None:
     robot = scripted(arena_of(square(1, 0, 1)), pose=(0.39, 0, 0))
     fired = robot.robot.fault("whisker_left", "bouncing", 0.05, 0, NEVER)
