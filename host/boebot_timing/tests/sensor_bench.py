@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -45,8 +44,6 @@ class Surroundings:
         self.bench = Bench(elf, record=False)
         self.line = Line(self.bench)
         self.stimuli: dict[str, Stimulus] = {}
-        self._due: list[tuple[int, int, Callable[[], None]]] = []
-        self._number = 0
 
     def begin(self, devices: Devices) -> None:
         """Opens a session with those devices on, each sent as often as it can be."""
@@ -58,19 +55,14 @@ class Surroundings:
         self.bench.run(20 * TICK_CYCLES)
         self.each(self.bench.now + PROBE_CYCLES, PROBE_CYCLES, lambda: self.line.send(messages.ClockProbe(0)))
 
-    def at(self, cycle: int, action: Callable[[], Any]) -> None:
-        """Does something at that time."""
-        self._number += 1
-        heapq.heappush(self._due, (cycle, self._number, action))
-
     def each(self, first: int, period: int, action: Callable[[], Any]) -> None:
         """Does something again and again."""
 
         def once(cycle: int) -> None:
             action()
-            self.at(cycle + period, lambda: once(cycle + period))
+            self.bench.at(cycle + period, lambda: once(cycle + period))
 
-        self.at(first, lambda: once(first))
+        self.bench.at(first, lambda: once(first))
 
     def change(self, name: str, first: int, period: int, apply: Callable[[bool], None]) -> None:
         """Changes what a sensor sees, again and again. `period`, in cycles, is longer than a reading's greatest age;
@@ -85,12 +77,7 @@ class Surroundings:
 
     def run(self, seconds: float) -> None:
         """Lets time pass."""
-        end = self.bench.now + round(seconds * 16e6)
-        while self._due and self._due[0][0] < end:
-            cycle, _, action = heapq.heappop(self._due)
-            self.bench.run_until(cycle)
-            action()
-        self.bench.run_until(end)
+        self.bench.run(round(seconds * 16e6))
 
     def ages(self, name: str, kind: type, shows: Callable[[Any, bool], bool]) -> Ages:
         """Of all changes of a stimulus, by the telemetry of that kind. `shows(message, state)`: it is of that state
@@ -138,56 +125,48 @@ class RangeFinder(Ping):
 class Receiver:
     """An IR receiver that sees the bursts of its LED while its stimulus is on: its output is low then."""
 
-    def __init__(self, led: int, pin: int, stimulus: Stimulus) -> None:
-        self.led, self.pin, self.stimulus = led, pin, stimulus
-        self._seen, self._until = 0, 0
+    def __init__(self, bench: Bench, led: int, pin: int, stimulus: Stimulus) -> None:
+        self.bench, self.pin, self.stimulus, self._until = bench, pin, stimulus, 0
+        bench.on_edge(led, self._on_edge)
 
-    def queue(self, bench: Bench, until: int) -> None:
-        """See Source. A burst of 1 ms takes longer than a slice."""
-        del until
-        for edge in bench.edges[self.led][self._seen :]:
-            self._seen += 1
-            if edge.level == Level.HIGH and edge.cycle > self._until:
-                self._until = edge.cycle + 1300 * CYCLES_PER_US
-                if self.stimulus.at(edge.cycle):
-                    bench.drive(self.pin, Level.LOW)
-                    bench.drive(self.pin, Level.HIGH, at=self._until)
+    def _on_edge(self, cycle: int, level: Level) -> None:
+        if level == Level.HIGH and cycle > self._until:
+            self._until = cycle + 1300 * CYCLES_PER_US
+            if self.stimulus.at(cycle):
+                self.bench.drive(self.pin, Level.LOW)
+                self.bench.drive(self.pin, Level.HIGH, at=self._until)
 
 
 class LightSensor:
     """A capacitor that the board charges and the light discharges; `decays`: us, in either light."""
 
-    def __init__(self, pin: int, decays: tuple[int, int]) -> None:
-        self.pin, self.decays = pin, [us * CYCLES_PER_US for us in decays]
+    def __init__(self, bench: Bench, pin: int, decays: tuple[int, int]) -> None:
+        self.bench, self.pin, self.decays = bench, pin, [us * CYCLES_PER_US for us in decays]
         self.bright = False
-        self._seen = 0
         self._left, self._since = 0.0, 0  # charge, of 1, and when it was that
         self._falls: int | None = None
+        bench.on_edge(pin, self._on_edge)
 
-    def queue(self, bench: Bench, until: int) -> None:
-        """See Source. A decay takes longer than a slice."""
-        del until
-        for edge in bench.edges[self.pin][self._seen :]:
-            self._seen += 1
-            if edge.level == Level.HIGH:
-                self._falls = None
-                bench.drive(self.pin, Level.HIGH)
-            else:
-                self._left, self._since = 1.0, edge.cycle
-                self._fall(bench)
+    def _on_edge(self, cycle: int, level: Level) -> None:
+        if level == Level.HIGH:
+            self._falls = None
+            self.bench.drive(self.pin, Level.HIGH)
+        else:
+            self._left, self._since = 1.0, cycle
+            self._fall()
 
-    def shine(self, bench: Bench, bright: bool) -> None:
+    def shine(self, bright: bool) -> None:
         """The light changes; what is left of the charge goes at the new rate."""
-        self.queue(bench, bench.now)
-        if self._falls is not None and bench.now < self._falls:
-            self._left -= (bench.now - self._since) / self.decays[self.bright]
-            self._since, self.bright = bench.now, bright
-            self._fall(bench)
+        now = self.bench.now
+        if self._falls is not None and now < self._falls:
+            self._left -= (now - self._since) / self.decays[self.bright]
+            self._since, self.bright = now, bright
+            self._fall()
         self.bright = bright
 
-    def _fall(self, bench: Bench) -> None:
+    def _fall(self) -> None:
         self._falls = self._since + round(self._left * self.decays[self.bright])
-        bench.drive(self.pin, Level.LOW, at=self._falls)
+        self.bench.drive(self.pin, Level.LOW, at=self._falls)
 
 
 class Held:
@@ -203,4 +182,4 @@ class Held:
 
     def _measure(self) -> None:
         state = self._around.stimuli[self._name].now
-        self._around.at(self._around.bench.now + self._takes, lambda: self._out(state))
+        self._around.bench.at(self._around.bench.now + self._takes, lambda: self._out(state))

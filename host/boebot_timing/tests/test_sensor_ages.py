@@ -71,11 +71,11 @@ def around() -> Iterator[Surroundings]:
         Devices.WHISKER | Devices.INFRARED | Devices.PING | Devices.BATTERY | Devices.LIGHT | Devices.ANALOG_INFRARED
     )
     here.line.set("infrared_sweep", 1)
-    lights = [LightSensor(pin, DECAYS_US) for pin in LIGHTS]
+    lights = [LightSensor(bench, pin, DECAYS_US) for pin in LIGHTS]
 
     def shine(bright: bool) -> None:
         for one in lights:
-            one.shine(bench, bright)
+            one.shine(bright)
 
     start = bench.now + 20 * TICK_CYCLES
     here.change("whisker", start, 643_009, lambda on: bench.drive(WHISKER, Level(not on)))
@@ -91,8 +91,8 @@ def around() -> Iterator[Surroundings]:
     )
     board.analog(BATTERY_CHANNEL, BATTERY_V[0])
     board.analog(SHARP_CHANNEL, SHARP_V[0])
-    bench.sources += [RangeFinder(PING, here.stimuli["ping"], ECHOES_US), *lights]
-    bench.sources += [Receiver(LEDS[0], RECEIVER, here.stimuli["receiver"])]
+    bench.ahead(RangeFinder(PING, here.stimuli["ping"], ECHOES_US))
+    Receiver(bench, LEDS[0], RECEIVER, here.stimuli["receiver"])
     here.run(SECONDS)
     yield here
     bench.close()
@@ -272,7 +272,8 @@ def test_light_takes_its_longest_decay(decay_us: int) -> None:
     around = Surroundings(IMAGE)
     try:
         around.begin(Devices.LIGHT | Devices.BATTERY)
-        around.bench.sources += [LightSensor(pin, (decay_us, decay_us)) for pin in LIGHTS]
+        for pin in LIGHTS:
+            LightSensor(around.bench, pin, (decay_us, decay_us))
         around.run(0.2)
         reported = next(one.message for one in reversed(around.line.heard) if isinstance(one.message, DevicesTelemetry))
     finally:
