@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 import reference_frame
 
-from sim_bridge.boards.board import BoardAccess, Level
-from sim_bridge.boards.emulated import avr_image, native_board, native_library
+from sim_bridge.bench.bench import Bench, bare
+from sim_bridge.boards.board import Level
 
 CYCLES_PER_S = 16_000_000
 MS = CYCLES_PER_S // 1000
@@ -102,7 +102,7 @@ def unstuff(block: bytes) -> bytes | None:
 class Host:
     """A host on the bench of one board. Keeps every message in order; time is the board's, in CPU cycles."""
 
-    def __init__(self, board: BoardAccess) -> None:
+    def __init__(self, board: Bench) -> None:
         self.board = board
         self.seed: int | None = None
         self.messages: list[Message] = []
@@ -129,12 +129,12 @@ class Host:
         """Lets time pass, in steps of at most a quarter of a tick, and takes what the board says."""
         end = self.board.now + cycles
         while self.board.now < end:
-            self.board.advance(min(end, self.board.now + TICK // 4))
-            for sent in self.board.receive():
-                if sent.byte != 0:
-                    self._block.append(sent.byte)
+            self.board.run_until(min(end, self.board.now + TICK // 4))
+            for byte, cycle in zip(*self.board.received(), strict=True):
+                if byte != 0:
+                    self._block.append(byte)
                 elif self._block:
-                    self._take(bytes(self._block), sent.cycle)
+                    self._take(bytes(self._block), cycle)
                     self._block.clear()
 
     def _take(self, block: bytes, cycle: int) -> None:
@@ -248,29 +248,16 @@ class Host:
         self.arm()
 
 
-def pulses(board: BoardAccess, pin: int, log: list[Any]) -> list[tuple[int, int]]:
-    """(rise, width) of each whole pulse since the log began; the log is emptied."""
-    log += board.log()
+def pulses(board: Bench, pin: int) -> list[tuple[int, int]]:
+    """(rise, width) of each whole pulse so far."""
     found, rise = [], None
-    for edge in log:
-        if edge.pin == pin and edge.level == Level.HIGH:
+    for edge in board.edges[pin]:
+        if edge.level == Level.HIGH:
             rise = edge.cycle
-        elif edge.pin == pin and rise is not None:
+        elif rise is not None:
             found.append((rise, edge.cycle - rise))
             rise = None
     return found
-
-
-def power_on(kind: str) -> BoardAccess:
-    """An emulated board with nothing around it: native, or the AVR image on the emulated ATmega328P."""
-    if kind == "avr":
-        from sim_bridge.boards import avr
-
-        board = avr.create(avr_image("shieldbot")).access()
-    else:
-        board = native_board(native_library("shieldbot")).access()
-    board.drive(WHISKER_LEFT, Level.HIGH)
-    return board
 
 
 @pytest.fixture(params=["native", "avr"])
@@ -279,14 +266,15 @@ def board_url(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def board(board_url: str) -> Iterator[BoardAccess]:
-    board = power_on(board_url)
-    yield board
-    board.close()
+def board(board_url: str) -> Iterator[Bench]:
+    """With nothing around it: native, or the AVR image on the emulated ATmega328P."""
+    with Bench(on=board_url, robot=bare("shieldbot")) as board:
+        board.drive(WHISKER_LEFT, Level.HIGH)
+        yield board
 
 
 @pytest.fixture
-def host(board: BoardAccess) -> Host:
+def host(board: Bench) -> Host:
     return Host(board)
 
 
@@ -402,11 +390,10 @@ def test_board_describes_every_message(host: Host) -> None:
 
 
 def test_reset_ends_the_session_and_the_next_one_opens_within_a_second(host: Host) -> None:
-    log: list[Any] = []
     host.start()
     host.drive(5000, 5000, 20 * TICK)
     old_seed, nonce = host.seed, host.last("hello").board_nonce
-    host.board.reset()
+    host.board.pins.reset()
     reset_at = host.board.now
     hello = host.hello()
     assert hello.session == 0
@@ -417,28 +404,27 @@ def test_reset_ends_the_session_and_the_next_one_opens_within_a_second(host: Hos
     assert host.board.now - reset_at < CYCLES_PER_S
     assert telemetry.latch == START
     host.run(5 * TICK)
-    assert all(rise <= reset_at for rise, _ in pulses(host.board, SERVO_LEFT, log))
+    assert all(rise <= reset_at for rise, _ in pulses(host.board, SERVO_LEFT))
 
 
 # ---- motion ----------------------------------------------------------------------------------------------------------
 
 
 def test_motors_run_only_when_armed_and_for_the_time_to_live(host: Host) -> None:
-    log: list[Any] = []
     host.open()
     host.live(3 * TICK)
     host.signal(5000, 5000, 500)
     host.live(5 * TICK)
     assert host.last("telemetry").latch == START
     assert host.last("telemetry").status & LATCHED
-    assert not pulses(host.board, SERVO_LEFT, log)
+    assert not pulses(host.board, SERVO_LEFT)
     tick = host.arm()
     host.signal(5000, 5000, 200, tick)
     begun = host.last("telemetry").cycle  # a little after the start of that tick
     host.run(10 * TICK)
     assert host.last("telemetry").status & MOTORS_ENABLED
     host.live(30 * TICK)
-    left, right = pulses(host.board, SERVO_LEFT, log), pulses(host.board, SERVO_RIGHT, log)
+    left, right = pulses(host.board, SERVO_LEFT), pulses(host.board, SERVO_RIGHT)
     assert all(abs(width - 1600 * 16) <= 16 for _, width in left)
     assert all(abs(width - 1400 * 16) <= 16 for _, width in right)
     assert left[-1][0] + left[-1][1] <= begun + 200 * MS + SERVO_FRAME
@@ -452,14 +438,13 @@ def test_motors_run_only_when_armed_and_for_the_time_to_live(host: Host) -> None
 
 
 def test_stop_latches_until_armed_with_the_count_of_latches(host: Host) -> None:
-    log: list[Any] = []
     host.start()
     host.drive(5000, 5000, 10 * TICK)
     host.send(STOP, "<B", 9)
     assert host.next("stopped").token == 9
     stopped = host.board.now
     host.drive(5000, 5000, 20 * TICK)
-    assert all(rise <= stopped + SERVO_FRAME for rise, _ in pulses(host.board, SERVO_LEFT, log))
+    assert all(rise <= stopped + SERVO_FRAME for rise, _ in pulses(host.board, SERVO_LEFT))
     telemetry = host.last("telemetry")
     assert (telemetry.latch, telemetry.pulse_left) == (STOP_COMMAND, 0)
     assert host.request(ARM, "B", (telemetry.latches - 1) & 0xFF).status == LATCHED_AGAIN
@@ -495,15 +480,13 @@ def test_old_reordered_and_future_setpoints_are_late(host: Host) -> None:
 
 
 def test_motion_of_a_stalled_line_is_not_carried_out_later(host: Host) -> None:
-    log: list[Any] = []
     host.start()
     tick = host.last("telemetry").tick
     stalled = b"".join(host.frame(SIGNAL, "<hhHH", 9000, 9000, 2000, tick & 0xFFFF) for _ in range(50))
     host.run(2 * CYCLES_PER_S)
-    pulses(host.board, SERVO_LEFT, log)
     host.board.send(stalled)
     host.run(20 * TICK)
-    assert not pulses(host.board, SERVO_LEFT, log)
+    assert not pulses(host.board, SERVO_LEFT)
 
 
 # ---- exactly once ----------------------------------------------------------------------------------------------------
@@ -557,7 +540,7 @@ def test_saved_parameter_is_answered_when_it_is_written_and_outlives_a_reset(hos
     assert host.board.now - begun > 40 * 34 * MS // 10  # more than 40 cells of 3.4 ms
     assert len([answer for answer in host.all("answer") if answer.number == host.number]) == 1
     assert host.request(RESET, "").status == OK
-    host.board.reset()
+    host.board.pins.reset()
     hello = host.open()
     assert hello.parameters_saved == 1
     assert host.request(GET, "B", TRACK_WIDTH).value == 12345
@@ -618,4 +601,4 @@ def test_line_full_of_set_points_misses_no_tick(host: Host, setpoint: str) -> No
     host.live(2 * TICK)
     last = host.last("telemetry")
     assert last.overruns == 0
-    assert host.board.counters()["resets"] == 0
+    assert host.board.pins.counters()["resets"] == 0
