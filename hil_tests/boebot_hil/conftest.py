@@ -12,7 +12,12 @@ from collections.abc import Iterator
 import pytest
 
 from boebot.boards import is_live
+from boebot.errors import BoebotError
 from boebot_hil.rig import Rig
+from sim_bridge.bench.plugin import CANNOT
+
+EMULATED = "only an emulated board gives its pins, its reset, its EEPROM"
+START_S = 4.0  # from a real board's reset to its first hello: a boot loader waits for one to three of them
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -44,12 +49,33 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skips what only an emulated board can be asked, where the board under test is behind a port."""
+    """Skips what only an emulated board can be asked, where the board under test is behind a port, which has to answer.
+
+    Raises:
+        UsageError: it does not.
+    """
+    if items and not config.option.collectonly:
+        for url in filter(is_live, boards(config)):
+            _expect_the_kits_firmware(url)
     for item in items:
         spec = getattr(item, "callspec", None)
         under_test = [spec.params["board_url"]] if spec and "board_url" in spec.params else boards(config)
         if all(map(is_live, under_test)) and item.get_closest_marker("emulated") is not None:
-            item.add_marker(pytest.mark.skip(reason="only an emulated board gives its pins, its reset, its EEPROM"))
+            item.add_marker(pytest.mark.skip(reason=EMULATED))
+            item.user_properties.append((CANNOT, EMULATED))  # the plugin counts them
+
+
+def _expect_the_kits_firmware(url: str) -> None:
+    why = ""
+    try:
+        with Rig.open(url) as rig:
+            rig.next_hello(within_s=START_S)
+    except AssertionError:
+        why = f"the board at {url} does not speak the kit's protocol; expected its firmware: boebot flash --on {url}"
+    except BoebotError as error:
+        why = str(error)
+    if why:
+        raise pytest.UsageError(why)
 
 
 @pytest.fixture

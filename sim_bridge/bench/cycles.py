@@ -69,7 +69,7 @@ class Cycles:
         has = f"has {name} as {', '.join(sorted(found.values()))}" if found else f"has no function {name}"
         hint = did_you_mean(name, [each.name for each in labels])
         expected = "expected one that the compiler keeps whole and apart: __attribute__((noinline))"
-        raise CallError(f"{self._image} {has}; {expected}{hint}")
+        raise CallError(f"{self._image.name} {has}; {expected}{hint}")
 
     def __getitem__(self, name: str) -> FunctionCycles:
         """What was seen so far.

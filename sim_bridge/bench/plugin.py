@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shlex
 import shutil
 import sys
@@ -106,7 +107,7 @@ def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
     except BoebotError as error:
         if _cannot(error):
             raise
-        failure = f"uno: {error}"
+        failure = "\n".join([f"uno: {error}", *getattr(error, "__notes__", ())])
     if failure:  # here, or the text of the error would be shown twice
         pytest.fail(failure, pytrace=False)
     request.node.stash[UNO] = opened
@@ -122,7 +123,6 @@ def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
 
 def _wanted(item: pytest.Item) -> Wanted:
     """What the marks of a test ask for, the nearest one first. Raises CallError where they make no sense."""
-    from boebot.brains import load_program
     from boebot.errors import CallError, did_you_mean
     from sim_bridge.bench.uno import Wanted
 
@@ -144,12 +144,7 @@ def _wanted(item: pytest.Item) -> Wanted:
             f"{item.name} says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot="
         )
     if (image := asked.get("image")) is not None:
-        program = load_program(_file(item, image))
-        if program is None:
-            raise CallError(
-                f"image={str(image)!r} is no program; expected an ELF or HEX file, a sketch or a folder of one"
-            )
-        asked["image"] = program.path
+        asked["image"] = session.program(_file(item, image))
     return Wanted(**asked)
 
 
@@ -244,7 +239,8 @@ def _keep(item: pytest.Item, opened: Uno, report: pytest.TestReport) -> None:
     again = _command(item.config, item.nodeid)
     try:
         evidence.keep(opened, folder, again)
-        report.sections.append(("uno", f"kept in {folder}; again: {again}"))
+        shown = os.path.relpath(folder) if folder.is_relative_to(Path.cwd()) else folder
+        report.sections.append(("uno", f"kept in {shown}\nagain: {again}"))
     except Exception as error:  # whatever is wrong with it, the test's own failure is what counts
         report.sections.append(("uno", f"nothing is kept: {type(error).__name__}: {error}"))
 
@@ -263,12 +259,30 @@ class Session:
     def __init__(self, config: pytest.Config) -> None:
         self._config, self._root = config, config.rootpath
         self._folder = Path(config.rootpath, config.getoption("--uno-keep"))
+        self._programs: dict[Path, Path | Exception] = {}
         self._measured: dict[str, list[dict[str, Any]]] = {}
         self._cannot: Counter[str] = Counter()
         self._cycles: dict[str, list[dict[str, Any]]] = {}
         self.covers: bool = config.getoption("--uno-cover")
         self._coverage: Coverage | None = None
         self._not_covered: set[str] = set()
+
+    def program(self, file: Path) -> Path:
+        """The ELF or HEX file, which is built once; what is wrong with it is said of each test. Raises BoebotError."""
+        from boebot.brains import load_program
+        from boebot.errors import BoebotError, CallError
+
+        if file not in self._programs:
+            try:
+                program = load_program(file)
+                if program is None or program.path is None:
+                    raise CallError(f"{file} is no program; expected an ELF or HEX file, a sketch or a folder of one")
+                self._programs[file] = program.path
+            except BoebotError as error:
+                self._programs[file] = error
+        if isinstance(found := self._programs[file], Exception):
+            raise found
+        return found
 
     # ---- cycles, as they were before -----------------------------------------------------------------------------
 

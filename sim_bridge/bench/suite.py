@@ -44,7 +44,6 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
         f"--uno-keep={Path('.uno').absolute()}",
         "-m",
         "not soak",
-        "-rs",
     ]
     options += [*(f"--uno-on={board}" for board in boards), *["--uno-motors"] * motors]
     if find_spec("xdist") is not None and not any(map(is_live, boards)):
@@ -63,7 +62,7 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
     if interrupted:
         return INTERRUPTED
     if process.returncode == _USAGE:
-        raise CallError("pytest does not understand these arguments, as it says above")
+        raise CallError("no test can run, as pytest says above")
     if process.returncode not in _CODES:
         raise BoebotError(f"pytest has failed with exit code {process.returncode}, as it says above")
     return _CODES[process.returncode]

@@ -100,6 +100,10 @@ class Uno:
             bench.after_slice.append(self._put_aside)
         self.recorded: Cycles | None = None
 
+    def __repr__(self) -> str:
+        image = self._wanted.image.name if self._wanted.image else self._wanted.robot
+        return f"<Uno: {image} on {self._on}, {self.now:.6f} s>"
+
     def begin(self) -> Uno:
         """Before time passes: what is to fail and to be recorded. Raises as `open_uno`, and is closed then."""
         wanted = self._wanted

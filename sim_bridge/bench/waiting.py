@@ -8,6 +8,8 @@ from boebot.errors import BoebotError
 class WaitError(AssertionError):
     """What a test waited for did not come within its time. The text says what it was, and what came instead."""
 
+    __module__ = "uno"  # as reports name it, whose lines are short
+
 
 class Cannot(BoebotError):  # noqa: N818 (no error of anybody's: a test that meets it is skipped)
     """The board under test cannot be asked that, as its kind has no such thing: a test is skipped, with this reason."""

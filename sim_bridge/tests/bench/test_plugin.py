@@ -83,7 +83,7 @@ def test_waits_in_vain(uno):
     assert "WaitError: waited 0.1 s for b'steady' from the board: saw b'ready\\r\\n'" in text
     assert "bench/serial.py" not in text  # it ends at the user's own line
     (kept,) = (users.path / ".uno").iterdir()
-    assert (kept / "again.txt").read_text() in text and f"kept in {kept}" in text
+    assert (kept / "again.txt").read_text() in text and f"kept in .uno/{kept.name}" in text
     assert (kept / "serial.txt").read_bytes() == b"ready\r\n"
     vcd = (kept / "pins.vcd").read_text()
     assert "D9" in vcd and "#" in vcd and not (kept / "run").exists()
