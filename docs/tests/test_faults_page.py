@@ -6,12 +6,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from boebot.cli.faults import HEADINGS, cells, names_of
+from boebot.cli.faults import HEADINGS, by_verdict, names_of
 from boebot.description.robots import load_robot, robot_names
 from boebot.running.faults import known
 from boebot.running.noticed import noticed
 
 PAGE = (Path(__file__).parents[1] / "reference" / "faults.md").read_text(encoding="utf-8")
+DASHES = ["---"] * len(HEADINGS)
 ROWS = {
     name: value
     for names, value in re.findall(r"^\| (`[a-z_]+\.[a-z_`., ]+) \| (.*?) \|", PAGE, flags=re.MULTILINE)
@@ -34,6 +35,8 @@ def test_the_page_has_every_fault_with_its_value() -> None:
 def test_the_table_is_what_the_command_makes() -> None:
     """To write it anew: boebot faults --robot shieldbot-quad --table, rows as here."""
     robot = load_robot("shieldbot-quad")
-    rows = [HEADINGS, ["---"] * len(HEADINGS), *(cells(one) for one in noticed(robot, names_of(known(robot))))]
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    assert table in PAGE, f"expected:\n{table}"
+    found = list(noticed(robot, names_of(known(robot))))
+    assert all(one.verdict for one in found), "each is noticed, or has a reason in boebot.running.noticed"
+    for verdict, rows in by_verdict(found).items():
+        lines = [f"**{verdict.capitalize()}**", "", *(f"| {' | '.join(row)} |" for row in [HEADINGS, DASHES, *rows])]
+        assert "\n".join(lines) in PAGE, "expected:\n" + "\n".join(lines)

@@ -59,6 +59,8 @@ class InWorld:
     def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
         """See `boebot.boards.Session`."""
         begin, end = (NEVER if at == math.inf else round(at * CLOCK_HZ) for at in (begin_s, end_s))
+        if end <= self.sim.cycle:
+            return lambda: 0  # it was over before the first step of the brain was: it never acts
         return self.robot.fault(owner, kind, value, begin, end)
 
     def place(self, x: float, y: float, heading: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -16,7 +16,7 @@ from boebot.running.faults import known
 if TYPE_CHECKING:
     from boebot.running.noticed import Noticed
 
-HEADINGS = ["name", "fired", "noticed by", "after", "valid and wrong", "still after"]
+HEADINGS = ["name", "noticed by, or why not", "after", "wrong", "still"]
 
 
 def faults(
@@ -46,13 +46,17 @@ def faults(
             for one in noticed(description, names):
                 found.append(one)
                 progress(len(found))
-        rows, titles, texts = [one._asdict() for one in found], HEADINGS, [cells(one) for one in found]
+        rows, titles, tables = [one._asdict() for one in found], HEADINGS, by_verdict(found)
     else:
         rows = [{"name": name, "of": list(whose), **kind._asdict()} for name, (kind, whose) in there.items()]
-        titles, texts = ["name", "value", "when", "what happens"], [[name, *_said(there[name][0])] for name in names]
+        titles = ["name", "value", "when", "what happens"]
+        tables = {"": [[name, *_said(there[name][0])] for name in names]}
     if json:
         output.print_json({"robot": robot, "faults": rows})
-    else:
+        return
+    for heading, texts in tables.items():
+        if heading:
+            output.line(f"\n{heading}")
         output.print_columns(titles, texts, whole=1)
 
 
@@ -62,11 +66,15 @@ def names_of(there: Mapping[str, tuple[FaultKind, tuple[str, ...]]]) -> list[str
     return [name for name, (_, whose) in there.items() if len(whose) > 1 or not members.issuperset(whose)]
 
 
-def cells(one: Noticed) -> list[str]:
-    """A row of the table of who notices what."""
-    after, still = ("" if time_s is None else f"{time_s:.2f} s" for time_s in (one.after_s, one.still_s))
-    wrong = "" if one.wrong is None else f"{one.wrong:.0%}"
-    return [one.fault, str(one.fired), ", ".join(one.by) or "nobody", after, wrong, still]
+def by_verdict(found: Iterable[Noticed]) -> dict[str, list[list[str]]]:
+    """The tables of who notices what, by verdict: rows as in `HEADINGS`. "wrong": in that share of the steps a reading
+    claims to be valid and is another than without the fault; "still": after that time the wheels stood still."""
+    tables: dict[str, list[list[str]]] = {}
+    for one in found:
+        after, still = ("" if time_s is None else f"{time_s:.2f} s" for time_s in (one.after_s, one.still_s))
+        wrong = "" if one.wrong is None else f"{one.wrong:.0%}"
+        tables.setdefault(one.verdict, []).append([one.fault, ", ".join(one.by), after, wrong, still])
+    return tables
 
 
 def _said(kind: FaultKind) -> list[Any]:

@@ -1,4 +1,5 @@
-"""Who notices what fails: each fault in a run of its own on the native board, beside the same run without it.
+"""Who notices what fails, or why nobody does: each fault in a run of its own on the native board, beside the same run
+without it.
 
 The robot drives to a wall, touches it and backs off, whatever its sensors say, and nothing about it is drawn.
 So what differs from the run without the fault comes of the fault, as long as that does not change its way.
@@ -6,7 +7,7 @@ So what differs from the run without the fault comes of the fault, as long as th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,9 +17,11 @@ from boebot.imperfections import switches
 from boebot.link.messages import EventKind
 from boebot.record.columns import events
 from boebot.record.interventions import Fault
+from boebot.record.run import Run
 from boebot.result import RunResult
 from boebot.robot import Robot
 from boebot.running.faults import UnfiredError, known
+from boebot.running.hands import Hands, Onlooker
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
 
@@ -35,6 +38,32 @@ FIGURES = {
 BOARD = {"bad": "board: checksum", "late": "board: late set-points", "duplicate": "board: request numbers"}
 DRAWN = [name for name in switches() if name not in ("coast_drag", "slip", "battery_sag")]  # which draw nothing
 _STILL_M_S, _STILL_S = 0.01, 0.3
+RESET_S = 1.0  # the memory is looked at when the firmware starts
+
+NOTICED, HARMLESS = "noticed", "changes nothing"
+NOT_HERE, NEVER, BROKEN = "not by this kit", "cannot be noticed", "does not hold"
+_COMPARED = (NOT_HERE, "command and edges are compared nowhere; without encoders there is nothing to compare")
+_DIRTY = (NEVER, "less light is as over a darker floor, or in the shade")
+REASONS = {
+    "servos.dead": _COMPARED,
+    "servos.weak": _COMPARED,
+    "servos.reversed": _COMPARED,
+    "servos.offset": _COMPARED,
+    "wheel.blocked": _COMPARED,
+    "encoders.missing": _COMPARED,
+    "encoders.extra": (HARMLESS, "edges that follow so fast are taken for bounces"),
+    "wheel.slipping": (NEVER, "encoders turn as always"),
+    "robot.lifted": (NEVER, "nothing feels the floor; wheels and encoders turn as always"),
+    "whiskers.stuck": (NEVER, "a contact that is stuck is as one that touches something, or nothing"),
+    "whiskers.bouncing": (NEVER, "what outlasts the debouncing is as a touch"),
+    "infrared.blinded": (BROKEN, "the firmware sees light before its burst, and says that nothing is there, as valid"),
+    "ping.doubled": (HARMLESS, "after the first pulse nobody listens"),
+    "serial.rate": (HARMLESS, "bytes come whole; further off the checksum notices it"),
+    "battery.sagging": (HARMLESS, "that is enough for the board, and what is measured is true"),
+    "host.killed": (NOTICED, "board: dead-man, and the session's end; no host hears of it"),
+    **dict.fromkeys(("line.dirty", "lines.dirty", "lights.dirty"), _DIRTY),
+}
+"""Of faults of which nothing shows: what that means, and why."""
 
 
 class Noticed(NamedTuple):
@@ -42,8 +71,10 @@ class Noticed(NamedTuple):
 
     fault: str
     fired: int
+    verdict: str
+    """NOTICED, or what else of those above; empty: it is not noticed, and there is no reason."""
     by: tuple[str, ...]
-    """Who noticed it; empty: none of both ends."""
+    """Who noticed it; or why nobody does."""
     after_s: float | None
     """From its begin to the first row of the record that shows it; None: figures at the end do."""
     wrong: float | None
@@ -53,11 +84,14 @@ class Noticed(NamedTuple):
     """From its begin until the wheels stood still; None: they went on."""
 
 
-class _Run:
+class _Run(Onlooker):
     """One run, and what the brain read in each of its steps."""
 
-    def __init__(self, robot: RobotDescription, faults: list[Fault]) -> None:
+    def __init__(self, robot: RobotDescription, faults: list[Fault], *, saves: bool = False) -> None:
+        """`saves`: the board's parameters, before the first step; and the board is reset later on, and reads them."""
         self.readings: dict[float, dict[str, Any]] = {}
+        self.saves, self.has_defaults = saves, False
+        faults = [*faults, Fault("board.reset", None, RESET_S)] if saves else faults
         names = [name for name, device in robot.device.items() if device.on and device.READING is not None]
 
         def step(robot: Robot) -> None:
@@ -68,7 +102,20 @@ class _Run:
         request = Request.single(
             step, robot, arena=ARENA, pose=POSE, on="native", seconds=SECONDS, without=DRAWN, faults=faults
         )
-        self.result: RunResult = execute(request)
+        self.result: RunResult = execute(request, onlooker=self)
+
+    def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
+        """See `Onlooker`."""
+        link = robots[0].driver.link
+        assert link is not None
+        self._link = link
+        if self.saves:
+            link.parameters.save()
+
+    def look(self, time_s: float, *, is_over: bool = False) -> None:
+        """See `Onlooker`."""
+        if self.saves and (hello := self._link.session.hello) is not None:
+            self.has_defaults = not hello.parameters_saved
 
     def figures(self) -> dict[str, Any]:
         """Those that may show a fault, by who has them."""
@@ -103,33 +150,40 @@ def _is_valid(reading: Any) -> bool:
 def noticed(robot: RobotDescription, names: Iterable[str]) -> Iterator[Noticed]:
     """Of each fault of those names what came of it, with its usual value."""
     plain = _Run(robot, [])
-    figures, signs, still_s = plain.figures(), set(plain.signs()), plain.still_from()
     for name in names:
-        kind, owners = known(robot)[name]
-        run = _Run(robot, [Fault(name, None, BEGIN_S, END_S if kind.lasts else None)])
-        by = [who for who, value in run.figures().items() if (value or 0) > (figures[who] or 0)]
-        within = {
-            at_s: read for at_s, read in run.readings.items() if BEGIN_S <= at_s < END_S and at_s in plain.readings
-        }
-        sensors = [one for one in owners if one in next(iter(plain.readings.values()))]
-        if any(not _is_valid(read[one]) for read in within.values() for one in sensors):
-            by.append("board: not valid")
-        if run.result.error is not None and not isinstance(run.result.error, UnfiredError):
-            by.append("host: run ended")
-        wrong = [
-            any(_is_valid(read[one]) and _value(read[one]) != _value(plain.readings[at_s][one]) for one in sensors)
-            for at_s, read in within.items()
-        ]
-        sign_s = min((at_s for at_s in run.signs() if at_s >= BEGIN_S and at_s not in signs), default=None)
-        stood_s = run.still_from()
-        yield Noticed(
-            name,
-            sum(run.result.faults.values()),
-            tuple(by),
-            sign_s - BEGIN_S if by and sign_s is not None else None,
-            float(np.mean(wrong)) if sensors else None,
-            stood_s - BEGIN_S if stood_s < still_s else None,
-        )
+        saves = name == "eeprom.corrupted"
+        yield _noticed(robot, name, _Run(robot, [], saves=True) if saves else plain, saves=saves)
+
+
+def _noticed(robot: RobotDescription, name: str, plain: _Run, *, saves: bool) -> Noticed:
+    kind, owners = known(robot)[name]
+    run = _Run(robot, [Fault(name, None, BEGIN_S, END_S if kind.lasts else None)], saves=saves)
+    figures, signs = plain.figures(), set(plain.signs())
+    by = [who for who, value in run.figures().items() if (value or 0) > (figures[who] or 0)]
+    within = {at_s: read for at_s, read in run.readings.items() if BEGIN_S <= at_s < END_S and at_s in plain.readings}
+    sensors = [one for one in owners if one in next(iter(plain.readings.values())) and one != "battery"]
+    if any(not _is_valid(read[one]) for read in within.values() for one in sensors):
+        by.append("board: not valid")
+    if run.has_defaults > plain.has_defaults:
+        by.append("board: checksum of its memory, at the next start")
+    if run.result.error is not None and not isinstance(run.result.error, UnfiredError):
+        by.append("host: run ended")
+    wrong = [
+        any(_is_valid(read[one]) and _value(read[one]) != _value(plain.readings[at_s][one]) for one in sensors)
+        for at_s, read in within.items()
+    ]
+    sign_s = min((at_s for at_s in run.signs() if at_s >= BEGIN_S and at_s not in signs), default=None)
+    stood_s = run.still_from()
+    verdict, why = (BROKEN if any(wrong) else NOTICED, "") if by else REASONS.get(name, ("", ""))
+    return Noticed(
+        name,
+        sum(count for fault, count in run.result.faults.items() if fault.startswith(name)),
+        verdict,
+        (*by, *([why] if why else [])),
+        sign_s - BEGIN_S if by and sign_s is not None else None,
+        float(np.mean(wrong)) if sensors else None,
+        stood_s - BEGIN_S if stood_s < plain.still_from() else None,
+    )
 
 
 def _value(reading: Any) -> tuple[Any, ...]:
