@@ -148,23 +148,24 @@ def test_robot(uno):
     result.stdout.fnmatch_lines(["1 x the native board is the kit's own firmware; it cannot run own.elf"])
 
 
-@pytest.mark.parametrize(
-    ("mark", "sentence"),
-    [
-        ("", "test_it says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot="),
-        ("image='no.elf'", "there is no no.elf, neither in * nor in *"),
-        ("image='text.elf'", "*text.elf*"),
-        ("imgae='own.elf'", "*uno(imgae=...): expected one of image, robot, *; did you mean 'image'?"),
-        ("'own.elf'", "*uno('own.elf'): expected a keyword, such as image='own.elf'"),
-        ("robot='shieldbotx'", "*shieldbotx*did you mean*"),
-        ("robot='shieldbot', baud=0", "line_rate: the rate is 0; expected *"),
-    ],
-)
-def test_a_bad_mark_is_one_sentence(users: pytest.Pytester, mark: str, sentence: str) -> None:
+BAD_MARKS = {
+    "": "test_it says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot=",
+    "image='no.elf'": "there is no no.elf, neither in * nor in *",
+    "image='text.elf'": "*text.elf*",
+    "imgae='own.elf'": "*uno(imgae=...): expected one of image, robot, *; did you mean 'image'?",
+    "'own.elf'": "*uno('own.elf'): expected a keyword, such as image='own.elf'",
+    "robot='shieldbotx'": "*shieldbotx*did you mean*",
+    "robot='shieldbot', baud=0": "line_rate: the rate is 0; expected *",
+}
+
+
+def test_a_bad_mark_is_one_sentence(users: pytest.Pytester) -> None:
     users.path.joinpath("text.elf").write_text("no program")
-    result = run(users, f"@pytest.mark.uno({mark})\ndef test_it(uno):\n    pass\n")
-    result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines([f"uno: {sentence}"])
+    tests = [f"class Test{i}:\n    @pytest.mark.uno({mark})\n    def test_it(self, uno):\n        pass\n"
+             for i, mark in enumerate(BAD_MARKS)]  # fmt: skip
+    result = run(users, "\n".join(tests))
+    result.assert_outcomes(errors=len(BAD_MARKS))
+    result.stdout.fnmatch_lines([f"uno: {sentence}" for sentence in BAD_MARKS.values()])
     assert "Traceback" not in result.stdout.str() and "sim_bridge" not in result.stdout.str()
 
 
@@ -210,29 +211,27 @@ def worker(folder: Path, turns: int = TURNS) -> Path:
     return compiled(WORK.replace("TURNS", str(turns)), folder / "work.elf")
 
 
-@pytest.mark.parametrize("suffix", [".elf", ".hex"])
-def test_the_example_of_the_docs(users: pytest.Pytester, suffix: str) -> None:
+def test_the_example_of_the_docs(users: pytest.Pytester) -> None:
     subprocess.run(["avr-objcopy", "-O", "ihex", "own.elf", "own.hex"], cwd=users.path, check=True)
-    result = run(
-        users,
-        f"""
-@pytest.mark.uno(image="own{suffix}")
-def test_servo(uno):
+    of = """
+@pytest.mark.uno(image="own.SUFFIX")
+def test_servo_SUFFIX(uno):
     uno.serial.expect(b"ready", within=1)
     uno.serial.send(b"+")
     uno.serial.expect(b"+", within=0.01)
     assert uno.pin(9).pulse().us == 1700
-
-@pytest.mark.uno(image="own{suffix}")
+"""
+    bad = """
+@pytest.mark.uno(image="own.hex")
 def test_no_pin(uno):
     uno.pin(20)
 
 @pytest.mark.uno(image="own.hex")
 def test_no_symbols(uno):
     uno.symbol("count")
-""",
-    )
-    result.assert_outcomes(passed=1, failed=2)
+"""
+    result = run(users, of.replace("SUFFIX", "elf") + of.replace("SUFFIX", "hex") + bad)
+    result.assert_outcomes(passed=2, failed=2)
     result.stdout.fnmatch_lines_random([
         "E * there is no pin 20; expected 0..13 or 'A0'..'A5'",
         "E * own.hex has no symbols; expected the ELF file that it was made from",
