@@ -52,6 +52,7 @@ _LOOK_EARLY = 0.5
 _LOOK_EARLY_BYTES = 30
 _Telemetry = messages.Telemetry
 _LATCH = reader(messages.Telemetry, "latch")
+_SUPPLY = reader(messages.Telemetry, "supply")
 _TICK = reader(messages.Telemetry, "tick")
 _UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
 _SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
@@ -232,16 +233,18 @@ class BoardDriver(Driver):
             for kind, payload in self.link.devices.fetch():
                 self.record.append(kind.NAME, self._last_s, payload)
 
-    def _check_latch(self, payload: bytes) -> None:
-        """The board has latched its motors off: a reason to end the run, unless a new session mends it.
+    def _check_latch(self, payloads: list[bytes]) -> None:
+        """The board has latched its motors off: a reason to end the run, unless a new session mends it. `payloads`: of
+        the telemetry since it was last looked at: a low supply may have risen again by now.
 
         Raises:
             BoardError: the supply is low, or somebody else has stopped the robot.
         """
-        telemetry, where = _Telemetry.unpack(payload), self.link.transport.name
+        telemetry, where = _Telemetry.unpack(payloads[-1]), self.link.transport.name
         if telemetry.latch == messages.Latch.SUPPLY_LOW:
+            lowest_mv = min(_SUPPLY(payload)[0] or telemetry.supply for payload in payloads)
             raise BoardError(
-                f"the board at {where} has stopped its motors: its supply is low, {telemetry.supply / 1000:.2f} V; "
+                f"the board at {where} has stopped its motors: its supply is low, {lowest_mv / 1000:.2f} V; "
                 "charge or change the batteries"
             )
         if telemetry.latch == messages.Latch.STOP_COMMAND and not self._halted:
@@ -316,7 +319,7 @@ class BoardDriver(Driver):
                     self._last_s = time_s = tick * tick_s + time_zero
                     put_aside(time_s, payload, host_s, bound_s)
             if last > self._armed_tick and _LATCH(payload)[0]:
-                self._check_latch(payload)
+                self._check_latch([one for one, *_ in received])
             if waiting_events:
                 self._take_events()
             received_s = now_s
