@@ -25,7 +25,9 @@ def prove(
         bool, typer.Option("--motors", help="The motors of a real robot may turn: it stands on blocks, or has room.")
     ] = False,
 ) -> None:
-    """Prove a board: what the protocol promises, one test each; on a port without those that turn motors.
+    """Prove a board, emulated or at a port: what the protocol promises, one test each.
+
+    On a port motors turn with --motors only.
 
     Exit code: 0 all passed; 1 a test failed; 2 bad input, or no test ran; 130 after Ctrl-C."""
     raise typer.Exit(run_suite(on or ["native", "avr"], arguments or (), motors=motors))

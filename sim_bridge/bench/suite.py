@@ -11,11 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from boebot.errors import BoebotError, CallError
-from boebot.guests import Command
 
-COMMAND = Command(
-    "Prove a board, emulated or at a port: what the protocol promises, one test each.", "sim_bridge.bench.command:test"
-)
 SUITE = "boebot_hil"
 PASSED, FAILED, NOTHING_RAN, INTERRUPTED = 0, 1, 2, 130
 _CODES = {0: PASSED, 1: FAILED, 2: FAILED, 5: NOTHING_RAN}  # by pytest's; 2: a file of tests cannot be read
