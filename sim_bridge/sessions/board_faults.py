@@ -13,13 +13,16 @@ ERASED = 0xFF  # a cell of the EEPROM that nothing was written to
 
 
 class BoardFault:
-    """One of them. `fired`: how often it has changed something so far."""
-
-    fired = 0
+    """One of them."""
 
     def __init__(self, pins: BoardPins, baud: int, value: float) -> None:
         """`baud`: the bit rate of the host's side of the line."""
-        self._pins, self._baud, self._value = pins, baud, value
+        self._pins, self._baud, self._value, self._fired = pins, baud, value, 0
+
+    @property
+    def fired(self) -> int:
+        """How often it has changed something so far."""
+        return self._fired
 
     def begin(self) -> None:
         """It is time."""
@@ -34,12 +37,14 @@ class Reset(BoardFault):
     def begin(self) -> None:
         """See `BoardFault`."""
         self._pins.reset(RESET_CAUSES[int(self._value)])
-        self.fired = 1
+        self._fired = 1
 
 
 class BrownOut(BoardFault):
     """The rail is held at so many volts. It has changed something where the brown-out detector resets the board, or the
     board goes astray above the detector's voltage."""
+
+    _before: int | None = None  # brown-outs until it began
 
     def begin(self) -> None:
         """See `BoardFault`."""
@@ -48,8 +53,12 @@ class BrownOut(BoardFault):
 
     def end(self) -> None:
         """See `BoardFault`."""
-        self.fired = sum(self._pins.brown_outs()) - self._before
         self._pins.supply(None)
+
+    @property
+    def fired(self) -> int:
+        """See `BoardFault`."""
+        return 0 if self._before is None else sum(self._pins.brown_outs()) - self._before
 
 
 class Corruption(BoardFault):
@@ -61,7 +70,7 @@ class Corruption(BoardFault):
         places = [place for place, cell in enumerate(cells) if cell != ERASED] or list(range(EEPROM_SIZE))
         for place in draw.sample(places, min(round(self._value), len(places))):
             self._pins.write_eeprom(place, [cells[place] ^ draw.randrange(1, 256)])
-            self.fired += 1
+            self._fired += 1
 
 
 class RateOff(BoardFault):

@@ -18,6 +18,7 @@ from boebot.robot import Robot
 from boebot.running.again import again, recorded
 from boebot.running.faults import UnfiredError, known, read
 from peer import Peer, pty
+from sim_bridge.tests.boards.avr.avr_program import compiled
 
 SHIELDBOT = load_robot("shieldbot")
 TIME_TO_LIVE_S = 0.25
@@ -119,6 +120,12 @@ def test_motors_stop_where_no_host_speaks(fault: str) -> None:
         assert truth.left_speed[at > 2.8].min() > 0.05, "it drives again"
         assert result.run_time == pytest.approx(3.0)
         assert result.sessions_lost == ("slow" not in fault)
+
+
+def test_a_brown_out_that_lasts_fires_as_it_begins(tmp_path: Path) -> None:
+    program = compiled("int main(void) { for (;;) ; }", tmp_path / "waits.elf")
+    result = boebot.run(program, seconds=0.3, faults=["board.brown_out=2.5@0.1"])
+    assert list(result.faults.values()) == [1]
 
 
 @pytest.mark.parametrize("cause", ["external", "watchdog"])
