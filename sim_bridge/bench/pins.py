@@ -162,10 +162,10 @@ class Pin:
         self._look()
         return Level(self._levels[-1])
 
-    def edges(self, since: int | None = None) -> NDArray[Any]:
-        """Its changes (dtype NET: cycle and level from then on) from a cycle on, or from the mark."""
+    def edges(self, since: int = 0) -> NDArray[Any]:
+        """Its changes (dtype NET: cycle and level from then on) from a cycle on, else from power-on."""
         self._look()
-        first = bisect_left(self._cycles, self.bench.mark if since is None else since)
+        first = bisect_left(self._cycles, since)
         return np.array(list(zip(self._cycles[first:], self._levels[first:], strict=True)), NET)
 
     def _look(self) -> None:

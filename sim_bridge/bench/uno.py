@@ -220,7 +220,7 @@ class Uno:
         from sim_bridge.bench.symbols import Symbol
 
         elf = self.elf()
-        return Symbol(self.bench("memory").pins, _variables(elf).find(name))
+        return Symbol(self.bench("memory").pins, _variables(elf, elf.stat().st_mtime_ns).find(name))
 
     def cycles(self, function: str) -> FunctionCycles:
         """What calls of a function took so far: `.shortest`, `.longest`, and the `.bound` where there is one.
@@ -362,7 +362,8 @@ class Analog:
 
 
 @cache
-def _variables(elf: Path) -> Variables:
+def _variables(elf: Path, written_ns: int) -> Variables:
+    """`written_ns`: when the file was written; one that is built anew is read anew."""
     from boebot.image.data import read_variables
 
     return read_variables(elf)

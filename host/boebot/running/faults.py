@@ -53,9 +53,7 @@ OWNERS: Mapping[str, Mapping[str, FaultKind]] = {
         "reset": FaultKind("the microcontroller is reset", words=RESET_CAUSES, lasts=False),
         "brown_out": FaultKind("the 5 V rail falls to this", "V", default=2.5, most=5.0),
     },
-    "eeprom": {
-        "corrupted": FaultKind("so many bytes get other values", default=1.0, least=1.0, most=1024.0, lasts=False)
-    },
+    "eeprom": {"corrupted": FaultKind("bytes get other values", default=1.0, least=1.0, most=1024.0, lasts=False)},
 }
 
 

@@ -1,5 +1,5 @@
-"""Who notices what fails, or why nobody does: each fault in a run of its own on the native board, beside the same run
-without it.
+"""Who notices what fails, or why it goes unnoticed: each fault in a run by itself on the native board, beside the same
+run without it.
 
 The robot drives to a wall, touches it and backs off, whatever its sensors say, and nothing about it is drawn.
 So what differs from the run without the fault comes of the fault, as long as that does not change its way.
@@ -57,7 +57,7 @@ REASONS = {
     "whiskers.stuck": (NEVER, "a contact that is stuck is as one that touches something, or nothing"),
     "whiskers.bouncing": (NEVER, "what outlasts the debouncing is as a touch"),
     "infrared.blinded": (BROKEN, "the firmware sees light before its burst, and says that nothing is there, as valid"),
-    "ping.doubled": (HARMLESS, "after the first pulse nobody listens"),
+    "ping.doubled": (HARMLESS, "the board ignores what follows the first pulse"),
     "serial.rate": (HARMLESS, "bytes come whole; further off the checksum notices it"),
     "battery.sagging": (HARMLESS, "that is enough for the board, and what is measured is true"),
     "host.killed": (NOTICED, "board: dead-man, and the session's end; no host hears of it"),
@@ -74,7 +74,7 @@ class Noticed(NamedTuple):
     verdict: str
     """NOTICED, or what else of those above; empty: it is not noticed, and there is no reason."""
     by: tuple[str, ...]
-    """Who noticed it; or why nobody does."""
+    """Who noticed it, or why it goes unnoticed."""
     after_s: float | None
     """From its begin to the first row of the record that shows it; None: figures at the end do."""
     wrong: float | None
