@@ -29,7 +29,7 @@ read_with_clang host -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
 find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' >"$lists/simulator"
 read_with_clang simulator -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
 if [ -n "$simavr" ]; then
-  find sim_bridge -name '*.c' -not -name '_*.c' -path '*/avr/*' >"$lists/avr"
+  find sim_bridge -name '*.c' -not -name '_*.c' -not -name simavr_machine.c -path '*/avr/*' >"$lists/avr"
   read_with_clang avr -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -isystem "$simavr/sim" -isystem "$simavr/cores"
 fi
 
