@@ -32,7 +32,7 @@ export HYPOTHESIS_STORAGE_DIRECTORY := build/hypothesis
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help run test check bench soak fuzz experiments wheel firmware pictures timing format setup clean lock
+.PHONY: help run test check bench soak fuzz experiments wheel wheels firmware pictures timing format setup clean lock
 
 help:
 	@echo "make run       build everything, let the demonstration brain drive the emulated robot, write build/run"
@@ -43,6 +43,7 @@ help:
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
+	@echo "make wheels    dist/*.whl for Linux, Windows and macOS, and what is inside; ONLY=win_amd64 for one of them"
 	@echo "make experiments  all experiments of the notes, and a page of them, build/experiments/index.md"
 	@echo "make pictures  the pictures of the documentation, and the pages of experiments and of the timing"
 	@echo "make timing    what the pages of the timing show: bounds and measurements, a tick drawn to scale"
@@ -143,6 +144,10 @@ wheel:
 	@$(PYTHON_VENV) -m pip wheel --quiet --no-index --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
+wheels:
+	@$(SIDE_BY_SIDE) ready-wheels
+	@$(PYTHON_VENV) -m tools.wheels $(ONLY)
+
 format:
 	@$(SIDE_BY_SIDE) ready-check
 	@$(PYTHON_VENV) -m ruff format --quiet .
@@ -161,7 +166,7 @@ clean:
 lock:
 	@rm -rf build/lock-venv && $$(tools/find_python.sh) -m venv build/lock-venv
 	@build/lock-venv/bin/pip install --quiet \
-		$$(build/lock-venv/bin/python tools/requirements.py build run can firmware foxglove test browser bench check)
+		$$(build/lock-venv/bin/python tools/requirements.py build run can firmware foxglove test browser bench check wheels)
 	@{ sed -n 1p requirements.lock; build/lock-venv/bin/pip freeze --all --exclude pip --exclude wheel; } >build/requirements.lock
 	@mv build/requirements.lock requirements.lock
 
@@ -187,13 +192,14 @@ check-generated:
 
 # ---- steps ---------------------------------------------------------------------------------------------------------
 
-.PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware
+.PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware ready-wheels
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done build/.done-sketches
 ready-bench: ready-test build/mcap-core/.done
-ready-soak: ready-bench build/.done-system-soak
+ready-soak: ready-bench ready-wheels build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
+ready-wheels: ready-run $(VENV)/.done-wheels
 
 build/.done-system-%: tools/setup_system.sh tools/find_python.sh
 	@mkdir -p build
@@ -232,6 +238,10 @@ $(VENV)/.done-boebot: pyproject.toml $(VENV)/.done-run | build/.done-core
 	@rm -rf boebot.egg-info
 	@$(PIP) --no-index --no-deps --no-build-isolation --editable .
 	@touch $@
+
+$(VENV)/.done-wheels: $(DECLARED) | $(VENV)/.done-boebot
+	@echo "Installing the compiler of wheels"
+	@$(call INSTALL,wheels)
 
 # What an installation without a network takes its packages from (tools/tests/test_wheel.py).
 build/wheelhouse/.done: $(DECLARED) | $(VENV)/.done-test

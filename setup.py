@@ -9,8 +9,9 @@ else it makes what follows from the protocol and the robots' files (protocol/gen
   else works without it.
 * `sim_bridge/images/firmware-<pin map>.so`: the firmware's own C, one library per pin map.
 
-A wheel also carries the robots and the AVR images. BOEBOT_SANITIZE=1, for the makers' tests, builds all C with the
-address and undefined-behaviour sanitizers, and every warning about ours is an error.
+A wheel also carries the robots and the AVR images. BOEBOT_TARGET names another system to compile for
+(tools/wheels.py, which also says with which compiler). BOEBOT_SANITIZE=1, for the makers' tests, builds all C with
+the address and undefined-behaviour sanitizers, and every warning about ours is an error.
 """
 
 from __future__ import annotations
@@ -51,7 +52,14 @@ WHEEL_DATA = {
     "boebot/data/protocol": ("protocol", ("boebot.dbc",)),
 }
 
-MSVC = sys.platform == "win32"
+# The system that is compiled for, as clang names it: x86_64-windows-gnu ...; "": this one. What follows from a system
+# follows from this, since wheels for all of them are built on Linux.
+TARGET = os.environ.get("BOEBOT_TARGET", "")
+WINDOWS, MACOS = "windows" in TARGET, "macos" in TARGET
+MODULE_SUFFIX = ".pyd" if WINDOWS else ".abi3.so"
+LIBRARY_SUFFIX = ".dll" if WINDOWS else ".dylib" if MACOS else ".so"
+GCC_ONLY = ("-fvect-cost-model=", "--param=")  # wheels are compiled by clang
+
 CFFI_MODULES = [
     f"{script}:ffi"
     for script, wanted in (
@@ -96,11 +104,18 @@ def headers() -> list[str]:
 class BuildExt(build_ext):
     """Compiles on all processors and only what has changed, then links one firmware library per pin map."""
 
+    def get_ext_filename(self, fullname: str) -> str:
+        """Modules are of Python's stable interface; setuptools knows only this system's suffix for one."""
+        if TARGET:
+            return f"{Path(*fullname.split('.'))}{MODULE_SUFFIX}"
+        return str(super().get_ext_filename(fullname))  # type: ignore[no-untyped-call]
+
     def build_extensions(self) -> None:
         self.compiler.compile = self.compile_in_parallel(self.compiler.compile)
         for extension in self.extensions:
             extension.depends = [*extension.depends, *headers(), "setup.py"]
-            extension.extra_compile_args = [*extension.extra_compile_args, *SANITIZE]
+            flags = [*extension.extra_compile_args, *SANITIZE]
+            extension.extra_compile_args = [flag for flag in flags if not (TARGET and flag.startswith(GCC_ONLY))]
             extension.extra_link_args = [*extension.extra_link_args, *SANITIZE]
         super().build_extensions()
         for pin_map in PIN_MAPS:
@@ -130,13 +145,13 @@ class BuildExt(build_ext):
         sources = firmware_sources()
         if not sources:
             return
-        library = Path(self.build_lib, LIBRARIES, f"firmware-{pin_map}{'.dll' if MSVC else '.so'}")
+        library = Path(self.build_lib, LIBRARIES, f"firmware-{pin_map}{LIBRARY_SUFFIX}")
         objects = self.compiler.compile(
             sources,
             output_dir=str(Path(self.build_temp, "firmware", pin_map)),
             macros=[(f"PIN_MAP_{pin_map.replace('-', '_').upper()}", None)],
             include_dirs=[str(FIRMWARE)],
-            extra_postargs=[] if MSVC else ["-std=gnu11", "-O2", "-fvisibility=hidden", *SANITIZE],
+            extra_postargs=["-std=gnu11", "-O2", "-fvisibility=hidden", *SANITIZE],
         )
         if library.exists() and all(library.stat().st_mtime > Path(name).stat().st_mtime for name in objects):
             return

@@ -6,6 +6,7 @@ that `boebot.arenas._arena` offers: arenas and rays are the same C in both.
 
 from __future__ import annotations
 
+import os
 import re
 import runpy
 import sys
@@ -75,7 +76,7 @@ SOURCES = [
 ]
 UNMARKED = ["world/body_step.h", "loop/state.h"]  # what is declared here
 ROOM = Path("sim_bridge")
-LIBRARIES = [] if sys.platform in ("win32", "darwin") else ["-ldl"]
+LIBRARIES = ["-ldl"] if "linux" in os.environ.get("BOEBOT_TARGET", sys.platform) else []
 
 
 def headers() -> list[str]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import queue
 import re
-import select
 import shutil
 import subprocess
 import tempfile
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -106,13 +107,17 @@ def _path(port: str) -> str:
 def _listen(
     stream: IO[bytes], limit_s: float, silence_s: float, progress: Callable[[float], object]
 ) -> tuple[str, bool]:
-    """All that avrdude says until it ends or is too late, and whether it is."""
+    """All that avrdude says until it ends or is too late, and whether it is. A thread reads: not every system can wait
+    for a pipe for a while only."""
+    parts: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(os.dup(stream.fileno()), parts.put), daemon=True).start()
     said, begun = b"", time.monotonic()
     heard, marks = begun, 0
     while (now := time.monotonic()) < min(begun + limit_s, heard + silence_s):
-        if not select.select([stream], [], [], min(1.0, heard + silence_s - now))[0]:
+        try:
+            data = parts.get(timeout=min(1.0, heard + silence_s - now))
+        except queue.Empty:
             continue
-        data = os.read(stream.fileno(), 4096)
         if not data:
             return said.decode("utf-8", "replace"), False
         said += data
@@ -120,6 +125,14 @@ def _listen(
             heard = now
             progress(100 * min(said.count(b"#") / BARS, 1.0))
     return said.decode("utf-8", "replace"), True
+
+
+def _read(pipe: int, to: Callable[[bytes], object]) -> None:
+    """All that comes through a pipe, and then nothing, once."""
+    with open(pipe, "rb", buffering=0) as stream:
+        while data := stream.read(4096):
+            to(data)
+    to(b"")
 
 
 def _why(port: str, said: str) -> str:

@@ -19,7 +19,7 @@ def native_library(pin_map: str) -> Path:
         BoardError: it was not built.
     """
     folder = Path(__file__).resolve().parents[1] / "images"
-    for suffix in (".so", ".dll"):
+    for suffix in (".so", ".dll", ".dylib"):
         path = folder / f"firmware-{pin_map}{suffix}"
         if path.is_file():
             return path

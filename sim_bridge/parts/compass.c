@@ -10,7 +10,7 @@
 #define CYCLES_PER_US (BOARD_CLOCK_HZ / 1000000u)
 #define MEASUREMENT_CYCLES (6000u * CYCLES_PER_US)
 #define WRITING_CYCLES (250u * CYCLES_PER_US) /* RDY is 0 while data are written */
-#define OVERFLOW (-4096)
+#define BEYOND_RANGE (-4096)
 #define BIAS_HORIZONTAL_GAUSS 1.16 /* of the self test */
 #define BIAS_VERTICAL_GAUSS 1.08
 
@@ -31,7 +31,7 @@ static int16_t counts(const compass *self, double gauss) {
   static const double per_gauss[] = {1370, 1090, 820, 660, 440, 390, 330, 230};
   const double value = gauss * per_gauss[self->registers[CONFIGURATION_B] >> 5];
   const long long rounded = number_floor(value + 0.5);
-  return rounded < -2048 || rounded > 2047 ? OVERFLOW : (int16_t)rounded;
+  return rounded < -2048 || rounded > 2047 ? BEYOND_RANGE : (int16_t)rounded;
 }
 
 /* The field at the end of the measurement, averaged over 1, 2, 4 or 8 samples. */

@@ -35,7 +35,7 @@ def without_network(command: list[str]) -> list[str]:
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An empty environment with the wheel in it."""
     subprocess.run(["make", "wheel"], cwd=PROJECT, check=True, stdout=subprocess.DEVNULL)
-    (wheel,) = (PROJECT / "dist").glob("boebot-*.whl")
+    (wheel,) = (PROJECT / "dist").glob("boebot-*-linux_*.whl")
     environment = tmp_path_factory.mktemp("wheel") / "environment"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
     pip = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python"), "--quiet"]

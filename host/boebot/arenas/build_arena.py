@@ -8,26 +8,21 @@ extension's arenas as they are.
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 from cffi import FFI
 
 HERE = Path("host/boebot/arenas")
 HEADERS = ["numbers.h", "paths.h", "arena.h", "scene.h", "scan.h"]
-WINDOWS = sys.platform == "win32"
 # Nothing but the module's entry is seen from outside: what is called within the library may be inlined there. Nobody
 # asks for errno or floating-point traps: without them loops become vectors, with the same results. So do loops of any
 # length where that makes them faster, which gcc's -O2 leaves out.
-INSIDE = [
-    "-std=gnu11",
-    "-fvisibility=hidden",
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-fvect-cost-model=dynamic",
-]
 # No fused multiply-add: the same bits on every machine.
-COMPILE = ["/O2", "/fp:precise"] if WINDOWS else [*INSIDE, "-O2", "-ffp-contract=off"]
+COMPILE = [
+    *("-std=gnu11", "-O2", "-fvisibility=hidden"),
+    *("-fno-math-errno", "-fno-trapping-math", "-fvect-cost-model=dynamic"),
+    "-ffp-contract=off",
+]
 SOURCES = sorted(path.as_posix() for path in (HERE / "geometry").glob("*.c"))
 
 

@@ -8,6 +8,8 @@ import os
 import sys
 from collections.abc import Iterator
 
+from boebot import system
+
 _STDOUT, _STDERR = 1, 2  # file descriptors
 
 
@@ -36,13 +38,14 @@ def kept(*, for_the_answer: bool = False) -> Iterator[None]:
     """
     depth, rights = sys.getrecursionlimit(), os.umask(0)
     os.umask(rights)
-    streams, folder = {"stdout": sys.stdout, "stderr": sys.stderr}, os.open(".", getattr(os, "O_PATH", os.O_RDONLY))
+    streams = {"stdout": sys.stdout, "stderr": sys.stderr}
     own = [os.dup(number) for number in range(_STDERR + 1)]
     if for_the_answer:
         sys.stdout = sys.stderr
         os.dup2(_STDERR, _STDOUT)
     try:
-        yield
+        with system.folder_kept():
+            yield
     finally:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.__stdout__.flush()  # type: ignore[union-attr]
@@ -55,8 +58,6 @@ def kept(*, for_the_answer: bool = False) -> Iterator[None]:
             setattr(sys, name, stream)
         sys.setrecursionlimit(depth)
         os.umask(rights)
-        os.fchdir(folder)
-        os.close(folder)
 
 
 def finish() -> None:

@@ -7,17 +7,15 @@ import contextlib
 import dataclasses
 import functools
 import os
-import select
 import sys
-import termios
 import time
-import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, TextIO
 
 import typer
 
+from boebot import system
 from boebot.cli import options, output, quantity
 from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError
@@ -122,7 +120,7 @@ def teleop(
     screen = sys.stderr if json else sys.stdout  # JSON stands alone on standard output
     output.line(HELP, screen)
     with run_folder.locked(out) as folder:
-        with raw_keyboard() as read_keys:
+        with system.raw_keyboard() as read_keys:
             brain = Keyboard(read_keys, functools.partial(_show, screen))
             request = Request.single(
                 brain,
@@ -145,21 +143,3 @@ def teleop(
 def _show(screen: TextIO, line: str) -> None:
     width = max(20, os.get_terminal_size(screen.fileno()).columns - 1) if screen.isatty() else 200
     print("\r" + line[:width].ljust(width), end="", file=screen, flush=True)
-
-
-@contextlib.contextmanager
-def raw_keyboard() -> Iterator[Callable[[], str]]:
-    """Keys as they are typed, without waiting and without echo; gives a function that returns what was typed."""
-    file = sys.stdin.fileno()
-    before = termios.tcgetattr(file)
-
-    def read_terminal() -> str:
-        ready, _, _ = select.select([file], [], [], 0)
-        return os.read(file, 1024).decode("utf-8", errors="ignore") if ready else ""
-
-    try:
-        tty.setcbreak(file)
-        yield read_terminal
-    finally:
-        with contextlib.suppress(termios.error):  # the terminal has gone
-            termios.tcsetattr(file, termios.TCSADRAIN, before)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 from cffi import FFI
 
 HERE = Path("host/boebot/link")
-COMPILE = ["/O2"] if sys.platform == "win32" else ["-std=gnu11", "-O2", "-fvisibility=hidden"]
+COMPILE = ["-std=gnu11", "-O2", "-fvisibility=hidden"]
 
 
 def builder() -> FFI:

@@ -6,7 +6,6 @@ A new run replaces the record and the files that runs leave, and no others. Whil
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import re
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
+from boebot import system
 from boebot.errors import BoebotError
 from boebot.guests import FORMATS, guests
 
@@ -51,9 +51,8 @@ class RunFolder:
         try:
             self.path = path.absolute()  # a brain may change to another folder
             make_folder(path)
-            self._lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            there = {entry.name for entry in path.iterdir()}
+            self._lock = system.lock_folder(path)
+            there = {entry.name for entry in path.iterdir()} - {system.LOCK}
             links = sorted(name for name in there if _ROBOT.match(name) and (path / name).is_symlink())
         except BlockingIOError:
             self.close()

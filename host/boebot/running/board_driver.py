@@ -15,7 +15,6 @@ import contextlib
 import math
 import time as wall
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 from boebot.boards import BoardSession
@@ -35,6 +34,7 @@ from boebot.robot import Observation, Robot
 from boebot.running.driver import Driver, Status, check_time_to_live, step_limit, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepLimit
 from boebot.running.tasks import Task
+from boebot.system import host_clock
 
 SILENCE_S = 3.0  # a board silent for longer is lost; after a reset its boot loader waits for up to 2 s
 SILENCE_SIMULATED_S = 1.0  # a board in this process has no boot loader
@@ -57,8 +57,6 @@ _TICK = reader(messages.Telemetry, "tick")
 _UNASKED = (messages.EventKind.DEAD_MAN, messages.EventKind.FALLBACK)
 _SUPPLY_LOW = (messages.EventKind.LATCH, messages.Latch.SUPPLY_LOW)
 _NOT_YET = 1 << 32  # no tick is later
-# Time (s) that goes on while the computer sleeps, where the system has such a clock:
-_host_clock = partial(wall.clock_gettime, getattr(wall, "CLOCK_BOOTTIME", wall.CLOCK_MONOTONIC))
 
 
 def message_ticks(devices_period: int, byte_s: float, tick_s: float) -> int:
@@ -271,7 +269,7 @@ class BoardDriver(Driver):
         awaited = -1  # the tick that was looked for
         started_s = received_s = now_s = look_s = transport.now()
         nap_s = link.session.time_out_s / _NAPS if transport.realtime else math.inf
-        awake_s, took_s = _host_clock(), 0.0  # as of `now_s`; the brain's step since then
+        awake_s, took_s = host_clock(), 0.0  # as of `now_s`; the brain's step since then
         wait_until_s = received_s + (period + 1) * tick_s
         started = wall.perf_counter()
         meanwhile: list[Received] = []  # what came during a late step of a paced run
@@ -280,7 +278,7 @@ class BoardDriver(Driver):
             meanwhile = []
             if (bad := link.line.bad) is not None and bad.is_killed:
                 break
-            stood_s = _host_clock() - awake_s - (took_s if took_s <= self.step_limit.seconds else 0.0)
+            stood_s = host_clock() - awake_s - (took_s if took_s <= self.step_limit.seconds else 0.0)
             if stood_s > (_NAPS - 1) * nap_s:
                 raise BoardError(
                     f"this program stood still for {stood_s:.1f} s, as when a computer sleeps; expected "
@@ -291,7 +289,7 @@ class BoardDriver(Driver):
                 received = self._in_new_session(received)
                 equipment = self.equipment
                 now_s = transport.now()
-            awake_s = _host_clock()
+            awake_s = host_clock()
             restarted = link.counts.board_resets != self.resets
             if not received:
                 silence_s = SILENCE_S if transport.realtime or self.has_faults else SILENCE_SIMULATED_S

@@ -18,14 +18,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import hashlib
 import importlib.util
 import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -35,6 +33,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from boebot import system
 from boebot.errors import BoebotError, CallError, SketchError
 from boebot.sketch import cache, core_directory, servo
 from boebot.sketch.find import LIBRARIES, PROJECT, Sketch, below, find
@@ -250,7 +249,7 @@ class _PlatformIO:
                     stdin=subprocess.DEVNULL,
                     stdout=words,
                     stderr=subprocess.STDOUT,
-                    start_new_session=True,  # Ctrl-C comes to it from here
+                    **system.NEW_GROUP,  # Ctrl-C comes to it from here
                 )
             ) as process,
         ):
@@ -293,10 +292,10 @@ def _ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]
     try:
         yield process
     finally:
-        for number in (signal.SIGINT, signal.SIGKILL):
+        for by_force in (False, True):
             if process.poll() is None:
                 with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
-                    os.killpg(process.pid, number)
+                    system.end_group(process, by_force=by_force)
                     process.wait(timeout=5)
 
 
@@ -341,7 +340,7 @@ def _alone() -> Iterator[None]:
     """No other process builds meanwhile."""
     cache().mkdir(parents=True, exist_ok=True)
     with (cache() / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        system.lock(lock)
         yield
 
 
