@@ -195,7 +195,7 @@ check-generated:
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware ready-wheels
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done build/.done-sketches
-ready-bench: ready-test build/mcap-core/.done
+ready-bench: ready-test build/mcap-core/.done build/simavr/.done
 ready-soak: ready-bench ready-wheels build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
@@ -259,7 +259,7 @@ build/mcap-core/.done: $(addprefix host/tests/mcap_core/,package.json package-lo
 	@PATH="$(VENV)/bin:$$PATH" npm ci --prefix $(@D) --ignore-scripts --no-audit --no-fund --silent
 	@touch $@
 
-build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) build/simavr/.done $(VENV)/.done-firmware
+build/.done-core: setup.py pyproject.toml $(CORE_SOURCES) $(FIRMWARE_SOURCES) $(VENV)/.done-firmware
 	@echo "Compiling the simulated world and the emulated boards"
 	@$(PYTHON_VENV) setup.py --quiet build_ext --inplace >build/core.log 2>&1 || { cat build/core.log; exit 1; }
 	@touch $@

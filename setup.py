@@ -1,12 +1,10 @@
 """Builds what is not Python: the simulated world, the emulated boards, the firmware for this computer. Before anything
 else it makes what follows from the protocol and the robots' files (protocol/generate.py).
 
-* `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py), MIT.
-* `boebot.arenas._arena`: arenas and rays (host/boebot/arenas/build_arena.py), MIT.
-* `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py), MIT.
-* `sim_bridge.boards.avr._avr`: simavr and our board layer (sim_bridge/boards/avr/build_avr.py),
-  GPL-3.0-or-later. Built where simavr's sources are, that is after `python tools/fetch_simavr.py`; everything
-  else works without it.
+* `boebot.link._codec`: the firmware's frame code for the host (host/boebot/link/build_codec.py).
+* `boebot.arenas._arena`: arenas and rays (host/boebot/arenas/build_arena.py).
+* `sim_bridge._core`: world, parts and loop (sim_bridge/build_core.py).
+* `sim_bridge.boards.avr._avr`: the emulated ATmega328P (sim_bridge/boards/avr/build_avr.py).
 * `sim_bridge/images/firmware-<pin map>.so`: the firmware's own C, one library per pin map.
 
 A wheel also carries the robots and the AVR images. BOEBOT_TARGET names another system to compile for
@@ -37,7 +35,6 @@ if subprocess.run([sys.executable, "protocol/generate.py"], check=False).returnc
 
 FIRMWARE = Path("firmware/src")
 LIBRARIES = Path("sim_bridge/images")
-HAS_SIMAVR = any(Path("build/simavr").glob("**/sim_avr.c"))
 PIN_HEADERS = FIRMWARE.glob("generated/pins_*.h")
 PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in PIN_HEADERS)
 
@@ -62,13 +59,13 @@ GCC_ONLY = ("-fvect-cost-model=", "--param=")  # wheels are compiled by clang
 
 CFFI_MODULES = [
     f"{script}:ffi"
-    for script, wanted in (
-        ("host/boebot/link/build_codec.py", True),
-        ("host/boebot/arenas/build_arena.py", True),
-        ("sim_bridge/build_core.py", True),
-        ("sim_bridge/boards/avr/build_avr.py", HAS_SIMAVR),
+    for script in (
+        "host/boebot/link/build_codec.py",
+        "host/boebot/arenas/build_arena.py",
+        "sim_bridge/build_core.py",
+        "sim_bridge/boards/avr/build_avr.py",
     )
-    if wanted and Path(script).exists()
+    if Path(script).exists()
 ]
 
 SANITIZERS = [
@@ -196,9 +193,8 @@ class BuildPy(build_py):
 
 
 setup(
-    # The licence depends on what is linked in: simavr brings the GPL.
-    license_expression="MIT AND GPL-3.0-or-later" if HAS_SIMAVR else "MIT",
-    license_files=["LICENSE", *(["LICENSES/GPL-3.0-or-later.txt"] if HAS_SIMAVR else [])],
+    license_expression="MIT",
+    license_files=["LICENSE"],
     cmdclass={"build_ext": BuildExt, "build_py": BuildPy},
     package_dir={name: f"host/{name}" for name in ("boebot", *GUESTS)}
     | {"sim_bridge": "sim_bridge", "boebot_hil": "hil_tests/boebot_hil"},

@@ -90,7 +90,6 @@ def main() -> int:
     except (FetchError, OSError, tarfile.TarError) as error:
         print(f"fetch_simavr: {error}", file=sys.stderr)
         return 1
-    print(f"simavr (crate {CRATE} {VERSION}, GPL-3) is in {DESTINATION.relative_to(ROOT)}")
     return 0
 
 

@@ -5,7 +5,6 @@
 set -eu
 cd "$(dirname "$0")/.."
 warnings="-std=gnu11 -O2 -Wall -Wextra -Wno-unused-parameter -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
-simavr=$(find build/simavr -name sim_avr.h -exec dirname {} \; 2>/dev/null | sed 's|/sim$||' | head -n 1)
 lists=$(mktemp -d)
 trap 'rm -rf "$lists"' EXIT
 
@@ -26,12 +25,8 @@ done
 
 find host -name '*.c' -not -name '_*.c' >"$lists/host"
 read_with_clang host -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
-find sim_bridge -name '*.c' -not -name '_*.c' -not -path '*/avr/*' >"$lists/simulator"
+find sim_bridge -name '*.c' -not -name '_*.c' -not -name simavr_machine.c >"$lists/simulator"
 read_with_clang simulator -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
-if [ -n "$simavr" ]; then
-  find sim_bridge -name '*.c' -not -name '_*.c' -not -name simavr_machine.c -path '*/avr/*' >"$lists/avr"
-  read_with_clang avr -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -isystem "$simavr/sim" -isystem "$simavr/cores"
-fi
 
 for end in BOARD HOST; do
   for compiler in gcc clang "avr-gcc -mmcu=atmega328p"; do

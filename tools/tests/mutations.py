@@ -70,11 +70,9 @@ def compiles(name: str, source: bytes, changed: bytes) -> bool:
 @functools.lru_cache(maxsize=64)
 def machine_code(name: str, source: bytes, pins: str) -> bytes | None:
     """What gcc makes of C; None if it warns."""
-    simulator = next(ROOT.glob("build/simavr/**/sim_avr.h")).parent
     microcontroller = name.startswith(("firmware/src/hal/avr/", "firmware/src/main.c"))
     compiler = "avr-gcc -mmcu=atmega328p" if microcontroller else "gcc"
-    emulator = f"-isystem {simulator} -isystem {simulator.parent}/cores" if name.startswith("sim_bridge/") else ""
-    flags = f"{WARNINGS} -fkeep-inline-functions -DPIN_MAP_{pins} -I{(ROOT / name).parent} {INCLUDES} {emulator}"
+    flags = f"{WARNINGS} -fkeep-inline-functions -DPIN_MAP_{pins} -I{(ROOT / name).parent} {INCLUDES}"
     done = subprocess.run(
         [*compiler.split(), *flags.split(), "-xc", "-S", "-o-", "-"], cwd=ROOT, input=source, capture_output=True
     )

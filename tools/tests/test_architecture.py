@@ -105,8 +105,6 @@ def test_brains_touch_only_what_is_meant_for_them() -> None:
     ],
 )
 def test_c_room_includes_only_what_it_may_know(folder: str, forbidden: tuple[str, ...]) -> None:
-    if folder == "sim_bridge/boards":  # the AVR board is built on simavr's headers, which begin with sim_ too
-        forbidden = tuple(name for name in forbidden if name != "sim_")
     guilty = [
         f"{source.relative_to(ROOT)} includes {name}"
         for source, name in included(ROOT, folder)
@@ -216,17 +214,22 @@ def test_the_firmware_is_compiled_by_the_platforms_options() -> None:
     assert options <= {"-flto", "-ffunction-sections", "-fdata-sections", *sanitizers}
 
 
-def test_only_the_avr_board_and_the_recorder_of_its_vectors_include_simavr_and_say_its_licence() -> None:
+def test_only_the_recorder_of_vectors_includes_simavr_and_says_its_licence() -> None:
     users = {
-        source
+        source.name: source.read_text()
         for source, name in included(ROOT, "sim_bridge")
         if re.match(r"(sim_avr|avr_\w+|sim_\w+)\.h$", Path(name).name) and not (ROOT / name).exists()
     }
-    assert users
-    recorder = ROOT / "sim_bridge" / "tests" / "boards" / "avr" / "vectors" / "simavr_machine.c"
-    assert all(source.parent == ROOT / "sim_bridge" / "boards" / "avr" for source in users - {recorder})
-    for source in users:
-        assert "GPL-3.0-or-later" in source.read_text()[:1500], source.name
+    assert list(users) == ["simavr_machine.c"]
+    assert "GPL-3.0-or-later" in users["simavr_machine.c"][:1500]
+
+
+def test_the_core_of_the_microcontroller_knows_itself_and_the_c_library() -> None:
+    core = ROOT / "sim_bridge" / "boards" / "avr" / "core"
+    for source in [*core.glob("*.c"), *core.glob("*.h")]:
+        named = set(re.findall(r'#include ["<](.+)[">]', source.read_text()))
+        strangers = {name for name in named if not (core / name).exists()}
+        assert strangers <= {"stdbool.h", "stdint.h", "stdlib.h", "string.h"}, source.name
 
 
 def test_simulator_knows_no_protocol() -> None:

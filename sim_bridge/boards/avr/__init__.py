@@ -80,9 +80,9 @@ class AvrBoard(EmulatedBoard):
             raise MemoryError("emulated board")
         super().__init__(extension, board, "emulated ATmega328P", elf=program.elf, assumed=program.assumed)
 
-    def one_by_one(self) -> None:
-        """From now on each instruction is executed by itself and by simavr's core: for tests of what else is faster."""
-        self.lib.avr_board_one_by_one(self.handle)
+    def no_fast_forward(self) -> None:
+        """For tests: from now on each instruction by itself, and sleep cycle by cycle. All is the same."""
+        self.lib.avr_board_no_fast_forward(self.handle)
 
     def cover(self) -> NDArray[np.uint8]:
         """What was executed of each word of flash since the first call, which begins to keep it (avr_board.h): bit 0,

@@ -1,6 +1,4 @@
 /* avr_board.c: the emulated ATmega328P's place behind board.h: its registers, its construction, the operations.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_board.h"
 
@@ -10,85 +8,29 @@
 
 #include "avr_parts.h"
 
-#define RESERVED_RAMPZ 0x5Bu /* where larger AVRs have RAMPZ */
-#define Z_RANGE 0x10000u
-
 /* MCUSR: flags can only be cleared. */
 static void write_reset_flags(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  if (value & ~b->avr->data[address])
-    note(b, b->avr->pc, "writes 1 to", "MCUSR", "its flags can only be cleared (11.9.1)");
-  b->avr->data[address] &= value;
-}
-
-/* ---- construction ---- */
-
-/* WDR arrives as a request to all of simavr's modules. */
-static int on_request(avr_io_t *io, uint32_t request, void *param) {
-  if (request != AVR_IOCTL_WATCHDOG_RESET) return -1;
-  watchdog_kick((avr_board *)io->avr->custom.data);
-  return 0;
-}
-
-/* simavr calls these two by name: which modules an ATmega328P has. Of simavr's own it keeps program memory; the analog
- * comparator answers nothing. */
-void mx8_init(struct avr_t *avr) {
-  avr_board *b = avr->custom.data;
-  struct mcu_t *chip = (struct mcu_t *)avr;
-  b->avr = avr;
-  b->io.kind = "board";
-  b->io.ioctl = on_request;
-  avr_flash_init(avr, &chip->selfprog);
-  avr_register_io(avr, &b->io);
-  registers_init(b);
-  on_write(b, REG_MCUSR, write_reset_flags);
-  pins_init(b);
-  timers_init(b);
-  usart_init(b);
-  twi_init(b);
-  spi_init(b);
-  converter_init(b);
-  watchdog_init(b);
-  eeprom_init(b);
-}
-
-void mx8_reset(struct avr_t *avr) { hear_core(avr->custom.data); }
-
-/* simavr follows a program that reads or writes program memory beyond its end: with room for every address that fits
- * into Z, and no RAMPZ, it stays within what is ours. */
-static void enlarge_flash(avr_t *avr) {
-  uint8_t *flash = realloc(avr->flash, Z_RANGE);
-  if (!flash) abort();
-  memset(flash + AVR_BOARD_FLASH_SIZE, 0xFF, Z_RANGE - AVR_BOARD_FLASH_SIZE);
-  avr->flash = flash;
+  if (value & ~b->core.data[address])
+    note(b, b->core.pc, "writes 1 to", "MCUSR", "its flags can only be cleared (11.9.1)");
+  b->core.data[address] &= value;
 }
 
 static void destroy(board *self) {
   avr_board *b = (avr_board *)self;
-  avr_t *avr = b->avr;
-  if (avr) {
-    for (int i = 0; i < avr->interrupts.vector_count; i++) {
-      avr_free_irq(avr->interrupts.vector[i]->irq, AVR_INT_IRQ_COUNT);
-    }
-    avr_free_irq(avr->interrupts.irq, AVR_INT_IRQ_COUNT);
-    avr_terminate(avr);
-    free((void *)avr->data_names);
-    avr_free_irq(avr->irq, AVR_CORE_IRQ_COUNT);
-    free((void *)avr->irq_pool.irq);
-    free(avr);
-  }
+  avr_core_free(&b->core);
   pins_free(b);
   usart_free(b);
   watchdog_free(b);
   spans_free(b);
   debug_free(b);
-  free(b->written);
-  free(b->covered);
+  free(b->core.written);
+  free(b->core.covered);
   free(b);
 }
 
 /* ---- operations ---- */
 
-static uint64_t now(const board *self) { return ((const avr_board *)self)->avr->cycle; }
+static uint64_t now(const board *self) { return ((const avr_board *)self)->core.cycle; }
 
 static board_state advance(board *self, uint64_t until) { return run_until((avr_board *)self, until); }
 
@@ -131,14 +73,14 @@ static const char *fault(const board *self) {
 
 static void *extension(board *self, const char *name) {
   avr_board *b = (avr_board *)self;
-  if (!strcmp(name, BOARD_DATA)) return b->avr->data;
+  if (!strcmp(name, BOARD_DATA)) return b->core.data;
   if (!strcmp(name, BOARD_EEPROM)) return &b->eeprom.face;
   if (!strcmp(name, BOARD_WATCHDOG_LOG)) return &b->watchdog_log;
   if (!strcmp(name, BOARD_NOTES)) return &b->notes;
   if (!strcmp(name, BOARD_PIN_LEVELS)) return pins_levels(b);
   if (!strcmp(name, BOARD_CHECKS)) return &b->checks;
   if (!strcmp(name, BOARD_OUTSIDE_LOG)) return &b->outside_log;
-  if (!strcmp(name, BOARD_PROGRAM_COUNTER)) return &b->avr->pc;
+  if (!strcmp(name, BOARD_PROGRAM_COUNTER)) return &b->core.pc;
   if (!strcmp(name, BOARD_FAULT_ADDRESS)) {
     return b->crashed && b->fault_address != NO_ADDRESS ? &b->fault_address : NULL;
   }
@@ -166,46 +108,50 @@ static const board_operations OPERATIONS = {
 
 uint8_t *avr_board_cover(board *self) {
   avr_board *b = (avr_board *)self;
-  if (!b->covered) b->covered = calloc(1, AVR_BOARD_FLASH_SIZE / 2u);
-  return b->covered;
+  if (!b->core.covered) b->core.covered = calloc(1, AVR_FLASH_SIZE / 2u);
+  return b->core.covered;
 }
 
-void avr_board_one_by_one(board *self) { ((avr_board *)self)->one_by_one = true; }
+void avr_board_no_fast_forward(board *self) { ((avr_board *)self)->no_fast_forward = true; }
 
-/* Of what simavr says of a program, only that an address was "wrapped" is news. */
-static void hear_simavr(avr_t *avr, const int level, const char *format, va_list arguments) {
-  if (!strstr(format, "Wrapping")) return;
-  note(avr->custom.data, avr->pc, "reads or writes", "behind the memory's end",
-       "nothing is there; here it is RAM again");
+/* ---- construction ---- */
+
+static void join_units(avr_board *b) {
+  registers_init(b);
+  on_write(b, REG_MCUSR, write_reset_flags);
+  pins_init(b);
+  timers_init(b);
+  usart_init(b);
+  twi_init(b);
+  spi_init(b);
+  converter_init(b);
+  watchdog_init(b);
+  eeprom_init(b);
+  flash_init(b);
+  registers_complete(b);
 }
 
-/* A program that begins in the boot section has its reset there (27.6: the fuse BOOTRST). */
 static void load(avr_board *b, const avr_program *program) {
-  memcpy(b->avr->flash, program->flash, AVR_BOARD_FLASH_SIZE);
+  memcpy(b->core.flash, program->flash, AVR_FLASH_SIZE);
   memcpy(b->eeprom.cells, program->eeprom, BOARD_EEPROM_SIZE);
-  b->code_end = program->code_end;
   b->variables_end = program->variables_end;
-  b->avr->reset_pc = program->begin;
+  b->reset_address = program->begin;
+  b->core.code_end = program->code_end;
   if (program->begin == 0) b->code_begin = 1; /* address 0 is for resets: a jump there is noticed */
+  avr_core_flash_changed(&b->core, 0, AVR_FLASH_SIZE);
 }
 
 board *avr_board_create(const avr_program *program) {
-  avr_global_logger_set(hear_simavr);
   avr_board *b = calloc(1, sizeof *b);
-  avr_t *avr = b ? avr_make_mcu_by_name("atmega328p") : NULL;
-  if (!avr) {
+  if (!b || !avr_core_create(&b->core)) {
     free(b);
     return NULL;
   }
   b->base.op = &OPERATIONS;
-  b->next_due = NEVER;
+  b->core.calls = &CALLS_OF_CORE;
+  b->core.owner = b;
   for (int i = 0; i < DUE_COUNT; i++) b->due[i] = NEVER;
-  avr->custom.data = b;
-  avr->frequency = BOARD_CLOCK_HZ;
-  avr->rampz = RESERVED_RAMPZ;
-  avr_init(avr);
-  enlarge_flash(avr);
-  memset(avr->serial, 0, sizeof avr->serial); /* simavr's is another one each time */
+  join_units(b);
   load(b, program);
   usart_line_rate(b, 500000);
   b->reset_wanted = 1u << BOARD_RESET_POWER;

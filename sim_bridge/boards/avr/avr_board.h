@@ -1,6 +1,4 @@
-/* avr_board.h: the Arduino Uno's ATmega328P, emulated: simavr executes the instructions, this layer does the rest.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+/* avr_board.h: the Arduino Uno's ATmega328P, emulated.
  */
 #ifndef AVR_BOARD_H
 #define AVR_BOARD_H
@@ -9,11 +7,12 @@
 #include <stdint.h>
 
 #include "../board.h"
+#include "core/avr_chip.h"
 
 /* python: begin */
 /* A program as it lies in the chip's memories. */
 typedef struct {
-  const uint8_t *flash;   /* AVR_BOARD_FLASH_SIZE bytes */
+  const uint8_t *flash;   /* AVR_FLASH_SIZE bytes */
   const uint8_t *eeprom;  /* BOARD_EEPROM_SIZE bytes */
   uint32_t begin;         /* where the reset leads: 0, or into the boot section */
   uint32_t code_end;      /* behind the last byte that can be an instruction */
@@ -23,14 +22,12 @@ typedef struct {
 /* A board with that program, powered on at cycle 0; NULL: there is no memory for it. */
 board *avr_board_create(const avr_program *program);
 
-/* For tests of what else is faster: from now on each instruction is executed by itself, and by simavr's core. */
-void avr_board_one_by_one(board *self);
+/* For tests: from now on each instruction is executed by itself, and sleep goes by cycle by cycle. All is the same. */
+void avr_board_no_fast_forward(board *self);
 
 /* From now on keeps what was executed of each word of flash: bit 0, and it went straight on; bit 1, and it went elsewhere, by a
- * jump, a skip or over a second word. AVR_BOARD_FLASH_SIZE / 2 bytes, the board's; NULL: no memory. */
+ * jump, a skip or over a second word. AVR_FLASH_SIZE / 2 bytes, the board's; NULL: no memory. */
 uint8_t *avr_board_cover(board *self);
 /* python: end */
-
-#define AVR_BOARD_FLASH_SIZE 0x8000u /* bytes */
 
 #endif

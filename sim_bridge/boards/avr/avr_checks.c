@@ -1,16 +1,13 @@
 /* avr_checks.c: see avr_checks.h.
  *
  * What stands at a pin the board does not know: who joins parts to it says it (board_checks of board.h).
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_checks.h"
 
 #include <stdlib.h>
 
-#include "avr_instructions.h"
-#include "avr_opcodes.h"
 #include "avr_parts.h"
+#include "core/avr_decode.h"
 
 #define LOOKAHEAD 4 /* instructions from the reading of a port to what takes one bit of it */
 
@@ -22,7 +19,7 @@ static const char *const PINS[BOARD_PIN_COUNT] = {
 static bool is_set(uint32_t pins, uint8_t pin) { return pins >> pin & 1u; }
 
 /* The instruction under way, or the next one. */
-static uint32_t here(const avr_board *b) { return (uint32_t)b->avr->pc; }
+static uint32_t here(const avr_board *b) { return b->core.pc; }
 
 static void found(avr_board *b, const char *does, const char *what, const char *why) {
   if (b->checks.strict) {
@@ -63,25 +60,21 @@ void check_watched(avr_board *b, uint8_t port, uint8_t mask) {
 /* The bits that the program looks at of the port that the instruction at `pc` reads: by SBIC and SBIS one; else those
  * that one of the next instructions picks out. 0: not known, as of a port that is kept whole. */
 static uint8_t bits_of_interest(const avr_board *b) {
-  const uint8_t *flash = b->avr->flash, *data = b->avr->data;
-  uint32_t pc = here(b);
-  unsigned opcode = word_of(flash, pc), changed = 0;
-  if ((opcode & 0xFD00u) == 0x9900u) return (uint8_t)(1u << (opcode & 7u));
-  const unsigned port = opcode >> 4 & 0x1Fu;
-  for (int i = 0; i < LOOKAHEAD; i++) {
-    pc += is_two_words(opcode) ? 4 : 2;
-    if (pc >= AVR_BOARD_FLASH_SIZE) return 0;
-    opcode = word_of(flash, pc);
-    const unsigned kind = avr_kinds[opcode], d = opcode >> 4 & 0x1Fu, r = (opcode >> 5 & 0x10u) | (opcode & 0xFu);
-    const unsigned h = (opcode >> 4 & 0xFu) + 16u;
-    if (kind == AND && (d == port || r == port) && d != r) {
-      const unsigned mask = d == port ? r : d;
-      return changed >> mask & 1u ? 0 : data[mask];
+  const avr_instruction *i = &b->core.code[here(b) / 2u];
+  if (i->kind == SBIC || i->kind == SBIS) return i->r;
+  const uint8_t port = i->d;
+  uint32_t changed = 0;
+  for (int n = 0; n < LOOKAHEAD; n++) {
+    i += i->kind == LDS ? 2 : 1;
+    if (i - b->core.code >= AVR_FLASH_SIZE / 2) return 0;
+    if (i->kind == AND && (i->d == port || i->r == port) && i->d != i->r) {
+      const uint8_t mask = i->d == port ? i->r : i->d;
+      return changed >> mask & 1u ? 0 : b->core.data[mask];
     }
-    if (kind == ANDI && h == port) return (uint8_t)((opcode >> 4 & 0xF0u) | (opcode & 0xFu));
-    if ((kind == SKIP_CLEAR || kind == SKIP_SET || kind == BST) && d == port) return (uint8_t)(1u << (opcode & 7u));
-    if (kind != LDI || h == port) return 0;
-    changed |= 1u << h;
+    if (i->kind == ANDI && i->d == port) return (uint8_t)i->k;
+    if ((i->kind == SBRC || i->kind == SBRS || i->kind == BST) && i->d == port) return i->r;
+    if (i->kind != LDI || i->d == port) return 0;
+    changed |= UINT32_C(1) << i->d;
   }
   return 0;
 }
@@ -96,22 +89,17 @@ void check_read(avr_board *b, uint8_t port) {
 
 /* ---- RAM ---- */
 
-void check_access(avr_board *b) {
-  const data_access access = next_access(b);
-  for (unsigned i = 0; i < access.count; i++) {
-    const unsigned cell = access.first + i;
-    if (cell < RAM_BEGIN || cell >= BOARD_DATA_SIZE || b->written[cell]) continue;
-    if (!access.writes) found(b, "reads", "RAM that was never written", "it is anything since the power came");
-    b->written[cell] = 1;
-  }
+void check_never_written(avr_board *b) {
+  found(b, "reads", "RAM that was never written", "it is anything since the power came");
+  if (b->crashed) avr_stop(&b->core);
 }
 
 /* ---- from outside ---- */
 
 bool avr_board_check(board *self, bool strict) {
   avr_board *b = (avr_board *)self;
-  if (!b->written) b->written = calloc(1, BOARD_DATA_SIZE);
-  if (!b->written) return false;
+  if (!b->core.written) b->core.written = calloc(1, BOARD_DATA_SIZE);
+  if (!b->core.written) return false;
   b->checks.on = true;
   b->checks.joined |= 3u; /* the serial line */
   b->checks.strict = strict;

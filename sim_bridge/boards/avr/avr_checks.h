@@ -1,7 +1,5 @@
 /* avr_checks.h: what a program does that a bench does not show: two that drive one pin against each other, an input that
  * nothing decides, RAM that is read before it is written. Off until `avr_board_check`, and then free.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #ifndef AVR_CHECKS_H
 #define AVR_CHECKS_H

@@ -4,8 +4,6 @@
  *
  * The reference is AVCC, at the supply, or the band gap; nothing is joined to AREF, which reads as AVCC. The band gap as
  * input (channel 14) is good 70 us after it was selected (29.5, the longest start-up time), until then too low.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_parts.h"
 
@@ -17,18 +15,18 @@ enum { REFS = 0xC0, ADLAR = 0x20, MUX = 0x0F, MUX_BAND_GAP = 14 };              
 enum { ADTS = 0x07 };                                                                   /* ADCSRB */
 
 static uint64_t clock_cycles(const avr_board *b) {
-  unsigned setting = b->avr->data[REG_ADCSRA] & ADPS;
+  unsigned setting = b->core.data[REG_ADCSRA] & ADPS;
   return UINT64_C(1) << (setting ? setting : 1);
 }
 
 static void note_missing(avr_board *b) {
-  const uint8_t selection = b->avr->data[REG_ADMUX], channel = selection & MUX;
+  const uint8_t selection = b->core.data[REG_ADMUX], channel = selection & MUX;
   if (channel >= BOARD_ANALOG_COUNT && channel < MUX_BAND_GAP) {
-    note(b, b->avr->pc, "converts", "a channel without pin",
+    note(b, b->core.pc, "converts", "a channel without pin",
          "it has none (6, 7), is reserved, or is the temperature, which is not built: it reads 0 V");
   }
   if (!(selection & REFS)) {
-    note(b, b->avr->pc, "converts with", "the reference AREF", "nothing is joined to it: it is at the supply");
+    note(b, b->core.pc, "converts with", "the reference AREF", "nothing is joined to it: it is at the supply");
   }
 }
 
@@ -70,10 +68,10 @@ static uint16_t convert(const avr_board *b, uint64_t cycle) {
 
 void converter_due(avr_board *b, uint64_t cycle) {
   converter_state *c = &b->converter;
-  uint8_t *control = &b->avr->data[REG_ADCSRA];
+  uint8_t *control = &b->core.data[REG_ADCSRA];
   if (!c->begun) {
     c->begun = true;
-    c->selection = b->avr->data[REG_ADMUX];
+    c->selection = b->core.data[REG_ADMUX];
     set_due(b, DUE_CONVERTER, c->hold);
     return;
   }
@@ -84,9 +82,9 @@ void converter_due(avr_board *b, uint64_t cycle) {
     return;
   }
   set_due(b, DUE_CONVERTER, NEVER);
-  if (!c->locked) c->result = (uint16_t)(b->avr->data[REG_ADMUX] & ADLAR ? c->sample << 6 : c->sample);
+  if (!c->locked) c->result = (uint16_t)(b->core.data[REG_ADMUX] & ADLAR ? c->sample << 6 : c->sample);
   raise_flag(b, VECTOR_ADC);
-  if ((*control & ADATE) && !(b->avr->data[REG_ADCSRB] & ADTS)) {
+  if ((*control & ADATE) && !(b->core.data[REG_ADCSRB] & ADTS)) {
     start(b, cycle - 1); /* at this very edge */
   } else {
     *control &= (uint8_t)~ADSC;
@@ -94,18 +92,18 @@ void converter_due(avr_board *b, uint64_t cycle) {
 }
 
 static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
-  return (uint8_t)((b->avr->data[address] & ~ADIF) | (b->raised & FLAG(VECTOR_ADC) ? ADIF : 0));
+  return (uint8_t)((b->core.data[address] & ~ADIF) | (b->core.raised & FLAG(VECTOR_ADC) ? ADIF : 0));
 }
 
 static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   converter_state *c = &b->converter;
   bool converting = b->due[DUE_CONVERTER] != NEVER;
-  bool was_enabled = b->avr->data[address] & ADEN;
+  bool was_enabled = b->core.data[address] & ADEN;
   if (value & ADIF) clear_flag(b, VECTOR_ADC);
-  b->avr->data[address] = (uint8_t)(value & ~ADIF);
+  b->core.data[address] = (uint8_t)(value & ~ADIF);
   enable_interrupt(b, VECTOR_ADC, value & ADIE);
   if (!(value & ADEN)) {
-    b->avr->data[address] &= (uint8_t)~ADSC;
+    b->core.data[address] &= (uint8_t)~ADSC;
     set_due(b, DUE_CONVERTER, NEVER);
     return;
   }
@@ -114,17 +112,17 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
     c->first = true;
   }
   if (converting) {
-    b->avr->data[address] |= ADSC; /* writing 0 does not stop it */
+    b->core.data[address] |= ADSC; /* writing 0 does not stop it */
   } else if (value & ADSC) {
     note_missing(b);
-    check_analog(b, b->avr->data[REG_ADMUX] & MUX);
+    check_analog(b, b->core.data[REG_ADMUX] & MUX);
     start(b, end);
   }
 }
 
 static void write_selection(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  if ((b->avr->data[address] & MUX) != MUX_BAND_GAP) b->converter.band_gap_from = end;
-  b->avr->data[address] = value;
+  if ((b->core.data[address] & MUX) != MUX_BAND_GAP) b->converter.band_gap_from = end;
+  b->core.data[address] = value;
 }
 
 static uint8_t read_low(avr_board *b, uint16_t address, uint64_t cycle) {

@@ -1,24 +1,19 @@
 /* avr_debug.c: see avr_debug.h.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_debug.h"
 
 #include <stdlib.h>
 
-#include "avr_instructions.h"
 #include "avr_parts.h"
-#include "sim_core.h"
 
 #define DATA_BEGIN 0x800000u
 #define EEPROM_BEGIN 0x810000u
-#define IO_BEGIN 0x20u
 #define CHANGED "is changed", "by the debugger", "the run cannot be repeated from its record"
 
 struct avr_debugging {
   avr_debug face;
   avr_debugger *call;
-  instruction_stops stops;
+  avr_stops stops;
   uint8_t watched[BOARD_DATA_SIZE];
   uint64_t halted_at; /* cycle of the last halt: from there it goes on */
   bool accessed;      /* a watched cell, by the last instruction */
@@ -28,11 +23,11 @@ struct avr_debugging {
 
 static bool call(avr_board *b, avr_halt why) {
   avr_debug *d = &b->debug->face;
-  d->pc = (uint32_t)b->avr->pc;
+  d->pc = b->core.pc;
   if (b->debug->call(NULL, why) != 0) return false;
-  if (why != AVR_LOOKS && b->avr->pc != d->pc) {
-    note(b, (uint32_t)b->avr->pc, CHANGED);
-    b->avr->pc = d->pc;
+  if (why != AVR_LOOKS && b->core.pc != d->pc) {
+    note(b, b->core.pc, CHANGED);
+    b->core.pc = d->pc;
   }
   return true;
 }
@@ -41,26 +36,26 @@ static bool halt(avr_board *b, avr_halt why) {
   struct avr_debugging *g = b->debug;
   g->face.stepping = g->face.interrupted = false;
   g->accessed = false;
-  g->halted_at = b->avr->cycle;
+  g->halted_at = b->core.cycle;
   return call(b, why);
 }
 
 bool debug_looks(avr_board *b) { return call(b, AVR_LOOKS); }
 
-bool debug_crashed(avr_board *b) { return b->debug->halted_at == b->avr->cycle || halt(b, AVR_CRASHED); }
+bool debug_crashed(avr_board *b) { return b->debug->halted_at == b->core.cycle || halt(b, AVR_CRASHED); }
 
 bool debug_before(avr_board *b) {
   const struct avr_debugging *g = b->debug;
-  const uint32_t pc = (uint32_t)b->avr->pc;
+  const uint32_t pc = b->core.pc;
   if (g->face.interrupted) return halt(b, AVR_INTERRUPTED);
-  if (b->sleeping || g->halted_at == b->avr->cycle) return true;
+  if (b->core.sleeping || g->halted_at == b->core.cycle) return true;
   if (g->accessed) return halt(b, AVR_WATCHED);
-  const bool marked = pc < AVR_BOARD_FLASH_SIZE && g->stops.marked[pc / 2u];
+  const bool marked = pc < AVR_FLASH_SIZE && g->stops.marked[pc / 2u];
   return !(marked || g->face.stepping) || halt(b, AVR_TRAPPED);
 }
 
 static void look_at_access(const avr_board *b, struct avr_debugging *g) {
-  const data_access access = next_access(b);
+  const avr_access access = avr_next_access(&b->core);
   for (unsigned i = 0; i < access.count; i++) {
     const uint16_t cell = (uint16_t)(access.first + i);
     const uint8_t kind = access.writes ? AVR_WATCH_WRITE : AVR_WATCH_READ;
@@ -73,8 +68,8 @@ static void look_at_access(const avr_board *b, struct avr_debugging *g) {
 uint32_t run_debugged(avr_board *b, uint64_t until) {
   struct avr_debugging *g = b->debug;
   if (g->face.watching) look_at_access(b, g);
-  if (g->face.watching || g->face.stepping) until = b->avr->cycle + 1;
-  return execute_instructions(b, until, &g->stops);
+  if (g->face.watching || g->face.stepping) until = b->core.cycle + 1;
+  return avr_run(&b->core, until, &g->stops);
 }
 
 /* ---- from outside ---- */
@@ -100,31 +95,27 @@ avr_debug *avr_board_debug(board *self, avr_debugger *debugger) {
 
 /* As it was but for the value: what a program's reading would change (a byte is taken, a flag is cleared) is put back. */
 static uint8_t peek(avr_board *b, uint16_t address) {
-  if (address == R_SREG) {
-    uint8_t flags = 0;
-    for (unsigned i = 0; i < 8; i++) flags |= (uint8_t)(b->avr->sreg[i] << i);
-    return flags;
-  }
-  if (address < IO_BEGIN || address > UINT8_MAX || !b->reads[address]) return b->avr->data[address];
+  if (address == REG_SREG) return avr_core_flags(&b->core);
+  if (address < AVR_IO_BEGIN || address > UINT8_MAX || !b->core.reads[address]) return b->core.data[address];
   const avr_board before = *b;
-  const uint8_t value = b->reads[address](b, address, b->avr->cycle);
+  const uint8_t value = b->core.reads[address](b, address, b->core.cycle);
   *b = before;
   return value;
 }
 
 static void poke(avr_board *b, uint16_t address, uint8_t value) {
-  if (address == R_SREG) {
-    for (unsigned i = 0; i < 8; i++) b->avr->sreg[i] = value >> i & 1;
-  } else if (address >= IO_BEGIN && address <= UINT8_MAX && b->writes[address]) {
-    b->writes[address](b, address, value, b->avr->cycle);
+  if (address == REG_SREG) {
+    avr_core_set_flags(&b->core, value);
+  } else if (address >= AVR_IO_BEGIN && address <= UINT8_MAX && b->core.writes[address]) {
+    b->core.writes[address](b, address, value, b->core.cycle);
   } else {
-    b->avr->data[address] = value;
+    b->core.data[address] = value;
   }
 }
 
 int avr_debug_read(board *self, uint32_t address) {
   avr_board *b = (avr_board *)self;
-  if (address < AVR_BOARD_FLASH_SIZE) return b->avr->flash[address];
+  if (address < AVR_FLASH_SIZE) return b->core.flash[address];
   if (address - DATA_BEGIN < BOARD_DATA_SIZE) return peek(b, (uint16_t)(address - DATA_BEGIN));
   if (address - EEPROM_BEGIN < BOARD_EEPROM_SIZE) return b->eeprom.cells[address - EEPROM_BEGIN];
   return -1;
@@ -134,11 +125,12 @@ bool avr_debug_write(board *self, uint32_t address, uint8_t value) {
   avr_board *b = (avr_board *)self;
   const int before = avr_debug_read(self, address);
   if (before == value || before < 0) return before == value;
-  note(b, (uint32_t)b->avr->pc, CHANGED);
-  if (address < AVR_BOARD_FLASH_SIZE) {
-    b->avr->flash[address] = value;
-    b->code_end = AVR_BOARD_FLASH_SIZE; /* another program, of which nothing is known */
-    b->variables_end = b->lowest_stack = RAM_BEGIN;
+  note(b, b->core.pc, CHANGED);
+  if (address < AVR_FLASH_SIZE) {
+    b->core.flash[address] = value;
+    b->core.code_end = AVR_FLASH_SIZE; /* another program, of which nothing is known */
+    avr_core_flash_changed(&b->core, 0, AVR_FLASH_SIZE);
+    b->variables_end = b->core.stack_floor = AVR_RAM_BEGIN;
   } else if (address < EEPROM_BEGIN) {
     poke(b, (uint16_t)(address - DATA_BEGIN), value);
   } else {
@@ -149,8 +141,8 @@ bool avr_debug_write(board *self, uint32_t address, uint8_t value) {
 
 void avr_debug_reset(board *self) {
   avr_board *b = (avr_board *)self;
-  note(b, (uint32_t)b->avr->pc, CHANGED);
+  note(b, b->core.pc, CHANGED);
   want_reset(b, BOARD_RESET_EXTERNAL);
   restart(b);
-  b->debug->face.pc = (uint32_t)b->avr->pc;
+  b->debug->face.pc = b->core.pc;
 }

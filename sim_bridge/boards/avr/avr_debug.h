@@ -3,8 +3,6 @@
  * Where the program stops, the board calls the debugger from within `advance`: no cycle passes until that returns, so
  * that a run with a debugger is the run without it. Watched data memory makes each instruction run by itself; a
  * breakpoint does not. What an interrupt's entry puts on the stack is not watched.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #ifndef AVR_DEBUG_H
 #define AVR_DEBUG_H

@@ -5,8 +5,6 @@
  * write, no read, and EEAR cannot be changed. Erasing makes a cell 0xFF, writing clears bits.
  *
  * A reset does not stop a write as long as there is supply (8.4.2).
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <string.h>
 
@@ -40,6 +38,7 @@ static void start_write(avr_board *b, uint8_t mode, uint64_t cycle) {
   bool both = mode != MODE_ERASE && mode != MODE_WRITE; /* the fourth is reserved */
   set_due(b, DUE_EEPROM, cycle + (both ? ERASE_AND_WRITE_CYCLES : ONE_OF_BOTH_CYCLES));
   halt_cpu(b, WRITE_HALT_CYCLES);
+  flash_forget_page(b); /* (27.8.2) */
 }
 
 static void end_write(avr_board *b) {
@@ -54,7 +53,7 @@ void eeprom_due(avr_board *b, uint64_t cycle) {
 }
 
 static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
-  uint8_t value = b->avr->data[address] & (EEPM | EERIE);
+  uint8_t value = b->core.data[address] & (EEPM | EERIE);
   if (cycle < b->eeprom.armed_until) value |= EEMPE;
   if (b->eeprom.writing) value |= EEPE;
   return value;
@@ -62,17 +61,17 @@ static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
 
 static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   eeprom_state *e = &b->eeprom;
-  uint8_t mode = (e->writing ? b->avr->data[address] : value) & EEPM;
+  uint8_t mode = (e->writing ? b->core.data[address] : value) & EEPM;
   bool armed = end <= e->armed_until;
-  b->avr->data[address] = mode | (value & EERIE);
+  b->core.data[address] = mode | (value & EERIE);
   enable_interrupt(b, VECTOR_EE_READY, value & EERIE);
   if (armed && (value & EEPE) && !e->writing) {
     start_write(b, mode, end);
     return;
   }
   if ((value & EEPE) && !e->writing)
-    note(b, b->avr->pc, "sets", "EEPE", "it is dropped: EEMPE was not set just before (8.6.3)");
-  if ((value & EERE) && e->writing) note(b, b->avr->pc, "sets", "EERE", BUSY);
+    note(b, b->core.pc, "sets", "EEPE", "it is dropped: EEMPE was not set just before (8.6.3)");
+  if ((value & EERE) && e->writing) note(b, b->core.pc, "sets", "EERE", BUSY);
   if ((value & EEMPE) && (e->writing || !(value & EEPE))) e->armed_until = end + ARMED_CYCLES;
   if ((value & EERE) && !e->writing) {
     e->data = e->cells[e->selected];
@@ -85,7 +84,7 @@ static void write_address(avr_board *b, uint16_t address, uint8_t value, uint64_
   unsigned high = address == REG_EEARH ? value & (BOARD_EEPROM_SIZE / 256u - 1u) : e->selected >> 8;
   unsigned low = address == REG_EEARH ? e->selected & 0xFFu : value;
   const uint16_t selected = (uint16_t)(high << 8 | low);
-  if (e->writing && selected != e->selected) note(b, b->avr->pc, "writes to", "EEAR", BUSY);
+  if (e->writing && selected != e->selected) note(b, b->core.pc, "writes to", "EEAR", BUSY);
   if (!e->writing) e->selected = selected;
 }
 
@@ -107,7 +106,7 @@ void eeprom_reset(avr_board *b, bool power_failed) {
   e->armed_until = 0;
   e->data = 0;
   if (e->writing) {
-    b->avr->data[REG_EECR] = e->mode; /* EEPM: not reset while a write is under way */
+    b->core.data[REG_EECR] = e->mode; /* EEPM: not reset while a write is under way */
   } else {
     end_write(b);
   }

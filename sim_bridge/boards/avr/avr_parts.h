@@ -1,19 +1,13 @@
 /* avr_parts.h: what the files of the emulated ATmega328P know of each other.
  *
- * simavr (sim_core.c) executes the less common instructions and keeps the data space. Everything that has to do with
- * time or pins is here: common instructions (avr_instructions.c, avr_opcodes.c), run loop and interrupts (avr_run.c),
- * registers and construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
+ * core/ has the CPU: it executes the instructions and keeps data memory and flash. Here is what has to do with time or
+ * pins: run loop and interrupts (avr_run.c), registers (avr_registers.c), construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
  * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), SPI (avr_spi.c), ADC (avr_converter.c), watchdog (avr_watchdog.c),
- * EEPROM (avr_eeprom.c), program image (avr_image.c), recorder (avr_spans.c), debugger (avr_debug.c), checks of the program (avr_checks.c).
- * Section numbers in these files are those of the ATmega48A/PA/88A/PA/168A/PA/328/P data sheet.
+ * EEPROM (avr_eeprom.c), recorder (avr_spans.c), debugger (avr_debug.c), checks of the program (avr_checks.c).
  *
- * When something happens. Times are CPU cycles; "at cycle t" means at the clock edge with which cycle t begins. An
- * instruction that starts at c and takes n cycles reads and writes I/O registers in the last of them (IN, OUT and SBIC
- * in the only one), c + n - 1, and what it wrote takes effect at its end, c + n. Each source of events has one due
- * time; the core runs no further than the earliest of them, so that every event happens at its own cycle, however long
- * the instruction during which it falls and however the run is cut into calls.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
+ * When something happens: avr_core.h. Each source of events has one due time; the core runs no further than the earliest
+ * of them, so that every event happens at its own cycle, however long the instruction during which it falls and however
+ * the run is cut into calls.
  */
 #ifndef AVR_PARTS_H
 #define AVR_PARTS_H
@@ -23,45 +17,17 @@
 #include <stdint.h>
 
 #include "board.h"
+#include "core/avr_core.h"
 #include "queue.h"
-#include "sim_megax8.h"
 
 #define NEVER UINT64_MAX
 #define NO_ADDRESS UINT32_MAX
-#define RAM_BEGIN 0x100u
-#define BOOT_BEGIN 0x7000u /* of the largest boot section */
 
 /* From an edge at a pin to the flag or the capture that it causes: synchronizer and edge detector, 2.5 to 3.5 cycles
  * (13.2.1, 17.3). */
 #define INPUT_LATENCY_CYCLES 3u
 
-/* Interrupt vectors (12.4); a flag that is raised is a bit of that number in `raised`. */
-enum {
-  VECTOR_INT0 = 1,
-  VECTOR_INT1,
-  VECTOR_PCINT0,
-  VECTOR_PCINT1,
-  VECTOR_PCINT2,
-  VECTOR_WDT,
-  VECTOR_TIMER2_COMPA,
-  VECTOR_TIMER2_COMPB,
-  VECTOR_TIMER2_OVF,
-  VECTOR_TIMER1_CAPT,
-  VECTOR_TIMER1_COMPA,
-  VECTOR_TIMER1_COMPB,
-  VECTOR_TIMER1_OVF,
-  VECTOR_TIMER0_COMPA,
-  VECTOR_TIMER0_COMPB,
-  VECTOR_TIMER0_OVF,
-  VECTOR_SPI,
-  VECTOR_USART_RX,
-  VECTOR_USART_UDRE,
-  VECTOR_USART_TX,
-  VECTOR_ADC,
-  VECTOR_EE_READY,
-  VECTOR_ANALOG_COMP,
-  VECTOR_TWI,
-};
+/* An interrupt flag in `raised` and `enabled`. */
 #define FLAG(vector) (UINT32_C(1) << (vector))
 
 /* Where the events come from; of two at the same cycle the first listed happens first. */
@@ -81,53 +47,9 @@ typedef enum {
   DUE_EEPROM,
   DUE_TWI,
   DUE_SPI,
+  DUE_FLASH,
   DUE_COUNT
 } due_source;
-
-/* I/O registers, by their address in the data space (36). */
-enum {
-  REG_PINB = 0x23,
-  REG_PINC = 0x26,
-  REG_PIND = 0x29,
-  REG_TIFR0 = 0x35,
-  REG_TIFR1 = 0x36,
-  REG_TIFR2 = 0x37,
-  REG_PCIFR = 0x3B,
-  REG_EIFR = 0x3C,
-  REG_EIMSK = 0x3D,
-  REG_EECR = 0x3F,
-  REG_EEDR = 0x40,
-  REG_EEARL = 0x41,
-  REG_EEARH = 0x42,
-  REG_GTCCR = 0x43,
-  REG_SPCR = 0x4C,
-  REG_SPSR = 0x4D,
-  REG_SPDR = 0x4E,
-  REG_SMCR = 0x53,
-  REG_MCUSR = 0x54,
-  REG_MCUCR = 0x55,
-  REG_WDTCSR = 0x60,
-  REG_PCICR = 0x68,
-  REG_EICRA = 0x69,
-  REG_PCMSK0 = 0x6B,
-  REG_TIMSK0 = 0x6E,
-  REG_ADCL = 0x78,
-  REG_ADCH = 0x79,
-  REG_ADCSRA = 0x7A,
-  REG_ADCSRB = 0x7B,
-  REG_ADMUX = 0x7C,
-  REG_TWBR = 0xB8,
-  REG_TWSR = 0xB9,
-  REG_TWAR = 0xBA,
-  REG_TWDR = 0xBB,
-  REG_TWCR = 0xBC,
-  REG_UCSR0A = 0xC0,
-  REG_UCSR0B = 0xC1,
-  REG_UCSR0C = 0xC2,
-  REG_UBRR0L = 0xC4,
-  REG_UBRR0H = 0xC5,
-  REG_UDR0 = 0xC6,
-};
 
 /* ---- ports and edges ---- */
 
@@ -352,44 +274,37 @@ typedef struct {
   uint8_t value;        /* that it ends with */
 } eeprom_state;
 
+/* ---- self-programming ---- */
+
+typedef struct {
+  uint8_t control; /* SPMCSR without RWWSB */
+  bool busy;       /* a page is erased or written */
+  bool blocked;    /* RWWSB */
+  uint16_t page;   /* its address */
+  uint8_t buffer[AVR_PAGE_SIZE];
+} flash_state;
+
 /* ---- the board ---- */
 
-/* What the program reads at a register; `cycle`: of the access. All that is due until then has happened. */
-typedef uint8_t register_read(struct avr_board *b, uint16_t address, uint64_t cycle);
-
-/* The program writes to a register, which takes effect at `end`. All that is due before has happened. */
-typedef void register_write(struct avr_board *b, uint16_t address, uint8_t value, uint64_t end);
-
-typedef struct avr_board {
+struct avr_board {
   board base;
-  avr_t *avr;
-  avr_io_t io; /* our place among simavr's modules */
+  avr_core core;
   uint64_t due[DUE_COUNT];
-  uint64_t next_due; /* the earliest */
-  uint64_t clock;    /* of what is happening now; never goes back */
-  uint32_t raised;   /* interrupt flags */
-  uint32_t enabled;  /* interrupts that are enabled */
-  bool sleeping;
   bool held;            /* in brown-out reset */
   uint8_t reset_wanted; /* bits 1 << board_reset_cause */
   bool crashed;
   char fault[160];
   uint32_t fault_address; /* of the instruction that crashed the board, or NO_ADDRESS */
-  uint32_t code_begin;    /* a jump to what is below is a soft reset, */
-  uint32_t code_end;      /* no instruction of the image stands from here on */
-  uint16_t variables_end; /* in data memory */
-  uint16_t lowest_stack;  /* that the stack may write: variables_end, or RAM_BEGIN while it lies among the variables */
-  uint8_t *covered;       /* by word of flash, see avr_board_cover; NULL: that is not kept */
-  bool one_by_one;        /* each instruction by itself, and by simavr's core */
+  uint16_t variables_end; /* in data memory; the stack's floor is there, or at RAM's begin while it lies among them */
+  uint32_t code_begin;    /* a jump to what is below is a soft reset */
+  uint32_t reset_address; /* where a reset leads: 0, or into the boot section (27.6: the fuse BOOTRST) */
+  bool no_fast_forward;   /* each instruction by itself, sleep cycle by cycle */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   struct avr_debugging *debug;   /* NULL: no debugger */
   board_checks checks;
-  uint8_t
-      *written; /* by address of data memory: cells of RAM that were written since the power came; NULL: not checked */
   board_counters counters;
-  register_read *reads[0x100];   /* by address */
-  register_write *writes[0x100]; /* NULL: it is kept */
   const struct chip_register *unbuilt[0x100];
+  avr_register_write *behind[0x100]; /* of registers that are not whole: what writes the bits that are built */
   board_notes notes;
   uint64_t timer_base[2]; /* when the prescalers were reset: timers 0 and 1, timer 2 */
   port_state port[PORT_COUNT];
@@ -407,15 +322,14 @@ typedef struct avr_board {
   board_outside_log outside_log;
   uint8_t levels[BOARD_PIN_COUNT]; /* see BOARD_PIN_LEVELS */
   eeprom_state eeprom;
-} avr_board;
+  flash_state programming;
+};
+
+_Static_assert(AVR_DATA_SIZE == BOARD_DATA_SIZE, "the board offers the data memory of its core");
 
 /* avr_run.c */
 board_state run_until(avr_board *b, uint64_t until);
-void stop_core(avr_board *b);              /* after the instruction that it executes */
-bool core_stopped(avr_board *b);           /* because it sleeps, or not; false: it cannot go on */
-uint64_t next_of_simavr(const avr_t *avr); /* when the next of simavr's own timers is due, or NEVER */
-void restart(avr_board *b);                /* for the causes in `reset_wanted` */
-void hear_core(avr_board *b);              /* connects to simavr's core; after each of its resets */
+void restart(avr_board *b); /* for the causes in `reset_wanted` */
 void set_due(avr_board *b, due_source source, uint64_t cycle);
 void raise_flag(avr_board *b, uint8_t vector);
 void clear_flag(avr_board *b, uint8_t vector);
@@ -428,22 +342,15 @@ void crash_at(avr_board *b, uint32_t address, const char *format, ...) __attribu
  * has set it to where it is, which may be among the variables; else it has grown there. */
 void check_stack(avr_board *b, uint32_t address, bool set);
 void halt_cpu(avr_board *b, unsigned cycles); /* before the next instruction; to be called by an access */
-/* To be called first by whatever an instruction reads or writes: lets everything happen that is due until then and
- * returns the cycle of the access. */
-uint64_t begin_access(avr_board *b);
-
-static inline unsigned word_of(const uint8_t *bytes, uint32_t at) { return bytes[at] | (unsigned)bytes[at + 1] << 8; }
-
-static inline bool is_code(const avr_board *b, uint32_t address) {
-  return address - b->code_begin < b->code_end - b->code_begin;
-}
+extern const avr_owner_calls CALLS_OF_CORE;
 
 /* avr_registers.c */
-void on_read(avr_board *b, uint16_t address, register_read *read);
-void on_write(avr_board *b, uint16_t address, register_write *write);
+void on_read(avr_board *b, uint16_t address, avr_register_read *read);
+void on_write(avr_board *b, uint16_t address, avr_register_write *write);
 void on_ones(avr_board *b,
-             uint16_t address);    /* SBI writes its bit alone, CBI does nothing: the register acts on ones */
-void registers_init(avr_board *b); /* before all that claim registers */
+             uint16_t address);        /* SBI writes its bit alone, CBI does nothing: the register acts on ones */
+void registers_init(avr_board *b);     /* before all that claim registers */
+void registers_complete(avr_board *b); /* behind them */
 /* Keeps what the instruction at `address` does, and `why` that is not what it seems; all literals. Once for each. */
 void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why);
 void note_place(avr_board *b, uint32_t address, const char *does, const char *what, const char *why); /* at each once */
@@ -519,8 +426,16 @@ void eeprom_init(avr_board *b);
 void eeprom_reset(avr_board *b, bool power_failed);
 void eeprom_due(avr_board *b, uint64_t cycle);
 
+/* avr_flash.c */
+void flash_init(avr_board *b);
+void flash_reset(avr_board *b);
+void flash_due(avr_board *b, uint64_t cycle);
+void flash_store(avr_board *b);                     /* SPM */
+uint8_t flash_load(avr_board *b, uint16_t address); /* LPM while SPMCSR is not 0 */
+void flash_forget_page(avr_board *b);               /* what was loaded for the next page */
+
 /* avr_spans.c; all but spans_free only while there is a recorder */
-uint32_t run_recorded(avr_board *b, uint64_t until); /* as execute_instructions; stops where something is recorded */
+uint32_t run_recorded(avr_board *b, uint64_t until);             /* as avr_run; stops where something is recorded */
 void spans_accept(avr_board *b, uint8_t vector, uint64_t begin); /* an interrupt begins, its flag is still raised */
 void spans_requested(avr_board *b, uint8_t vector, uint64_t cycle);
 void spans_request_gone(avr_board *b, uint8_t vector);
@@ -533,13 +448,13 @@ void check_driven(avr_board *b, uint8_t pin, bool high);      /* board and outsi
 void check_read(avr_board *b, uint8_t port);                  /* by the instruction under way */
 void check_watched(avr_board *b, uint8_t port, uint8_t mask); /* by an interrupt */
 void check_analog(avr_board *b, uint8_t channel);
-void check_access(avr_board *b); /* of the next instruction, to RAM */
+void check_never_written(avr_board *b); /* RAM, which the instruction under way reads */
 
 /* avr_debug.c; all but debug_free only while there is a debugger. False: it has ended the run */
 bool debug_looks(avr_board *b);
 bool debug_before(avr_board *b); /* an instruction */
 bool debug_crashed(avr_board *b);
-uint32_t run_debugged(avr_board *b, uint64_t until); /* as execute_instructions */
+uint32_t run_debugged(avr_board *b, uint64_t until); /* as avr_run */
 void debug_free(avr_board *b);
 
 #endif

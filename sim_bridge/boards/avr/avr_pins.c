@@ -3,8 +3,6 @@
  * An input that the outside drives stays driven whatever the program writes to PORT or DDR; an input that nobody drives
  * reads 1 with a pull-up and else keeps its last level. A pin's level is read one cycle late (14.2.4); its edges reach
  * the interrupts and the capture unit INPUT_LATENCY_CYCLES late.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <stdlib.h>
 
@@ -63,7 +61,7 @@ static uint64_t first_due(const change_queue *q) { return q->first < q->end ? q-
 
 /* Hands edges to what reacts to edges: pin-change, capture and external interrupts. */
 static void see_edges(avr_board *b, uint8_t port, uint8_t moved, uint64_t cycle) {
-  uint8_t watched = b->avr->data[REG_PCMSK0 + port];
+  uint8_t watched = b->core.data[REG_PCMSK0 + port];
   if (port == PORT_B) watched |= 1u << CAPTURE_BIT;
   if (port == PORT_D) watched |= 1u << INT0_BIT | 1u << INT1_BIT | b->clock_pins;
   for (uint8_t bit = 0; bit < 8; bit++) {
@@ -81,9 +79,9 @@ static uint8_t shown(const port_state *p, unsigned bit) {
 
 void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
   port_state *p = &b->port[port];
-  const uint8_t *registers = b->avr->data + ADDRESSES[port];
+  const uint8_t *registers = b->core.data + ADDRESSES[port];
   uint8_t direction = registers[1], value = registers[2];
-  bool pull_ups = !(b->avr->data[REG_MCUCR] & PULL_UPS_DISABLED);
+  bool pull_ups = !(b->core.data[REG_MCUCR] & PULL_UPS_DISABLED);
   port_state before = *p;
   p->out = (uint8_t)((direction | p->forced_out) & ~p->forced_in);
   uint8_t port_level = (uint8_t)(value & ~(p->forced | p->shifted));
@@ -105,7 +103,7 @@ void pins_update(avr_board *b, uint8_t port, uint64_t cycle) {
     uint8_t pin = pin_of(port, bit);
     if (!(changes & 1) || pin == NO_PIN) continue;
     b->counters.edges_out++;
-    if (board_show_edge(&b->base, cycle, pin, shown(p, bit))) stop_core(b);
+    if (board_show_edge(&b->base, cycle, pin, shown(p, bit))) avr_stop(&b->core);
   }
   if (port == PORT_B) spi_pins_moved(b, cycle);
   if (__builtin_expect(!b->checks.on, true)) return;
@@ -126,25 +124,25 @@ static uint8_t read_pins(avr_board *b, uint16_t address, uint64_t cycle) {
 }
 
 static void write_port(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  if (b->avr->data[address] == value) return;
-  b->avr->data[address] = value;
+  if (b->core.data[address] == value) return;
+  b->core.data[address] = value;
   pins_update(b, port_of(address), end);
 }
 
 /* Ones written to PINx toggle PORTx (14.2.2). */
 static void write_pins(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  write_port(b, (uint16_t)(address + 2), b->avr->data[address + 2] ^ value, end);
+  write_port(b, (uint16_t)(address + 2), b->core.data[address + 2] ^ value, end);
 }
 
 static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   for (uint8_t port = 0; port < PORT_COUNT; port++) pins_update(b, port, end);
 }
 
 /* ---- interrupts ---- */
 
 static unsigned external_mode(const avr_board *b, unsigned number) {
-  return b->avr->data[REG_EICRA] >> (2 * number) & 3u;
+  return b->core.data[REG_EICRA] >> (2 * number) & 3u;
 }
 
 /* Mode 0 asks for the interrupt as long as the pin is low. */
@@ -152,7 +150,7 @@ static void update_level_interrupt(avr_board *b, unsigned number) {
   if (external_mode(b, number) != 0) return;
   uint8_t vector = (uint8_t)(VECTOR_INT0 + number);
   bool low = !(b->port[PORT_D].level >> (INT0_BIT + number) & 1u);
-  if (low && (b->enabled & FLAG(vector))) {
+  if (low && (b->core.enabled & FLAG(vector))) {
     raise_flag(b, vector);
   } else {
     clear_flag(b, vector);
@@ -171,7 +169,7 @@ static void external_edge(avr_board *b, unsigned number, uint8_t level) {
 }
 
 static void capture_edge(avr_board *b, uint8_t level, uint64_t cycle) {
-  if (b->avr->data[REG_TCCR1B] & NOISE_FILTER_ON) {
+  if (b->core.data[REG_TCCR1B] & NOISE_FILTER_ON) {
     set_due(b, DUE_NOISE_FILTER, level == b->capture_level ? NEVER : cycle + NOISE_FILTER_CYCLES);
   } else {
     b->capture_level = level;
@@ -189,7 +187,7 @@ void pins_due_seen(avr_board *b, uint64_t cycle) {
   change_queue *q = &b->seen_edges;
   while (first_due(q) <= cycle) {
     pin_change edge = q->items[q->first++];
-    if (b->avr->data[REG_PCMSK0 + edge.port] >> edge.pin & 1) raise_flag(b, (uint8_t)(VECTOR_PCINT0 + edge.port));
+    if (b->core.data[REG_PCMSK0 + edge.port] >> edge.pin & 1) raise_flag(b, (uint8_t)(VECTOR_PCINT0 + edge.port));
     if (edge.port == PORT_B && edge.pin == CAPTURE_BIT) capture_edge(b, edge.level, edge.at);
     if (edge.port == PORT_D && edge.pin == INT0_BIT) external_edge(b, 0, edge.level);
     if (edge.port == PORT_D && edge.pin == INT1_BIT) external_edge(b, 1, edge.level);
@@ -201,21 +199,21 @@ void pins_due_seen(avr_board *b, uint64_t cycle) {
 }
 
 static void write_pin_change_enables(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   for (uint8_t port = 0; port < PORT_COUNT; port++) {
     enable_interrupt(b, (uint8_t)(VECTOR_PCINT0 + port), value >> port & 1);
-    if (value >> port & 1) check_watched(b, port, b->avr->data[REG_PCMSK0 + port]);
+    if (value >> port & 1) check_watched(b, port, b->core.data[REG_PCMSK0 + port]);
   }
 }
 
 static void write_pin_change_mask_d(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   usart_watched(b, value, end);
-  b->avr->data[address] = value;
-  if (b->avr->data[REG_PCICR] >> PORT_D & 1) check_watched(b, PORT_D, value);
+  b->core.data[address] = value;
+  if (b->core.data[REG_PCICR] >> PORT_D & 1) check_watched(b, PORT_D, value);
 }
 
 static void write_external_enables(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   check_watched(b, PORT_D, (uint8_t)(value << INT0_BIT));
   for (uint8_t number = 0; number < 2; number++) {
     enable_interrupt(b, (uint8_t)(VECTOR_INT0 + number), value >> number & 1);
@@ -224,7 +222,7 @@ static void write_external_enables(avr_board *b, uint16_t address, uint8_t value
 }
 
 static void write_external_modes(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   for (uint8_t number = 0; number < 2; number++) update_level_interrupt(b, number);
 }
 
@@ -245,7 +243,7 @@ void pins_due_driven(avr_board *b, uint64_t cycle) {
     p->driven = (uint8_t)(change.level == BOARD_RELEASED ? p->driven & ~mask : p->driven | mask);
     p->driven_level = (uint8_t)(change.level == BOARD_HIGH ? p->driven_level | mask : p->driven_level & ~mask);
     pins_update(b, port, cycle);
-    if (board_stops_at(&b->base, change.pin)) stop_core(b);
+    if (board_stops_at(&b->base, change.pin)) avr_stop(&b->core);
     if (b->outside_log.on) log_driven(b, cycle, change);
     if (b->outside_log.heard) b->outside_log.heard(b->outside_log.heard_context, cycle, change.pin, change.level);
   }
@@ -254,7 +252,7 @@ void pins_due_driven(avr_board *b, uint64_t cycle) {
 
 void pins_drive(avr_board *b, uint64_t at, uint8_t pin, uint8_t level) {
   if (pin >= BOARD_PIN_COUNT || level > BOARD_RELEASED) return;
-  if (at < b->clock) at = b->clock;
+  if (at < b->core.clock) at = b->core.clock;
   remove_from(&b->driven_edges, pin, at);
   insert(&b->driven_edges, (pin_change){at, pin, level, 0});
   set_due(b, DUE_DRIVEN_EDGE, first_due(&b->driven_edges));

@@ -4,8 +4,6 @@
  * A write that changes a bit which is not built does nothing more than to change that bit; a register that the chip does
  * not have keeps nothing. The first of them is noted, with its place and cycle. Only registers with such bits are looked
  * at: the others take no longer.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <string.h>
 
@@ -42,8 +40,8 @@ static const chip_register REGISTERS[] = {
 };
 /* clang-format on */
 
-/* GPIOR0 to 2, SPMCSR (simavr's), SPL, SPH, SREG, PCMSK0 and 1. */
-static const uint8_t KEPT[] = {0x3E, 0x4A, 0x4B, 0x57, 0x5D, 0x5E, 0x5F, 0x6B, 0x6C};
+/* GPIOR0 to 2, SPL, SPH, SREG, PCMSK0 and 1. */
+static const uint8_t KEPT[] = {0x3E, 0x4A, 0x4B, 0x5D, 0x5E, 0x5F, 0x6B, 0x6C};
 
 /* Of the same thing, `address` tells one from the other, or NO_ADDRESS. */
 static void keep_note(avr_board *b, uint32_t place, uint32_t address, const char *does, const char *what,
@@ -54,7 +52,7 @@ static void keep_note(avr_board *b, uint32_t place, uint32_t address, const char
     if (n->does == does && n->what == what && n->why == why && (place == NO_ADDRESS || place == n->address)) return;
   }
   if (all->count == BOARD_NOTES_MAXIMUM) return;
-  all->notes[all->count++] = (board_note){b->avr->cycle, address, does, what, why};
+  all->notes[all->count++] = (board_note){b->core.cycle, address, does, what, why};
 }
 
 void note(avr_board *b, uint32_t address, const char *does, const char *what, const char *why) {
@@ -65,50 +63,32 @@ void note_place(avr_board *b, uint32_t address, const char *does, const char *wh
   keep_note(b, address, address, does, what, why);
 }
 
-static uint8_t read_register(avr_t *avr, avr_io_addr_t address, void *param) {
-  avr_board *b = param;
-  return b->reads[address](b, address, begin_access(b));
-}
+static void write_kept(avr_board *b, uint16_t address, uint8_t value, uint64_t end) { b->core.data[address] = value; }
 
-static void write_register(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
-  avr_board *b = param;
+static void write_not_whole(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   const chip_register *r = b->unbuilt[address];
-  const uint64_t end = begin_access(b) + 1;
-  if (r && ((value ^ avr->data[address]) & r->missing)) note(b, avr->pc, "writes to", r->name, r->why);
-  if (b->writes[address]) {
-    b->writes[address](b, address, value, end);
-  } else {
-    avr->data[address] = value;
-  }
-}
-
-/* SBI and CBI, of which simavr does not say the register. */
-static int write_bit(avr_t *avr, uint8_t bit, uint8_t value, void *param) {
-  if (value) write_register(avr, (avr_io_addr_t)(uintptr_t)param, (uint8_t)(1u << bit), avr->custom.data);
-  return 1;
+  if ((value ^ b->core.data[address]) & r->missing) note(b, b->core.pc, "writes to", r->name, r->why);
+  b->behind[address](b, address, value, end);
 }
 
 static uint8_t read_unbuilt(avr_board *b, uint16_t address, uint64_t cycle) {
   const chip_register *r = b->unbuilt[address];
-  note(b, b->avr->pc, "reads", r->name, r->why);
-  return b->avr->data[address];
+  note(b, b->core.pc, "reads", r->name, r->why);
+  return b->core.data[address];
 }
 
 static void write_reserved(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  if (value) note(b, b->avr->pc, "writes to", "a reserved address", "the ATmega328P has no register there");
+  if (value) note(b, b->core.pc, "writes to", "a reserved address", "the ATmega328P has no register there");
 }
 
-void on_read(avr_board *b, uint16_t address, register_read *read) {
+void on_read(avr_board *b, uint16_t address, avr_register_read *read) {
   // cppcheck-suppress AssignmentAddressToInteger  // a function's type is taken for what it returns
-  b->reads[address] = read;
-  avr_register_io_read(b->avr, address, read_register, b);
+  b->core.reads[address] = read;
 }
 
-void on_write(avr_board *b, uint16_t address, register_write *write) { b->writes[address] = write; }
+void on_write(avr_board *b, uint16_t address, avr_register_write *write) { b->core.writes[address] = write; }
 
-void on_ones(avr_board *b, uint16_t address) {
-  avr_register_io_bit_write(b->avr, address, write_bit, (void *)(uintptr_t)address);
-}
+void on_ones(avr_board *b, uint16_t address) { b->core.ones |= UINT32_C(1) << (address - AVR_IO_BEGIN); }
 
 /* ---- registers of interrupt flags: a bit is read, a 1 clears it ---- */
 
@@ -138,7 +118,7 @@ static uint8_t read_flags(avr_board *b, uint16_t address, uint64_t cycle) {
     if (!vector) continue;
     timer_state *timer = timer_of_vector(b, vector);
     if (timer) timer_bring_up(timer, cycle);
-    if (b->raised & FLAG(vector)) value |= (uint8_t)(1u << bit);
+    if (b->core.raised & FLAG(vector)) value |= (uint8_t)(1u << bit);
   }
   return value;
 }
@@ -155,21 +135,26 @@ static void write_flags(avr_board *b, uint16_t address, uint8_t value, uint64_t 
 }
 
 void registers_init(avr_board *b) {
-  for (uint16_t address = 0x20; address <= 0xFF; address++) {
-    if (memchr(KEPT, address, sizeof KEPT)) continue;
-    b->avr->io[AVR_DATA_TO_IO(address)].w.c = write_register;
-    b->avr->io[AVR_DATA_TO_IO(address)].w.param = b;
-    on_write(b, address, write_reserved);
+  for (uint16_t address = AVR_IO_BEGIN; address < AVR_RAM_BEGIN; address++) {
+    if (!memchr(KEPT, address, sizeof KEPT)) on_write(b, address, write_reserved);
   }
   for (size_t i = 0; i < sizeof REGISTERS / sizeof *REGISTERS; i++) {
     const chip_register *r = &REGISTERS[i];
     b->unbuilt[r->address] = r;
-    on_write(b, r->address, NULL);
+    on_write(b, r->address, write_kept);
     if (r->answers) on_read(b, r->address, read_unbuilt);
   }
   for (size_t i = 0; i < FLAG_REGISTERS; i++) {
     on_read(b, FLAGS[i].address, read_flags);
     on_write(b, FLAGS[i].address, write_flags);
     on_ones(b, FLAGS[i].address);
+  }
+}
+
+void registers_complete(avr_board *b) {
+  for (size_t i = 0; i < sizeof REGISTERS / sizeof *REGISTERS; i++) {
+    const uint8_t address = REGISTERS[i].address;
+    b->behind[address] = b->core.writes[address];
+    on_write(b, address, write_not_whole);
   }
 }

@@ -3,21 +3,16 @@
  * What runs lies on a stack of open spans. A span has ended when the stack pointer is above its value at the span's
  * beginning: RET and RETI take the return address off in one instruction, whatever jumped where before. A program sets
  * the stack pointer by two OUTs, upper half first (avr-libc, gcc); between them it means nothing.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_spans.h"
 
 #include <stdlib.h>
 
 #include "avr_board.h"
-#include "avr_instructions.h"
 #include "avr_parts.h"
-#include "sim_core.h"
+#include "core/avr_decode.h"
 
 #define OPEN_MAXIMUM 64u
-#define OUT_MASK 0xFE0Fu /* OUT A, Rr: 1011 1AAr rrrr AAAA */
-#define OUT_SPH 0xBE0Eu
 #define HALF_WRITTEN_STEPS 3u /* out SPH; out SREG; out SPL */
 
 typedef struct {
@@ -27,7 +22,7 @@ typedef struct {
 } open_span;
 
 typedef struct avr_recorder {
-  instruction_stops stops; /* marked: 1 + index of the function that begins there */
+  avr_stops stops; /* marked: 1 + index of the function that begins there */
   uint64_t patience;
   avr_span *spans;
   size_t first, end, capacity;
@@ -35,8 +30,8 @@ typedef struct avr_recorder {
   avr_extremes extremes[AVR_FUNCTIONS_MAXIMUM];
   open_span open[OPEN_MAXIMUM];
   unsigned open_count;
-  uint64_t request[VECTOR_TWI + 1], next_request[VECTOR_TWI + 1]; /* since when each interrupt is wanted, or NEVER */
-  uint16_t stack;                                                 /* when the core stopped last */
+  uint64_t request[VECTOR_COUNT], next_request[VECTOR_COUNT]; /* since when each interrupt is wanted, or NEVER */
+  uint16_t stack;                                             /* when the core stopped last */
   uint16_t lowest_stack;
   uint8_t half_written; /* steps for which the stack pointer may be half of an old and half of a new one */
   uint64_t hangs_at;    /* unless it sleeps before */
@@ -62,7 +57,7 @@ static void keep(avr_recorder *r, const avr_span *span, uint64_t net) {
 static void open_one(avr_board *b, uint16_t id, uint64_t begin, uint32_t latency, uint16_t stack) {
   avr_recorder *r = b->recorder;
   if (r->open_count == OPEN_MAXIMUM) {
-    crash_at(b, (uint32_t)b->avr->pc, "more than %u functions and interrupts run in each other", OPEN_MAXIMUM);
+    crash_at(b, b->core.pc, "more than %u functions and interrupts run in each other", OPEN_MAXIMUM);
     return;
   }
   avr_span span = {.begin = begin, .executed = b->counters.executed_cycles, .latency = latency, .id = id};
@@ -73,7 +68,7 @@ static void open_one(avr_board *b, uint16_t id, uint64_t begin, uint32_t latency
 static void close_one(avr_board *b) {
   avr_recorder *r = b->recorder;
   open_span *ended = &r->open[--r->open_count];
-  uint64_t gross = b->avr->cycle - ended->span.begin;
+  uint64_t gross = b->core.cycle - ended->span.begin;
   ended->span.gross = (uint32_t)gross;
   ended->span.net = (uint32_t)(gross - ended->interrupted);
   keep(r, &ended->span, gross - ended->interrupted);
@@ -89,7 +84,7 @@ static void close_one(avr_board *b) {
 
 void spans_requested(avr_board *b, uint8_t vector, uint64_t cycle) {
   avr_recorder *r = b->recorder;
-  if (!(b->raised & b->enabled & FLAG(vector))) {
+  if (!(b->core.raised & b->core.enabled & FLAG(vector))) {
     r->request[vector] = NEVER;
   } else if (r->request[vector] == NEVER) {
     r->request[vector] = cycle;
@@ -110,7 +105,7 @@ void spans_accept(avr_board *b, uint8_t vector, uint64_t begin) {
   }
   r->request[vector] = r->next_request[vector]; /* of one whose flag stays: what it was raised for again */
   r->next_request[vector] = NEVER;
-  r->stack = (uint16_t)(_avr_sp_get(b->avr) - 2u);
+  r->stack = (uint16_t)(avr_stack(&b->core) - 2u);
   if (r->stack < r->lowest_stack) r->lowest_stack = r->stack;
   open_one(b, vector, begin, request < begin ? (uint32_t)(begin - request) : 0, r->stack);
 }
@@ -121,7 +116,7 @@ void spans_accept(avr_board *b, uint8_t vector, uint64_t begin) {
  * not be there. Between them its moves need not be seen. */
 static void choose_stops(const avr_board *b) {
   avr_recorder *r = b->recorder;
-  uint16_t allowed = (uint16_t)(b->lowest_stack - 1u);
+  uint16_t allowed = (uint16_t)(b->core.stack_floor - 1u);
   uint16_t highest = r->open_count ? r->open[r->open_count - 1].stack : BOARD_DATA_SIZE - 1u;
   r->stops.lowest = r->lowest_stack > allowed ? r->lowest_stack : allowed;
   r->stops.highest = highest < BOARD_DATA_SIZE ? highest : BOARD_DATA_SIZE - 1u;
@@ -129,9 +124,8 @@ static void choose_stops(const avr_board *b) {
 
 static bool stack_is_whole(avr_board *b, uint32_t address) {
   avr_recorder *r = b->recorder;
-  const uint8_t *flash = b->avr->flash;
-  unsigned opcode = flash[address] | (unsigned)flash[address + 1] << 8;
-  if ((opcode & OUT_MASK) == OUT_SPH) r->half_written = HALF_WRITTEN_STEPS;
+  const avr_instruction *i = &b->core.code[address / 2u];
+  if (i->kind == OUT && i->k == REG_SPH) r->half_written = HALF_WRITTEN_STEPS;
   if (r->half_written) r->half_written--;
   return r->half_written == 0;
 }
@@ -139,44 +133,42 @@ static bool stack_is_whole(avr_board *b, uint32_t address) {
 static void stack_moved(avr_board *b, uint32_t address) {
   avr_recorder *r = b->recorder;
   if (!stack_is_whole(b, address)) return;
-  r->stack = _avr_sp_get(b->avr);
+  r->stack = avr_stack(&b->core);
   if (r->stack < r->lowest_stack) r->lowest_stack = r->stack;
   while (r->open_count && r->stack > r->open[r->open_count - 1].stack) close_one(b);
 }
 
 static void reached(avr_board *b, uint8_t mark) {
   avr_recorder *r = b->recorder;
-  uint16_t id = (uint16_t)(AVR_FUNCTION_IDS + mark - 1u), stack = _avr_sp_get(b->avr);
+  uint16_t id = (uint16_t)(AVR_FUNCTION_IDS + mark - 1u), stack = avr_stack(&b->core);
   const open_span *top = r->open_count ? &r->open[r->open_count - 1] : NULL;
   if (top && top->span.id == id && top->stack == stack) return; /* a loop that goes back to its first instruction */
-  open_one(b, id, b->avr->cycle, 0, stack);
+  open_one(b, id, b->core.cycle, 0, stack);
 }
 
 uint32_t run_recorded(avr_board *b, uint64_t until) {
-  avr_t *avr = b->avr;
+  avr_core *core = &b->core;
   avr_recorder *r = b->recorder;
-  uint64_t start = avr->cycle;
+  uint64_t start = core->cycle;
   if (until > r->hangs_at) until = r->hangs_at;
   if (r->half_written) until = start + 1;
   choose_stops(b);
-  uint32_t address = execute_instructions(b, until, &r->stops), next = (uint32_t)avr->pc;
-  b->counters.executed_cycles += avr->cycle - start;
-  if (avr->state != cpu_Running) core_stopped(b);
-  if (b->crashed || !is_code(b, next)) return address;
-  if (_avr_sp_get(avr) != r->stack || r->half_written) stack_moved(b, address);
+  uint32_t address = avr_run(core, until, &r->stops), next = core->pc;
+  b->counters.executed_cycles += core->cycle - start;
+  if (b->crashed || !avr_is_code(&b->core, next)) return address;
+  if (avr_stack(core) != r->stack || r->half_written) stack_moved(b, address);
   if (r->stops.marked[next / 2]) reached(b, r->stops.marked[next / 2]);
-  if (b->sleeping) {
+  if (b->core.sleeping) {
     r->hangs_at = NEVER;
-  } else if (avr->cycle >= r->hangs_at && !b->crashed) {
-    crash_at(b, (uint32_t)avr->pc, "the program hangs: it has not slept for %llu cycles",
-             (unsigned long long)r->patience);
+  } else if (core->cycle >= r->hangs_at && !b->crashed) {
+    crash_at(b, core->pc, "the program hangs: it has not slept for %llu cycles", (unsigned long long)r->patience);
   }
   return address;
 }
 
 static void begin_patience(avr_board *b) {
   avr_recorder *r = b->recorder;
-  r->hangs_at = r->patience && !b->sleeping ? b->avr->cycle + r->patience : NEVER;
+  r->hangs_at = r->patience && !b->core.sleeping ? b->core.cycle + r->patience : NEVER;
 }
 
 void spans_woke(avr_board *b) { begin_patience(b); }
@@ -187,7 +179,7 @@ void spans_restart(avr_board *b) {
   r->stack = (uint16_t)(BOARD_DATA_SIZE - 1u);
   r->half_written = 0;
   begin_patience(b);
-  for (size_t i = 0; i <= VECTOR_TWI; i++) r->request[i] = r->next_request[i] = NEVER;
+  for (size_t i = 0; i < VECTOR_COUNT; i++) r->request[i] = r->next_request[i] = NEVER;
 }
 
 /* ---- from outside ---- */
@@ -204,7 +196,7 @@ bool avr_board_record(board *self, const avr_watch *watch) {
   avr_recorder *r = calloc(1, sizeof *r);
   if (!r) return false;
   for (size_t i = 0; i < watch->entry_count; i++) {
-    if (watch->entries[i] >= AVR_BOARD_FLASH_SIZE || watch->entries[i] % 2) {
+    if (watch->entries[i] >= AVR_FLASH_SIZE || watch->entries[i] % 2) {
       free(r);
       return false;
     }
@@ -212,12 +204,12 @@ bool avr_board_record(board *self, const avr_watch *watch) {
   }
   r->patience = watch->patience;
   r->only_extremes = watch->only_extremes;
-  r->lowest_stack = _avr_sp_get(b->avr);
+  r->lowest_stack = avr_stack(&b->core);
   spans_free(b);
   b->recorder = r;
   spans_restart(b);
   r->stack = r->lowest_stack;
-  for (uint8_t vector = 1; vector <= VECTOR_TWI; vector++) spans_requested(b, vector, b->avr->cycle);
+  for (uint8_t vector = 1; vector < VECTOR_COUNT; vector++) spans_requested(b, vector, b->core.cycle);
   return true;
 }
 

@@ -5,8 +5,6 @@
  * which nothing ends and nothing is new; cycles, edges and bytes are the same as without it. An interrupt's span begins
  * with the first of its four entry cycles, a function's with its first instruction; each ends with the instruction that
  * takes the return address off the stack.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #ifndef AVR_SPANS_H
 #define AVR_SPANS_H

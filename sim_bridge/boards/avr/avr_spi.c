@@ -7,8 +7,6 @@
  * edge. Where the data sheet does not say: MOSI keeps its last bit between two bytes.
  *
  * Not built: the slave mode.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_parts.h"
 
@@ -84,7 +82,7 @@ void spi_due(avr_board *b, uint64_t cycle) {
 void spi_pins_moved(avr_board *b, uint64_t cycle) {
   const port_state *p = &b->port[PORT_B];
   if (!is_master(b) || ((p->out | p->level) & SS)) return;
-  note(b, b->avr->pc, "is SPI master with", "SS (pin 10) as an input that is low", "MSTR is cleared (19.3.2)");
+  note(b, b->core.pc, "is SPI master with", "SS (pin 10) as an input that is low", "MSTR is cleared (19.3.2)");
   b->spi.control &= (uint8_t)~MSTR;
   complete(b);
   put(b, cycle);
@@ -105,7 +103,7 @@ static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) { re
 static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   spi_state *s = &b->spi;
   if ((value & SPE) && !(value & MSTR)) {
-    note(b, b->avr->pc, "writes to", "SPCR", "the slave mode of the SPI is not built: no transfer ends");
+    note(b, b->core.pc, "writes to", "SPCR", "the slave mode of the SPI is not built: no transfer ends");
   }
   s->control = value;
   enable_interrupt(b, VECTOR_SPI, value & SPIE);
@@ -119,7 +117,7 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
 
 static uint8_t read_status(avr_board *b, uint16_t address, uint64_t cycle) {
   spi_state *s = &b->spi;
-  s->seen = (uint8_t)((b->raised & FLAG(VECTOR_SPI) ? SPIF : 0) | (s->collided ? WCOL : 0));
+  s->seen = (uint8_t)((b->core.raised & FLAG(VECTOR_SPI) ? SPIF : 0) | (s->collided ? WCOL : 0));
   return (uint8_t)(s->seen | (s->doubled ? SPI2X : 0));
 }
 
@@ -136,7 +134,7 @@ static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t e
   spi_state *s = &b->spi;
   clear_seen(b);
   if (s->half < HALVES) {
-    note(b, b->avr->pc, "writes to", "SPDR", "it is dropped: a transfer is under way (WCOL, 19.5.2)");
+    note(b, b->core.pc, "writes to", "SPDR", "it is dropped: a transfer is under way (WCOL, 19.5.2)");
     s->collided = true;
   } else if (is_master(b)) {
     s->out = value;
@@ -145,7 +143,7 @@ static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t e
     plan(b, end + half_period(s));
     put(b, end);
   } else if (!is_on(b)) {
-    note(b, b->avr->pc, "writes to", "SPDR", "nothing is sent: the SPI is off (SPE in SPCR)");
+    note(b, b->core.pc, "writes to", "SPDR", "nothing is sent: the SPI is off (SPE in SPCR)");
   }
 }
 

@@ -8,8 +8,6 @@
  * A match with OCRn sets its flag, and moves its pin, one count after the count became equal (16.7.1). The compare
  * registers are double-buffered in the PWM modes. The prescalers run freely (17). With a clock from outside the divider
  * is 0, and each edge is a count.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_timer_count.h"
 
@@ -94,7 +92,7 @@ static bool buffer_is_waiting(const timer_state *t) {
  * `wanted` that is not set yet. */
 static uint64_t distance_to_next(const timer_state *t, uint32_t wanted) {
   uint64_t next = NEVER;
-  wanted &= ~t->owner->raised;
+  wanted &= ~t->owner->core.raised;
   for (int channel = 0; channel < 2; channel++) {
     if (t->action[channel] == ACTION_NONE && !(wanted & FLAG(t->vector_compare[channel]))) continue;
     uint32_t value = t->compare[channel];
@@ -140,7 +138,7 @@ bool timer_takes_over_pin(const timer_state *t, int channel) {
 
 void timer_force_match(timer_state *t, int channel, uint64_t cycle) {
   avr_board *b = t->owner;
-  if (is_buffered(t)) note(b, b->avr->pc, "forces", "a compare match", "it is dropped in PWM modes (15.9.2, 16.11.3)");
+  if (is_buffered(t)) note(b, b->core.pc, "forces", "a compare match", "it is dropped in PWM modes (15.9.2, 16.11.3)");
   if (is_buffered(t) || t->action[channel] == ACTION_NONE) return;
   set_output(t, channel, level_after_match(t, channel, false), cycle);
 }
@@ -220,7 +218,7 @@ void timer_bring_up(timer_state *t, uint64_t cycle) {
 }
 
 void timer_plan(timer_state *t) {
-  uint64_t next = t->divider ? distance_to_next(t, t->owner->enabled) : NEVER;
+  uint64_t next = t->divider ? distance_to_next(t, t->owner->core.enabled) : NEVER;
   uint64_t due = NEVER;
   if (next != NEVER) {
     uint64_t base = t->owner->timer_base[t->number == 2];
@@ -243,7 +241,7 @@ timer_state *timer_of_vector(avr_board *b, uint8_t vector) {
 
 void timer_capture(avr_board *b, uint8_t level, uint64_t cycle) {
   timer_state *t = &b->timer[1];
-  bool rising = b->avr->data[t->address_control_a + CONTROL_B] & CAPTURE_ON_RISE;
+  bool rising = b->core.data[t->address_control_a + CONTROL_B] & CAPTURE_ON_RISE;
   if (t->top_from == TOP_ICR || (level != 0) != rising) return;
   timer_bring_up(t, cycle);
   t->capture = t->count;

@@ -1,6 +1,4 @@
 /* avr_timer_count.h: what the two files of the timers share: avr_timers.c has the registers, avr_timer_count.c counts.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #ifndef AVR_TIMER_COUNT_H
 #define AVR_TIMER_COUNT_H

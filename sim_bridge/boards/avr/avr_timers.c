@@ -1,8 +1,6 @@
 /* avr_timers.c: the registers of timer/counters 0, 1 and 2 (15.9, 16.11, 18.11), and what is built into each.
  *
  * How they count is in avr_timer_count.c. Each access first brings the timer up to its cycle.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_timer_count.h"
 
@@ -79,7 +77,7 @@ static const timer_state BUILT_IN[3] = {
 
 void timer_clock_edge(avr_board *b, unsigned number, uint8_t level, uint64_t cycle) {
   timer_state *t = &b->timer[number];
-  unsigned clock = b->avr->data[t->address_control_a + CONTROL_B] & 7u;
+  unsigned clock = b->core.data[t->address_control_a + CONTROL_B] & 7u;
   if (clock == (level ? CLOCK_RISING : CLOCK_FALLING)) timer_count_once(t, cycle);
 }
 
@@ -105,8 +103,8 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
   timer_bring_up(t, end);
   unsigned which = address - (unsigned)t->address_control_a;
   uint8_t strobes = (which == CONTROL_C || (which == CONTROL_B && !is_wide(t))) ? value & 0xC0 : 0;
-  b->avr->data[address] = (uint8_t)(value & ~strobes);
-  const uint8_t *control = b->avr->data + t->address_control_a;
+  b->core.data[address] = (uint8_t)(value & ~strobes);
+  const uint8_t *control = b->core.data + t->address_control_a;
   uint8_t wave = (uint8_t)((control[CONTROL_A] & 3) | (control[CONTROL_B] >> 1 & 0x0C));
   const waveform *w = is_wide(t) ? &WIDE[wave] : &NARROW[wave & 7];
   t->mode = (count_mode)w->mode;
@@ -152,7 +150,7 @@ static uint8_t read_high_byte(avr_board *b, uint16_t address, uint64_t cycle) {
 static void write_high_byte(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   timer_state *t = timer_at(b, address);
   if (t->open_half == address - 1 && value != t->high_byte) {
-    note(t->owner, b->avr->pc, "writes", "a high byte behind its low one", "the register took the old one (16.3)");
+    note(t->owner, b->core.pc, "writes", "a high byte behind its low one", "the register took the old one (16.3)");
   }
   t->open_half = address;
   t->high_byte = value;
@@ -179,8 +177,8 @@ static void write_compare(avr_board *b, uint16_t address, uint8_t value, uint64_
   timer_bring_up(t, end);
   int channel = address == t->address_compare[1];
   t->compare_written[channel] = whole(t, address, value);
-  b->avr->data[address] = value;
-  if (is_wide(t)) b->avr->data[address + 1] = t->high_byte;
+  b->core.data[address] = value;
+  if (is_wide(t)) b->core.data[address + 1] = t->high_byte;
   if (!is_buffered(t)) t->compare[channel] = t->compare_written[channel];
   timer_plan(t);
 }
@@ -193,7 +191,7 @@ static void write_capture(avr_board *b, uint16_t address, uint8_t value, uint64_
   if (t->top_from == TOP_ICR) {
     t->capture = capture;
   } else if (t->capture != capture) {
-    note(t->owner, b->avr->pc, "writes to", "ICR1", "it is dropped: the mode has not ICR1 as its top (16.6)");
+    note(t->owner, b->core.pc, "writes to", "ICR1", "it is dropped: the mode has not ICR1 as its top (16.6)");
   }
   timer_plan(t);
 }
@@ -201,7 +199,7 @@ static void write_capture(avr_board *b, uint16_t address, uint8_t value, uint64_
 static void write_mask(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   timer_state *t = timer_at(b, address);
   timer_bring_up(t, end);
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   enable_interrupt(t->owner, t->vector_overflow, value & 1);
   enable_interrupt(t->owner, t->vector_compare[0], value & 2);
   enable_interrupt(t->owner, t->vector_compare[1], value & 4);

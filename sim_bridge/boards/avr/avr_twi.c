@@ -7,8 +7,6 @@
  * waits half a period; the data sheet does not say. After each of them but STOP, TWINT is set and SCL held low.
  *
  * Not built: slave modes (own addresses are never answered), bus errors by misplaced START and STOP of others.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include "avr_parts.h"
 
@@ -205,7 +203,7 @@ static void begin(avr_board *b, uint64_t cycle) {
 
 /* ---- registers ---- */
 
-static bool flag_is_set(const avr_board *b) { return b->raised & FLAG(VECTOR_TWI); }
+static bool flag_is_set(const avr_board *b) { return b->core.raised & FLAG(VECTOR_TWI); }
 
 static void switch_off(avr_board *b, uint64_t cycle) {
   port_state *p = &b->port[PORT_C];
@@ -247,7 +245,7 @@ static uint8_t read_status(avr_board *b, uint16_t address, uint64_t cycle) {
 static void write_status(avr_board *b, uint16_t address, uint8_t value, uint64_t end) { b->twi.prescaler = value & 3u; }
 
 static void write_rate(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   b->twi.rate = value;
 }
 
@@ -260,14 +258,14 @@ static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t e
     t->control &= (uint8_t)~TWWC;
     t->data = value;
   } else {
-    if (value != t->data) note(b, b->avr->pc, "writes to", "TWDR", "it is dropped: TWINT is not set (22.9.4)");
+    if (value != t->data) note(b, b->core.pc, "writes to", "TWDR", "it is dropped: TWINT is not set (22.9.4)");
     t->control |= TWWC;
   }
 }
 
 void twi_reset(avr_board *b) {
   b->twi = (twi_state){.data = 0xFF, .status = STATUS_NONE};
-  b->avr->data[REG_TWAR] = 0xFE;
+  b->core.data[REG_TWAR] = 0xFE;
   plan(b, TWI_IDLE, NEVER);
 }
 

@@ -10,8 +10,6 @@
  * A byte is complete for the outside at the end of its stop bit, whatever level that has. The board's bits show at pin 1
  * to whom the program lets look there: its reads of PIND, and while PCINT17 is unmasked every edge. Else the pin rests high,
  * as pin 0 does, and bits cost nothing. Synchronous and SPI modes, the ninth bit's value and parity checks are not built.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <stdlib.h>
 
@@ -105,7 +103,7 @@ static unsigned bits_before_stop(const usart_state *u) { return 1u + u->data_bit
  * the bit (20.8.3). */
 static uint64_t sampled_after(const avr_board *b) {
   const usart_state *u = &b->usart;
-  bool double_speed = b->avr->data[REG_UCSR0A] & U2X;
+  bool double_speed = b->core.data[REG_UCSR0A] & U2X;
   uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
   return bits_before_stop(u) * bit_time + bit_time * (double_speed ? 10 : 9) / 16;
 }
@@ -134,7 +132,7 @@ static void start_bit(avr_board *b) {
 static void stop_bit(avr_board *b) {
   usart_state *u = &b->usart;
   uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
-  received_byte r = {.arrived = b->clock};
+  received_byte r = {.arrived = b->core.clock};
   for (unsigned bit = 0; bit < u->data_bits && bit < 8; bit++) {
     if (line_level(&u->to_board, u->from + bit_time * (2 * bit + 3) / 2)) r.byte |= (uint8_t)(1u << bit);
   }
@@ -255,12 +253,12 @@ static void begin_frame(avr_board *b, uint8_t byte, uint64_t cycle) {
   if (b->outside_log.on) log_frame(&b->outside_log.from_board, &u->from_board.frames[u->from_board.end - 1]);
   if (u->outside_start == NEVER) plan_outside(b);
   set_due(b, DUE_TRANSMITTER, cycle + (uint64_t)u->frame_bits * u->bit_time);
-  if (b->avr->data[REG_PCMSK0 + PORT_D] & TX_MASK) set_due(b, DUE_BIT, cycle);
+  if (b->core.data[REG_PCMSK0 + PORT_D] & TX_MASK) set_due(b, DUE_BIT, cycle);
 }
 
 static void drive_transmit_pin(avr_board *b, uint64_t cycle) {
   port_state *p = &b->port[PORT_D];
-  bool on = (b->avr->data[REG_UCSR0B] & TXEN) || b->usart.sending;
+  bool on = (b->core.data[REG_UCSR0B] & TXEN) || b->usart.sending;
   bool was_on = p->forced_out & TX_MASK;
   if (on == was_on) return;
   p->forced_out ^= TX_MASK;
@@ -286,8 +284,8 @@ void usart_due_transmitter(avr_board *b, uint64_t cycle) {
 
 static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   usart_state *u = &b->usart;
-  if (!(b->avr->data[REG_UCSR0B] & TXEN) || u->holding) {
-    note(b, b->avr->pc, "writes to", "UDR0", "it is dropped: TXEN0 or UDRE0 is not set (20.11.1)");
+  if (!(b->core.data[REG_UCSR0B] & TXEN) || u->holding) {
+    note(b, b->core.pc, "writes to", "UDR0", "it is dropped: TXEN0 or UDRE0 is not set (20.11.1)");
     return;
   }
   if (u->sending) {
@@ -303,7 +301,7 @@ static void write_data(avr_board *b, uint16_t address, uint8_t value, uint64_t e
 
 static void update_settings(avr_board *b) {
   static const uint8_t sizes[8] = {5, 6, 7, 8, 8, 8, 8, 9};
-  const uint8_t *data = b->avr->data;
+  const uint8_t *data = b->core.data;
   usart_state *u = &b->usart;
   uint32_t divisor = (data[REG_UBRR0L] | (uint32_t)(data[REG_UBRR0H] & 0x0F) << 8) + 1;
   u->bit_time = divisor * (data[REG_UCSR0A] & U2X ? 8 : 16);
@@ -316,10 +314,10 @@ static void update_settings(avr_board *b) {
 
 static uint8_t read_status(avr_board *b, uint16_t address, uint64_t cycle) {
   const usart_state *u = &b->usart;
-  uint8_t value = b->avr->data[address] & (U2X | MPCM);
-  if (b->raised & FLAG(VECTOR_USART_RX)) value |= RXC;
-  if (b->raised & FLAG(VECTOR_USART_TX)) value |= TXC;
-  if (b->raised & FLAG(VECTOR_USART_UDRE)) value |= UDRE;
+  uint8_t value = b->core.data[address] & (U2X | MPCM);
+  if (b->core.raised & FLAG(VECTOR_USART_RX)) value |= RXC;
+  if (b->core.raised & FLAG(VECTOR_USART_TX)) value |= TXC;
+  if (b->core.raised & FLAG(VECTOR_USART_UDRE)) value |= UDRE;
   if (u->buffered && u->buffer[0].framing_error) value |= FE;
   if (u->buffered && u->buffer[0].overrun) value |= DOR;
   return value;
@@ -327,13 +325,13 @@ static uint8_t read_status(avr_board *b, uint16_t address, uint64_t cycle) {
 
 static void write_status(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   if (value & TXC) clear_flag(b, VECTOR_USART_TX);
-  b->avr->data[address] = value & (U2X | MPCM);
+  b->core.data[address] = value & (U2X | MPCM);
   update_settings(b);
 }
 
 static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   usart_state *u = &b->usart;
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   enable_interrupt(b, VECTOR_USART_RX, value & RXCIE);
   enable_interrupt(b, VECTOR_USART_TX, value & TXCIE);
   enable_interrupt(b, VECTOR_USART_UDRE, value & UDRIE);
@@ -355,7 +353,7 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
 }
 
 static void write_setting(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  b->avr->data[address] = value;
+  b->core.data[address] = value;
   update_settings(b);
 }
 
@@ -366,7 +364,7 @@ static void write_setting(avr_board *b, uint16_t address, uint8_t value, uint64_
 static void time_frames(avr_board *b) {
   usart_state *u = &b->usart;
   bool waits = u->receiver == RECEIVER_OFF;
-  uint64_t now = b->clock << FRACTION, start = waits ? HELD : now + u->line_bit_time;
+  uint64_t now = b->core.clock << FRACTION, start = waits ? HELD : now + u->line_bit_time;
   u->line_free = waits ? HELD : now;
   for (size_t i = u->to_board.first; i < u->to_board.end; i++) {
     line_frame *f = &u->to_board.frames[i];
@@ -378,10 +376,10 @@ static void time_frames(avr_board *b) {
 
 void usart_send(avr_board *b, uint64_t at, const uint8_t *bytes, size_t count) {
   usart_state *u = &b->usart;
-  if (at < b->clock) at = b->clock;
+  if (at < b->core.clock) at = b->core.clock;
   uint64_t start = at << FRACTION;
   if (start < u->line_free) start = u->line_free;
-  if (u->receiver == RECEIVER_OFF) forget_line(&u->to_board, b->clock << FRACTION);
+  if (u->receiver == RECEIVER_OFF) forget_line(&u->to_board, b->core.clock << FRACTION);
   for (size_t i = 0; i < count; i++) {
     put_on_line(&u->to_board, (line_frame){start, u->line_bit_time, LINE_BITS, bytes[i], false});
     start += (uint64_t)LINE_BITS * u->line_bit_time;
@@ -414,7 +412,7 @@ void usart_line_rate(avr_board *b, uint32_t baud) {
 
 void usart_reset(avr_board *b) {
   usart_state *u = &b->usart;
-  b->avr->data[REG_UCSR0C] = 0x06;
+  b->core.data[REG_UCSR0C] = 0x06;
   u->sending = u->holding = false;
   u->receiver = RECEIVER_OFF;
   empty_receiver(u);

@@ -2,8 +2,6 @@
  * interrupt and system reset mode (WDE and WDIE) the first time-out asks for the interrupt, whose execution clears WDIE;
  * the next one resets, whether the interrupt was executed or not (table 11-1). Of each reset it keeps where the program was:
  * when the interrupt was executed, or else at the reset.
- *
- * SPDX-License-Identifier: GPL-3.0-or-later (linked with simavr)
  */
 #include <stdlib.h>
 
@@ -15,14 +13,14 @@
 enum { WDIF = 0x80, WDIE = 0x40, WDP3 = 0x20, WDCE = 0x10, WDE = 0x08, WDP_LOW = 0x07, WDRF = 0x08 };
 
 static uint64_t period(const avr_board *b) {
-  uint8_t control = b->avr->data[REG_WDTCSR];
+  uint8_t control = b->core.data[REG_WDTCSR];
   unsigned step = (control & WDP_LOW) | (control & WDP3 ? 8u : 0u);
   if (step > 9) step = 9; /* reserved */
   return (UINT64_C(2048) << step) * (BOARD_CLOCK_HZ / OSCILLATOR_HZ);
 }
 
 static void plan(avr_board *b) {
-  bool runs = b->avr->data[REG_WDTCSR] & (WDE | WDIE);
+  bool runs = b->core.data[REG_WDTCSR] & (WDE | WDIE);
   set_due(b, DUE_WATCHDOG, runs ? b->watchdog.since + period(b) : NEVER);
 }
 
@@ -32,14 +30,14 @@ static void note_reset(avr_board *b, uint64_t cycle) {
   bool warned = b->watchdog.warned_at != NO_ADDRESS;
   log->resets[log->end++] = (board_watchdog_reset){
       .cycle = warned ? b->watchdog.warned_cycle : cycle,
-      .address = warned ? b->watchdog.warned_at : (uint32_t)b->avr->pc,
+      .address = warned ? b->watchdog.warned_at : b->core.pc,
   };
 }
 
 void watchdog_due(avr_board *b, uint64_t cycle) {
-  const uint8_t *control = &b->avr->data[REG_WDTCSR];
+  const uint8_t *control = &b->core.data[REG_WDTCSR];
   b->watchdog.since = cycle;
-  bool warned = (*control & WDE) && (b->raised & FLAG(VECTOR_WDT));
+  bool warned = (*control & WDE) && (b->core.raised & FLAG(VECTOR_WDT));
   if ((*control & WDIE) && !warned) {
     b->watchdog.warned_at = NO_ADDRESS; /* not yet, this time */
     raise_flag(b, VECTOR_WDT);
@@ -52,9 +50,9 @@ void watchdog_due(avr_board *b, uint64_t cycle) {
 
 /* Interrupt and reset mode: the interrupt was the warning. */
 void watchdog_acknowledged(avr_board *b) {
-  uint8_t *control = &b->avr->data[REG_WDTCSR];
-  b->watchdog.warned_at = (uint32_t)b->avr->pc;
-  b->watchdog.warned_cycle = b->avr->cycle;
+  uint8_t *control = &b->core.data[REG_WDTCSR];
+  b->watchdog.warned_at = b->core.pc;
+  b->watchdog.warned_cycle = b->core.cycle;
   if (!(*control & WDE)) return;
   *control &= (uint8_t)~WDIE;
   enable_interrupt(b, VECTOR_WDT, false);
@@ -62,21 +60,21 @@ void watchdog_acknowledged(avr_board *b) {
 
 /* With interrupts on it is not the warning's interrupt that kicks: the program has come to itself. */
 void watchdog_kick(avr_board *b) {
-  if (b->avr->sreg[S_I]) b->watchdog.warned_at = NO_ADDRESS;
-  b->watchdog.since = b->avr->cycle + 1;
+  if (b->core.flags.i) b->watchdog.warned_at = NO_ADDRESS;
+  b->watchdog.since = b->core.cycle + 1;
   if (b->due[DUE_WATCHDOG] != NEVER) plan(b);
 }
 
 static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) {
-  uint8_t value = b->avr->data[address] & (WDIE | WDP3 | WDE | WDP_LOW);
+  uint8_t value = b->core.data[address] & (WDIE | WDP3 | WDE | WDP_LOW);
   if (cycle < b->watchdog.change_until) value |= WDCE;
-  if (b->raised & FLAG(VECTOR_WDT)) value |= WDIF;
+  if (b->core.raised & FLAG(VECTOR_WDT)) value |= WDIF;
   return value;
 }
 
 static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   bool may_change = end <= b->watchdog.change_until;
-  uint8_t old = b->avr->data[address];
+  uint8_t old = b->core.data[address];
   uint8_t control = old & (WDP3 | WDP_LOW | WDE);
   if (may_change && !(value & WDCE)) { /* the second write of the timed sequence */
     control = value & (WDP3 | WDP_LOW | WDE);
@@ -85,12 +83,12 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
     b->watchdog.change_until = end + CHANGE_CYCLES;
   }
   control |= value & WDE; /* can always be set */
-  if (b->avr->data[REG_MCUSR] & WDRF) control |= WDE;
+  if (b->core.data[REG_MCUSR] & WDRF) control |= WDE;
   if (!(value & WDCE) && ((value ^ control) & (WDP3 | WDP_LOW | WDE))) {
-    note(b, b->avr->pc, "writes to", "WDTCSR", "it is dropped: WDRF is set, or WDCE was not just before (11.9.2)");
+    note(b, b->core.pc, "writes to", "WDTCSR", "it is dropped: WDRF is set, or WDCE was not just before (11.9.2)");
   }
   control |= value & WDIE;
-  b->avr->data[address] = control;
+  b->core.data[address] = control;
   if (!(old & (WDE | WDIE))) b->watchdog.since = end;
   if (value & WDIF) clear_flag(b, VECTOR_WDT);
   enable_interrupt(b, VECTOR_WDT, control & WDIE);
@@ -99,7 +97,7 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
 
 void watchdog_reset(avr_board *b, uint64_t cycle) {
   b->watchdog = (watchdog_state){.since = cycle, .warned_at = NO_ADDRESS};
-  b->avr->data[REG_WDTCSR] = b->avr->data[REG_MCUSR] & WDRF ? WDE : 0;
+  b->core.data[REG_WDTCSR] = b->core.data[REG_MCUSR] & WDRF ? WDE : 0;
   plan(b);
 }
 

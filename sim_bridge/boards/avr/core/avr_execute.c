@@ -1,0 +1,528 @@
+/* avr_execute.c: the interpreter. One `switch` over the kind of each decoded instruction, after the AVR instruction set
+ * manual; cycles are those of AVRe+ with a 16-bit program counter.
+ *
+ * What touches registers, RAM and flash is done in the case itself. Whatever reaches an I/O register, leaves RAM, or takes
+ * the stack below its floor goes through `avr_load` and `avr_store`, and hands the core over to its owner meanwhile.
+ */
+#include <string.h>
+
+#include "avr_arithmetic.h"
+#include "avr_decode.h"
+
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+#define NOT_INLINE __attribute__((noinline))
+
+enum { Z = 30 };
+
+/* ---- from outside ---- */
+
+uint8_t avr_core_flags(const avr_core *core) { return all_flags(&core->flags); }
+
+void avr_core_set_flags(avr_core *core, uint8_t sreg) { core->flags = flags_of(sreg); }
+
+void avr_core_reset(avr_core *core, uint32_t pc) {
+  memset(core->data + AVR_IO_BEGIN, 0, AVR_RAM_BEGIN - AVR_IO_BEGIN);
+  put_word(core->data, REG_SPL, AVR_DATA_SIZE - 1u);
+  avr_core_set_flags(core, 0);
+  core->pc = pc;
+  core->raised = core->enabled = 0;
+  core->one_more = core->sleeping = false;
+}
+
+/* ---- data memory ---- */
+
+static inline bool in_ram(uint16_t address) {
+  return (uint16_t)(address - AVR_RAM_BEGIN) < AVR_DATA_SIZE - AVR_RAM_BEGIN;
+}
+
+static inline bool in_io(uint16_t address) { return (uint16_t)(address - AVR_IO_BEGIN) < AVR_RAM_BEGIN - AVR_IO_BEGIN; }
+
+/* Everything that is due until `cycle` happens, and it is then. */
+static void reach(avr_core *core, uint64_t cycle) {
+  if (core->next_due <= cycle) core->calls->happen(core->owner, cycle);
+  if (cycle > core->clock) core->clock = cycle;
+}
+
+/* Behind the end of memory is nothing; here it is RAM again. */
+static uint16_t within_memory(avr_core *core, uint16_t address) {
+  if (address < AVR_DATA_SIZE) return address;
+  if (core->calls && core->calls->beyond_memory) core->calls->beyond_memory(core->owner);
+  return (uint16_t)(AVR_RAM_BEGIN + (address - AVR_RAM_BEGIN) % (AVR_DATA_SIZE - AVR_RAM_BEGIN));
+}
+
+/* I was clear, or RETI has set it: one instruction is executed before an interrupt. Where none can come before that has
+ * ended, there is no need to stop. */
+static void let_interrupts_in(avr_core *core, uint64_t end) {
+  if (!(core->raised & core->enabled) && core->next_due > end) return;
+  core->one_more = true;
+  avr_stop(core);
+}
+
+static void store_flags(avr_core *core, uint8_t sreg, uint64_t end) {
+  const bool before = core->flags.i;
+  core->data[REG_SREG] = sreg;
+  core->flags = flags_of(sreg);
+  if (core->flags.i && !before) let_interrupts_in(core, end);
+}
+
+static NOT_INLINE uint8_t avr_load(avr_core *core, uint16_t address, uint64_t cycle) {
+  address = within_memory(core, address);
+  if (in_io(address)) {
+    if (address == REG_SREG) return core->data[address] = all_flags(&core->flags);
+    avr_register_read *read = core->reads[address];
+    if (!read) return core->data[address];
+    reach(core, cycle);
+    return core->data[address] = read(core->owner, address, cycle);
+  }
+  if (core->written && in_ram(address) && !core->written[address]) {
+    core->calls->never_written(core->owner);
+    core->written[address] = 1;
+  }
+  return core->data[address];
+}
+
+static NOT_INLINE void avr_store(avr_core *core, uint16_t address, uint8_t value, uint64_t cycle) {
+  address = within_memory(core, address);
+  if (in_io(address)) {
+    avr_register_write *write = core->writes[address];
+    if (address == REG_SREG) {
+      store_flags(core, value, cycle + 1u);
+    } else if (write) {
+      reach(core, cycle);
+      write(core->owner, address, value, cycle + 1u);
+    } else {
+      core->data[address] = value;
+    }
+    return;
+  }
+  if (core->written) core->written[address] = 1;
+  core->data[address] = value;
+}
+
+/* Instructions of one bit of an I/O register read it and write all of it, but where a written one alone acts. */
+static NOT_INLINE void store_bit(avr_core *core, const avr_instruction *i, uint64_t cycle) {
+  const uint16_t address = (uint16_t)i->k;
+  const bool acts_on_ones = core->ones >> (address - AVR_IO_BEGIN) & 1u;
+  if (acts_on_ones && i->kind == CBI) return;
+  const uint8_t before = acts_on_ones ? 0 : avr_load(core, address, cycle);
+  avr_store(core, address, (uint8_t)(i->kind == SBI ? before | i->r : before & ~i->r), cycle);
+}
+
+/* ---- what the interpreter keeps to itself ---- */
+
+typedef struct {
+  avr_flags f;
+  uint64_t cycle;
+  uint32_t at, pc; /* of the instruction at hand, and of the next */
+  uint32_t takes;  /* cycles */
+  bool moves_stack;
+} state;
+
+/* Around whatever may look at the core or change it. */
+static ALWAYS_INLINE void hand_over(avr_core *core, const state *s) {
+  core->flags = s->f;
+  core->pc = s->at;
+  core->cycle = s->cycle;
+}
+
+static ALWAYS_INLINE void take_back(const avr_core *core, state *s) {
+  s->f = core->flags;
+  s->cycle = core->cycle;
+  s->moves_stack = true; /* for all that is known */
+}
+
+static ALWAYS_INLINE uint8_t load(avr_core *core, state *s, const uint8_t *written, uint16_t address, unsigned later) {
+  if (in_ram(address) && (!written || written[address])) return core->data[address];
+  hand_over(core, s);
+  const uint8_t value = avr_load(core, address, s->cycle + later);
+  take_back(core, s);
+  return value;
+}
+
+static ALWAYS_INLINE void store(avr_core *core, state *s, uint8_t *written, uint16_t address, uint8_t value,
+                                unsigned later) {
+  if (in_ram(address)) {
+    core->data[address] = value;
+    if (written) written[address] = 1;
+    return;
+  }
+  hand_over(core, s);
+  avr_store(core, address, value, s->cycle + later);
+  take_back(core, s);
+}
+
+/* By X, Y or Z, which then is `change` above `address`. What it loads may be half of the pointer; what it stores is what the
+ * register had before. */
+static ALWAYS_INLINE void load_moving(avr_core *core, state *s, const uint8_t *written, const avr_instruction *i,
+                                      uint16_t address, unsigned change) {
+  const uint8_t value = load(core, s, written, address, 1);
+  put_word(core->data, i->r, address + change);
+  core->data[i->d] = value;
+}
+
+static ALWAYS_INLINE void store_moving(avr_core *core, state *s, uint8_t *written, const avr_instruction *i,
+                                       uint16_t address, unsigned change) {
+  store(core, s, written, address, core->data[i->d], 1);
+  put_word(core->data, i->r, address + change);
+}
+
+/* ---- the stack ---- */
+
+/* The owner sees where the stack pointer is once it is whole, at the end of the instruction. */
+static void tell_of_stack(avr_core *core, uint16_t before, uint32_t takes) {
+  if (!core->calls || !core->calls->left_stack) return;
+  core->cycle += takes;
+  core->calls->left_stack(core->owner, core->pc, before);
+  core->cycle -= takes;
+}
+
+static NOT_INLINE void push_anywhere(avr_core *core, unsigned value, unsigned bytes, uint32_t takes) {
+  const uint16_t stack = avr_stack(core);
+  for (unsigned n = 0; n < bytes; n++)
+    avr_store(core, (uint16_t)(stack - n), (uint8_t)(value >> 8 * n), core->cycle + 1u);
+  put_word(core->data, REG_SPL, stack - bytes);
+  tell_of_stack(core, stack, takes);
+}
+
+static NOT_INLINE unsigned pop_anywhere(avr_core *core, unsigned bytes, uint32_t takes) {
+  const uint16_t stack = avr_stack(core);
+  unsigned value = 0;
+  for (unsigned n = 1; n <= bytes; n++) value = value << 8 | avr_load(core, (uint16_t)(stack + n), core->cycle + 1u);
+  put_word(core->data, REG_SPL, stack + bytes);
+  tell_of_stack(core, stack, takes);
+  return value;
+}
+
+/* One byte, or an address: two, the low one first, so that it lies above. */
+static ALWAYS_INLINE void push(avr_core *core, state *s, uint8_t *written, unsigned value, unsigned bytes) {
+  const uint16_t stack = avr_stack(core);
+  s->moves_stack = true;
+  if (stack + 1u < core->stack_floor + bytes || stack >= AVR_DATA_SIZE) {
+    hand_over(core, s);
+    push_anywhere(core, value, bytes, s->takes);
+    take_back(core, s);
+    return;
+  }
+  for (unsigned n = 0; n < bytes; n++) {
+    core->data[stack - n] = (uint8_t)(value >> 8 * n);
+    if (written) written[stack - n] = 1;
+  }
+  put_word(core->data, REG_SPL, stack - bytes);
+}
+
+static ALWAYS_INLINE unsigned pop(avr_core *core, state *s, const uint8_t *written, unsigned bytes) {
+  const uint16_t stack = avr_stack(core), first = (uint16_t)(stack + 1u), last = (uint16_t)(stack + bytes);
+  s->moves_stack = true;
+  if (!in_ram(first) || !in_ram(last) || (written && (!written[first] || !written[last]))) {
+    hand_over(core, s);
+    const unsigned value = pop_anywhere(core, bytes, s->takes);
+    take_back(core, s);
+    return value;
+  }
+  put_word(core->data, REG_SPL, last);
+  return bytes == 1u ? core->data[first] : (unsigned)core->data[first] << 8 | core->data[last];
+}
+
+void avr_enter_interrupt(avr_core *core, unsigned vector) {
+  const uint16_t stack = avr_stack(core);
+  avr_store(core, stack, (uint8_t)(core->pc >> 1), core->cycle + 1u);
+  avr_store(core, (uint16_t)(stack - 1u), (uint8_t)(core->pc >> 9), core->cycle + 1u);
+  put_word(core->data, REG_SPL, stack - 2u);
+  core->flags.i = 0;
+  core->pc = vector * 4u;
+}
+
+/* ---- jumps ---- */
+
+/* Where no code is it stops. */
+static ALWAYS_INLINE void jump(avr_core *core, state *s, uint32_t address) {
+  s->pc = address;
+  if (!avr_is_code(core, address)) avr_stop(core);
+}
+
+static ALWAYS_INLINE void branch(state *s, const avr_instruction *i, bool taken) {
+  if (!taken) return;
+  s->pc = i->k;
+  s->takes = 2;
+}
+
+/* A word of the next instruction takes a cycle. */
+static ALWAYS_INLINE void skip(state *s, const avr_instruction *i, bool skips) {
+  if (!skips) return;
+  s->pc += i->skips;
+  s->takes = 1u + i->skips / 2u;
+}
+
+/* ---- the rest of the state ---- */
+
+static NOT_INLINE uint8_t load_program(avr_core *core, uint16_t address) {
+  if (core->data[REG_SPMCSR] && core->calls && core->calls->load_program) {
+    return core->calls->load_program(core->owner, address);
+  }
+  return address < AVR_FLASH_SIZE ? core->flash[address] : 0xFF;
+}
+
+static ALWAYS_INLINE uint8_t program_byte(avr_core *core, state *s) {
+  const uint16_t address = word_at(core->data, Z);
+  if (address < AVR_FLASH_SIZE && !core->data[REG_SPMCSR]) return core->flash[address];
+  hand_over(core, s);
+  const uint8_t value = load_program(core, address);
+  take_back(core, s);
+  return value;
+}
+
+/* By its number in SREG. */
+static NOT_INLINE bool has_flag(avr_flags f, unsigned number) { return all_flags(&f) >> number & 1u; }
+
+static void set_flag(avr_core *core, unsigned number, bool set) {
+  const unsigned bit = 1u << number, before = all_flags(&core->flags);
+  core->flags = flags_of((uint8_t)(set ? before | bit : before & ~bit));
+}
+
+static ALWAYS_INLINE uint32_t cycles_of_rare(unsigned kind) { return kind == SBI || kind == CBI ? 2 : 1; }
+
+/* What is left of the instructions; the core is handed over. Without an owner WDR and SPM do nothing. */
+static NOT_INLINE void do_rare(avr_core *core, const avr_instruction *i, uint32_t takes) {
+  static const avr_owner_calls NOTHING = {0};
+  const avr_owner_calls *calls = core->calls ? core->calls : &NOTHING;
+  const uint8_t value = core->data[i->d];
+  const uint16_t stack = avr_stack(core);
+  switch (i->kind) {
+    case SBI:
+    case CBI:
+      store_bit(core, i, core->cycle + 1u);
+      break;
+    case BSET:
+    case BCLR:
+      set_flag(core, i->r, i->kind == BSET);
+      break;
+    case OUT_SREG:
+      store_flags(core, value, core->cycle + 1u);
+      break;
+    case OUT_SPL:
+      core->data[REG_SPL] = value;
+      tell_of_stack(core, stack, takes);
+      break;
+    case SLEEP:
+      core->sleeping = core->data[REG_SMCR] & 1u; /* SE */
+      avr_stop(core);
+      break;
+    case WDR:
+      if (calls->watchdog_reset) calls->watchdog_reset(core->owner);
+      break;
+    case SPM:
+      if (calls->store_program) calls->store_program(core->owner);
+      break;
+    case ERASED:
+      if (calls->runs_erased) calls->runs_erased(core->owner);
+      break;
+    default: /* INVALID */
+      if (calls->cannot_go_on) calls->cannot_go_on(core->owner, word_at(core->flash, core->pc));
+      avr_stop(core);
+  }
+}
+
+/* ---- the interpreter ---- */
+
+#define D data[i->d]
+#define R data[i->r]
+#define K ((uint8_t)i->k)
+#define POINTER word_at(data, i->r)
+
+static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_t *written, uint8_t *covered) {
+  uint8_t *const data = core->data;
+  const avr_instruction *const code = core->code;
+  state s = {.f = core->flags, .cycle = core->cycle, .pc = core->pc};
+  do {
+    const avr_instruction *const i = &code[s.pc / 2u];
+    s.at = s.pc;
+    s.pc += 2;
+    s.takes = 1;
+    s.moves_stack = false;
+    /* clang-format off */
+    switch (i->kind) {
+      case NOP: break;
+      case MOV: D = R; break;
+      case MOVW: put_word(data, i->d, POINTER); break;
+      case LDI: D = K; break;
+
+      case ADD: D = add(&s.f, D, R, 0); break;
+      case ADC: D = add(&s.f, D, R, s.f.c); break;
+      case SUB: D = subtract(&s.f, D, R); break;
+      case SUBI: D = subtract(&s.f, D, K); break;
+      case SBC: D = subtract_with_carry(&s.f, D, R); break;
+      case SBCI: D = subtract_with_carry(&s.f, D, K); break;
+      case CP: subtract(&s.f, D, R); break;
+      case CPI: subtract(&s.f, D, K); break;
+      case CPC: subtract_with_carry(&s.f, D, R); break;
+      case NEG: D = subtract(&s.f, 0, D); break;
+      case INC: D = count(&s.f, D, 1); break;
+      case DEC: D = count(&s.f, D, -1); break;
+      case AND: D = logic(&s.f, D & R); break;
+      case ANDI: D = logic(&s.f, D & K); break;
+      case OR: D = logic(&s.f, D | R); break;
+      case ORI: D = logic(&s.f, D | K); break;
+      case EOR: D = logic(&s.f, D ^ R); break;
+      case COM: D = logic(&s.f, D ^ 0xFF); s.f.c = 1; break;
+      case ASR: D = shift_right(&s.f, D, D & 0x80u); break;
+      case LSR: D = shift_right(&s.f, D, 0); break;
+      case ROR: D = shift_right(&s.f, D, (unsigned)s.f.c << 7); break;
+      case SWAP: D = (uint8_t)(D << 4 | D >> 4); break;
+      case ADIW: s.takes = 2; add_word(&s.f, &D, i->k, false); break;
+      case SBIW: s.takes = 2; add_word(&s.f, &D, i->k, true); break;
+      case MUL: s.takes = 2; multiply(&s.f, data, D, R, 0); break;
+      case MULS: s.takes = 2; multiply(&s.f, data, (int8_t)D, (int8_t)R, 0); break;
+      case MULSU: s.takes = 2; multiply(&s.f, data, (int8_t)D, R, 0); break;
+      case FMUL: s.takes = 2; multiply(&s.f, data, D, R, 1); break;
+      case FMULS: s.takes = 2; multiply(&s.f, data, (int8_t)D, (int8_t)R, 1); break;
+      case FMULSU: s.takes = 2; multiply(&s.f, data, (int8_t)D, R, 1); break;
+
+      case LDD: s.takes = 2; D = load(core, &s, written, (uint16_t)(POINTER + i->k), 1); break;
+      case LD_UP: s.takes = 2; load_moving(core, &s, written, i, POINTER, 1); break;
+      case LD_DOWN: s.takes = 2; load_moving(core, &s, written, i, (uint16_t)(POINTER - 1u), 0); break;
+      case LDS: s.takes = 2; s.pc += 2; D = load(core, &s, written, (uint16_t)i->k, 1); break;
+      case STD: s.takes = 2; store(core, &s, written, (uint16_t)(POINTER + i->k), D, 1); break;
+      case ST_UP: s.takes = 2; store_moving(core, &s, written, i, POINTER, 1); break;
+      case ST_DOWN: s.takes = 2; store_moving(core, &s, written, i, (uint16_t)(POINTER - 1u), 0); break;
+      case STS: s.takes = 2; s.pc += 2; store(core, &s, written, (uint16_t)i->k, D, 1); break;
+      case PUSH: s.takes = 2; push(core, &s, written, D, 1); break;
+      case POP: s.takes = 2; D = (uint8_t)pop(core, &s, written, 1); break;
+      case LPM: s.takes = 3; D = program_byte(core, &s); break;
+      case LPM_UP: s.takes = 3; D = program_byte(core, &s); put_word(data, Z, word_at(data, Z) + 1u); break;
+
+      case IN: D = load(core, &s, NULL, (uint16_t)i->k, 0); break;
+      case IN_SREG: D = data[REG_SREG] = all_flags(&s.f); break;
+      case OUT: store(core, &s, NULL, (uint16_t)i->k, D, 0); break;
+      case BLD: D = (uint8_t)(s.f.t ? D | i->r : D & ~i->r); break;
+      case BST: s.f.t = (D & i->r) != 0; break;
+      case CLI: s.f.i = 0; break;
+      case SEI:
+        if (!s.f.i) let_interrupts_in(core, s.cycle + 1u);
+        s.f.i = 1;
+        break;
+
+      case JUMP: s.takes = 2; jump(core, &s, i->k); break;
+      case LONG_JUMP: s.takes = 3; jump(core, &s, i->k); break;
+      case IJMP: s.takes = 2; jump(core, &s, word_at(data, Z) * 2u); break;
+      case RCALL: s.takes = 3; push(core, &s, written, s.pc / 2u, 2); jump(core, &s, i->k); break;
+      case CALL: s.takes = 4; push(core, &s, written, s.pc / 2u + 1u, 2); jump(core, &s, i->k); break;
+      case ICALL: s.takes = 3; push(core, &s, written, s.pc / 2u, 2); jump(core, &s, word_at(data, Z) * 2u); break;
+      case RET: s.takes = 4; jump(core, &s, pop(core, &s, written, 2) * 2u); break;
+      case RETI:
+        s.takes = 4;
+        s.f.i = 1;
+        jump(core, &s, pop(core, &s, written, 2) * 2u);
+        let_interrupts_in(core, s.cycle + 4u);
+        break;
+
+      case BRCS: branch(&s, i, s.f.c); break;
+      case BRCC: branch(&s, i, !s.f.c); break;
+      case BREQ: branch(&s, i, !s.f.z); break;
+      case BRNE: branch(&s, i, s.f.z); break;
+      case BRMI: branch(&s, i, s.f.n >> 7); break;
+      case BRPL: branch(&s, i, !(s.f.n >> 7)); break;
+      case BRLT: branch(&s, i, s.f.s >> 7); break;
+      case BRGE: branch(&s, i, !(s.f.s >> 7)); break;
+      case BRBS: branch(&s, i, has_flag(s.f, i->r)); break;
+      case BRBC: branch(&s, i, !has_flag(s.f, i->r)); break;
+      case CPSE: skip(&s, i, D == R); break;
+      case SBRC: skip(&s, i, !(D & i->r)); break;
+      case SBRS: skip(&s, i, D & i->r); break;
+      case SBIC: skip(&s, i, !(load(core, &s, NULL, (uint16_t)i->k, 0) & i->r)); break;
+      case SBIS: skip(&s, i, load(core, &s, NULL, (uint16_t)i->k, 0) & i->r); break;
+
+      case OUTSIDE:
+        s.pc = s.at;
+        s.takes = 0;
+        avr_stop(core);
+        break;
+      default: /* what is rare, or changes what the interpreter keeps */
+        s.takes = cycles_of_rare(i->kind);
+        hand_over(core, &s);
+        do_rare(core, i, s.takes);
+        take_back(core, &s);
+        if (i->kind == INVALID) s.pc = s.at;
+        if (i->kind == ERASED) skip(&s, i, D & i->r);
+    }
+    /* clang-format on */
+    s.cycle += s.takes;
+    if (covered && s.at < AVR_FLASH_SIZE) covered[s.at / 2u] |= (uint8_t)(s.pc == s.at + 2u ? 1u : 2u);
+    if (stops) {
+      if (s.moves_stack) {
+        const uint16_t above = (uint16_t)(avr_stack(core) - stops->lowest);
+        if (above > (uint16_t)(stops->highest - stops->lowest)) break;
+      }
+      if (s.pc >= AVR_FLASH_SIZE || stops->marked[s.pc / 2u]) break;
+    }
+  } while (s.cycle < core->until);
+  core->flags = s.f;
+  core->pc = s.pc;
+  core->cycle = s.cycle;
+  return s.at;
+}
+
+/* By themselves: what nobody asked for costs nothing. */
+static NOT_INLINE uint32_t run_checked(avr_core *core, const avr_stops *stops) {
+  return stops ? run(core, stops, core->written, NULL) : run(core, NULL, core->written, NULL);
+}
+
+static NOT_INLINE uint32_t run_stopping(avr_core *core, const avr_stops *stops) { return run(core, stops, NULL, NULL); }
+
+static NOT_INLINE uint32_t run_covered(avr_core *core, const avr_stops *stops) {
+  if (stops || core->written) return run(core, stops, core->written, core->covered);
+  return run(core, NULL, NULL, core->covered);
+}
+
+uint32_t avr_run(avr_core *core, uint64_t until, const avr_stops *stops) {
+  core->until = until;
+  if (core->pc >= AVR_FLASH_SIZE) return core->pc;
+  if (core->covered) return run_covered(core, stops);
+  if (core->written) return run_checked(core, stops);
+  return stops ? run_stopping(core, stops) : run(core, NULL, NULL, NULL);
+}
+
+/* ---- looked at before it is executed ---- */
+
+avr_access avr_next_access(const avr_core *core) {
+  if (core->pc >= AVR_FLASH_SIZE) return (avr_access){0, 0, false};
+  const avr_instruction *i = &core->code[core->pc / 2u];
+  const uint16_t stack = avr_stack(core), pointer = i->r < AVR_IO_BEGIN ? word_at(core->data, i->r) : 0;
+  switch (i->kind) {
+    case LDD:
+    case STD:
+      return (avr_access){(uint16_t)(pointer + i->k), 1, i->kind == STD};
+    case LD_UP:
+    case ST_UP:
+      return (avr_access){pointer, 1, i->kind == ST_UP};
+    case LD_DOWN:
+    case ST_DOWN:
+      return (avr_access){(uint16_t)(pointer - 1u), 1, i->kind == ST_DOWN};
+    case LDS:
+    case IN:
+    case SBIC:
+    case SBIS:
+      return (avr_access){(uint16_t)i->k, 1, false};
+    case STS:
+    case OUT:
+    case OUT_SREG:
+    case OUT_SPL:
+    case SBI:
+    case CBI:
+      return (avr_access){(uint16_t)i->k, 1, true};
+    case IN_SREG:
+      return (avr_access){REG_SREG, 1, false};
+    case PUSH:
+      return (avr_access){stack, 1, true};
+    case POP:
+      return (avr_access){(uint16_t)(stack + 1u), 1, false};
+    case RCALL:
+    case CALL:
+    case ICALL:
+      return (avr_access){(uint16_t)(stack - 1u), 2, true};
+    case RET:
+    case RETI:
+      return (avr_access){(uint16_t)(stack + 1u), 2, false};
+    default:
+      return (avr_access){0, 0, false};
+  }
+}
