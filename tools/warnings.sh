@@ -26,7 +26,7 @@ done
 find host -name '*.c' -not -name '_*.c' >"$lists/host"
 read_with_clang host -Ihost/boebot/arenas -Ihost/boebot/link -Ifirmware/src
 find sim_bridge -name '*.c' -not -name '_*.c' -not -name simavr_machine.c >"$lists/simulator"
-read_with_clang simulator -Isim_bridge -Isim_bridge/boards -Ihost/boebot/arenas -Ifirmware/src
+read_with_clang simulator -Isim_bridge -Isim_bridge/boards -Isim_bridge/boards/avr/core -Ihost/boebot/arenas -Ifirmware/src
 
 for end in BOARD HOST; do
   for compiler in gcc clang "avr-gcc -mmcu=atmega328p"; do

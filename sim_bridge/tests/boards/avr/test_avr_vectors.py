@@ -1,18 +1,29 @@
-"""What every instruction does, as recorded (vectors/README.md), is what the AVR instruction set manual (DS40002198)
-says: opcodes and cycles by its tables, results and flags of arithmetic by its equations."""
+"""The core alone does what is recorded of every instruction (vectors/README.md); and that is what the AVR instruction
+set manual (DS40002198) says: opcodes and cycles by its tables, results and flags of arithmetic by its equations."""
 
 from __future__ import annotations
 
+import itertools
+import os
+import random
 import zlib
 from collections.abc import Callable, Iterator
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from avr_timing.flow.instructions import BRANCHES, SKIPS, decode
-from sim_bridge.tests.boards.avr.vectors.record import recorded
+from sim_bridge.tests.boards.avr.vectors.record import HERE, build, printed, recorded
+
+# The tests may lie in a copy of the package below the checkout.
+CORE = next(
+    f for parent in HERE.parents if (f := parent / "sim_bridge/boards/avr/core").joinpath("avr_core.h").exists()
+)
+SANITIZERS = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+ROUNDS, PROGRAMS = 30, 40  # of programs that QEMU executes too
 
 Numbers = npt.NDArray[np.int64]
 C, Z = 0, 1  # bits of SREG
@@ -32,6 +43,46 @@ def checksums(title: str) -> Iterator[tuple[str, list[int]]]:
     for line in part(title):
         name, values = line.split(":")
         yield name, [int(value, 16) for value in values.split()]
+
+
+# ---- the core ----
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program that prints what the core does."""
+    sanitizers = SANITIZERS if os.environ.get("BOEBOT_SANITIZED") else []
+    sources = [str(HERE / "core_machine.c"), *map(str, CORE.glob("*.c"))]
+    return build(tmp_path_factory.mktemp("core") / "vectors", [f"-I{CORE}", *sanitizers, *sources])
+
+
+def difference(ours: str, theirs: str) -> str:
+    """The first line that differs; of a line of checksums, which one."""
+    for ours_line, theirs_line in itertools.zip_longest(ours.splitlines(), theirs.splitlines(), fillvalue=""):
+        if ours_line == theirs_line:
+            continue
+        name, colon, _ = theirs_line.partition(": ")
+        pairs = zip(ours_line.split()[1:], theirs_line.split()[1:], strict=False)
+        which = [number for number, (one, other) in enumerate(pairs) if one != other]
+        if colon and len(which) and len(theirs_line) > 120:
+            return f"{name}: the checksum of number {which[0]} differs (vectors.c says how to print what is behind it)"
+        return f"{ours_line!r}, expected {theirs_line!r}"
+    return ""
+
+
+def test_the_core_does_what_is_recorded(core: Path) -> None:
+    assert difference(printed(core), recorded()) == ""
+
+
+@pytest.mark.soak
+@pytest.mark.unsanitized
+def test_the_core_does_what_qemu_does(core: Path, tmp_path: Path) -> None:
+    qemu = build(tmp_path / "vectors", [str(HERE / "qemu_machine.c")])
+    assert difference(printed(core, "witness"), printed(qemu, "witness")) == ""
+    first = random.randrange(1 << 32)
+    for seed in range(first, first + PROGRAMS):
+        arguments = ("witness", str(seed), str(ROUNDS))
+        assert difference(printed(core, *arguments), printed(qemu, *arguments)) == ""
 
 
 # ---- opcodes and cycles ----

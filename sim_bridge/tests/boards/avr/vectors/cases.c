@@ -28,6 +28,8 @@
 #define RAM 0x100u
 #define AT 0x1000u /* where an instruction is, when this does not matter (words) */
 
+bool for_witness;
+
 static uint8_t background[DATA_SIZE]; /* of all cases; I/O registers are 0 */
 static uint16_t program[FLASH_SIZE / 2];
 
@@ -56,20 +58,25 @@ static uint32_t any_cell(numbers *from) {
     case 1:
       return below(from, 32);
     case 2:
-      return io[below(from, sizeof io / sizeof *io)];
+      return for_witness ? between(from, SPL, SREG) : io[below(from, sizeof io / sizeof *io)];
     default:
       return between(from, RAM, DATA_SIZE - 1);
   }
 }
 
-/* Where `bytes` of a stack can be, the upper one's address: RAM, and in few cases registers. */
+/* Where `bytes` of a stack can be, the upper one's address: RAM, and in few cases registers, where QEMU's calls find none. */
 static uint32_t any_stack(numbers *from, uint32_t bytes) {
-  return one_in(from, 8) ? between(from, bytes, 31) : between(from, RAM + bytes - 1, DATA_SIZE - 1);
+  return !for_witness && one_in(from, 8) ? between(from, bytes, 31) : between(from, RAM + bytes - 1, DATA_SIZE - 1);
 }
 
 static void put_word(uint8_t *cells, uint32_t value) {
   cells[0] = (uint8_t)value;
   cells[1] = (uint8_t)(value >> 8);
+}
+
+/* Where RJMP and RCALL are: anywhere; for QEMU where they do not lead over the ends of flash, which it has no ring for. */
+static uint32_t any_near(numbers *from) {
+  return for_witness ? between(from, 0x800, FLASH_SIZE / 2 - 0x801) : below(from, FLASH_SIZE / 2 - 1);
 }
 
 static uint16_t any_code_word(numbers *from) { return (uint16_t)below(from, FLASH_SIZE / 2); }
@@ -126,7 +133,7 @@ static bool prepare(trial *t, const instruction *which, uint16_t opcode, numbers
     case FAR_CALL:
     case INDIRECT_CALL:
       put_word(cells + SPL, any_stack(from, 2));
-      if (which->needs == NEAR_CALL) t->start.pc = 2u * below(from, FLASH_SIZE / 2 - 1);
+      if (which->needs == NEAR_CALL) t->start.pc = 2u * any_near(from);
       if (which->needs == FAR_CALL) t->words[1] = any_code_word(from);
       if (which->needs == INDIRECT_CALL) put_word(cells + 30, any_code_word(from));
       break;
@@ -143,7 +150,7 @@ static bool prepare(trial *t, const instruction *which, uint16_t opcode, numbers
       t->reads[1] = (int)cell;
       break;
     case NEAR:
-      t->start.pc = 2u * any_code_word(from);
+      t->start.pc = 2u * any_near(from);
       break;
     case FAR:
       t->words[1] = any_code_word(from);
@@ -167,6 +174,7 @@ static bool is_operand(const instruction *which, uint16_t opcode) {
   if (which->needs == FAR || which->needs == FAR_CALL) return instruction_field(which, opcode, 'k') == 0;
   if (port < 0) return true;
   const uint32_t cell = (uint32_t)port + 0x20;
+  if (for_witness) return cell >= SPL && cell <= SREG;
   return cell == GPIOR0 || cell == GPIOR1 || cell == GPIOR2 || (cell >= SPL && cell <= SREG);
 }
 
@@ -270,8 +278,10 @@ static void write_line(line *to, const trial *t, bool valid) {
   }
   add_flags(to, t->end.flags);
   add_hex(to, t->end.pc / 2, 4);
-  add_text(to, " ");
-  add_number(to, (uint32_t)t->end.cycle);
+  if (!for_witness) {
+    add_text(to, " ");
+    add_number(to, (uint32_t)t->end.cycle);
+  }
   add_text(to, valid ? "\n" : " invalid\n");
   to->text[to->length] = 0;
 }
@@ -338,7 +348,10 @@ static void print_lines(void) {
 
 /* ---- 3. more cases of each opcode ---- */
 
-/* The checksums of an instruction, or with `chunk` >= 0 the lines of one of them. */
+#define CHECKSUMS -1
+#define EVERY_LINE -2
+
+/* The checksums of an instruction, or the lines of one of them, or all lines. */
 static void print_more_of(size_t i, int chunk) {
   const instruction *which = &INSTRUCTIONS[i];
   const unsigned operands = (uint16_t)~instruction_mask(which);
@@ -353,20 +366,20 @@ static void print_more_of(size_t i, int chunk) {
       if (!prepare(&t, which, opcode, &from)) continue;
       const bool valid = execute(&t);
       write_line(&out, &t, valid);
-      if (chunk == (int)(cases / TOGETHER)) fwrite(out.text, 1, out.length, stdout);
+      if (chunk == EVERY_LINE || chunk == (int)(cases / TOGETHER)) fwrite(out.text, 1, out.length, stdout);
       crc = crc32_of(crc, out.text, out.length);
-      if (++cases % TOGETHER == 0 && chunk < 0) printf(" %08X", crc);
+      if (++cases % TOGETHER == 0 && chunk == CHECKSUMS) printf(" %08X", crc);
     }
     at = (at - operands) & operands; /* the next number in the operands' bits */
   } while (at);
-  if (cases % TOGETHER && chunk < 0) printf(" %08X", crc);
+  if (cases % TOGETHER && chunk == CHECKSUMS) printf(" %08X", crc);
 }
 
 static void print_more(void) {
   printf("# checksums of %u cases each\n", TOGETHER);
   for (size_t i = 0; i < INSTRUCTION_COUNT; i++) {
     printf("%s:", INSTRUCTIONS[i].name);
-    print_more_of(i, -1);
+    print_more_of(i, CHECKSUMS);
     printf("\n");
   }
 }
@@ -488,5 +501,18 @@ void print_chunk(const char *name, int chunk) {
   fill();
   for (size_t i = 0; i < INSTRUCTION_COUNT; i++) {
     if (!strcmp(INSTRUCTIONS[i].name, name)) print_more_of(i, chunk);
+  }
+}
+
+/* Skips end in the middle where a debugger stops QEMU behind them; programs have them. */
+void print_witness_cases(void) {
+  for_witness = true;
+  fill();
+  for (size_t i = 0; i < INSTRUCTION_COUNT; i++) {
+    const char *const stops[] = {"SLEEP", "BREAK", "WDR", "SPM"};
+    const need needs = INSTRUCTIONS[i].needs;
+    bool stopping = needs == SKIP || needs == PORT_SKIP;
+    for (size_t k = 0; k < sizeof stops / sizeof *stops; k++) stopping |= !strcmp(INSTRUCTIONS[i].name, stops[k]);
+    if (!stopping) print_more_of(i, EVERY_LINE);
   }
 }

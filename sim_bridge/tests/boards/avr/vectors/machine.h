@@ -25,5 +25,7 @@ void machine_set(const machine_state *state);
 machine_state machine_get(void);
 /* Executes instructions, one at least, until cycle `until`. False: one of them is no instruction of this chip. */
 bool machine_run(uint64_t until);
+/* Executes instructions, one at least, until the next one is at address 0. */
+bool machine_go_round(void);
 
 #endif

@@ -72,14 +72,15 @@ static void emit_plain(maker *m) {
   do {
     do {
       which = &INSTRUCTIONS[below(&m->random, (uint32_t)INSTRUCTION_COUNT)];
-    } while (which->needs != PLAIN || !strcmp(which->name, "SLEEP") || !strcmp(which->name, "BREAK"));
+    } while (which->needs != PLAIN || !strcmp(which->name, "SLEEP") || !strcmp(which->name, "BREAK") ||
+             (for_witness && !strcmp(which->name, "WDR")));
     opcode = (uint16_t)((draw(&m->random) & ~(unsigned)instruction_mask(which)) | instruction_value(which));
   } while (spoils_kept(m, which, opcode));
   emit(m, opcode);
 }
 
 static void emit_direct(maker *m) {
-  const uint32_t cell = one_in(&m->random, 6) ? GPIOR0 : between(&m->random, RAM, 0x8BF);
+  const uint32_t cell = !for_witness && one_in(&m->random, 6) ? GPIOR0 : between(&m->random, RAM, 0x8BF);
   if (one_in(&m->random, 2)) {
     emit(m, with("LDS", d_of(any_register(m))));
   } else {
@@ -91,9 +92,10 @@ static void emit_direct(maker *m) {
 static void emit_port(maker *m) {
   static const uint8_t cells[] = {GPIOR0, 0x4A, 0x4B, SPL, SPH, SREG};
   const uint32_t bit = (GPIOR0 - IO) << 3 | below(&m->random, 8);
-  switch (below(&m->random, 5)) {
+  switch (below(&m->random, for_witness ? 1 : 5)) {
     case 0:
-      emit(m, with("IN", d_of(any_register(m)) | a_of(cells[below(&m->random, sizeof cells)])));
+      emit(m, with("IN", d_of(any_register(m)) | a_of(for_witness ? between(&m->random, SPL, SREG)
+                                                                  : cells[below(&m->random, sizeof cells)])));
       break;
     case 1:
       emit(m, with("OUT", d_of(below(&m->random, 32)) | a_of(cells[below(&m->random, 3)])));
@@ -149,21 +151,21 @@ static void emit_program(maker *m) {
 
 static void emit_skip(maker *m) {
   const uint32_t bit = below(&m->random, 8);
-  switch (below(&m->random, 5)) {
+  switch (for_witness ? below(&m->random, 3) : below(&m->random, 5)) {
     case 0:
       emit(m, with("CPSE", (uint32_t)draw(&m->random) & 0x3FF));
       break;
     case 1:
-      emit(m, with("SBIC", (GPIOR0 - IO) << 3 | bit));
-      break;
-    case 2:
-      emit(m, with("SBIS", (GPIOR0 - IO) << 3 | bit));
-      break;
-    case 3:
       emit(m, with("SBRC", d_of(below(&m->random, 32)) | bit));
       break;
-    default:
+    case 2:
       emit(m, with("SBRS", d_of(below(&m->random, 32)) | bit));
+      break;
+    case 3:
+      emit(m, with("SBIC", (GPIOR0 - IO) << 3 | bit));
+      break;
+    default:
+      emit(m, with("SBIS", (GPIOR0 - IO) << 3 | bit));
   }
   emit_one(m);
 }
@@ -312,4 +314,15 @@ void print_program(uint64_t seed, uint32_t stops) {
 void print_programs(void) {
   printf("# random programs: cycle, address, SP, flags, checksum of memory\n");
   for (uint64_t seed = 0; seed < PROGRAMS; seed++) print_program(seed, STOPS);
+}
+
+void print_witness_program(uint64_t seed, uint32_t rounds) {
+  for_witness = true;
+  load(seed);
+  for (uint32_t round = 0; round < rounds; round++) {
+    const bool came_round = machine_go_round();
+    const uint8_t *cells = machine_data();
+    printf("%llu %u: %02X%02X %02X %08X%s\n", (unsigned long long)seed, round, cells[SPH], cells[SPL],
+           machine_get().flags, checksum(), came_round ? "" : " not at its start");
+  }
 }

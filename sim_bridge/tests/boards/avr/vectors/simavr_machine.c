@@ -84,3 +84,10 @@ bool machine_run(uint64_t until) {
   } while (avr->cycle < until);
   return true;
 }
+
+bool machine_go_round(void) {
+  do {
+    if (!machine_run(machine_get().cycle + 1)) return false;
+  } while (machine_get().pc != 0);
+  return true;
+}
