@@ -71,7 +71,7 @@ def build(tag: str) -> Path:
     compiler = f"{zig()} cc -target {target}"
     linker = f"{compiler} -shared -s"
     if "windows" in target:
-        linker += f" {INCLUDE / 'python3.lib'} -lws2_32"  # sockets: simavr's
+        linker += f" {INCLUDE / 'python3.lib'}"
         linker += f" -Wl,--out-implib,{BUILD / 'unused.lib'}"  # a module is loaded, not linked with
     elif "macos" in target:
         linker += " -undefined dynamic_lookup"  # the Python that loads a module has what it asks for

@@ -173,7 +173,7 @@ class Request(_NamesFiles):
         """What a record says of it, as values of JSON, so that the run can be repeated (boebot.running.again); `tasks`:
         those of its robots."""
         return {
-            "arena": None if self.arena is None else str(self.arena),
+            "arena": None if self.arena is None else Path(self.arena).as_posix(),
             "on": self.on,
             "seconds": self.seconds if math.isfinite(self.seconds) else None,
             "seed": self.seed,
@@ -258,10 +258,11 @@ class Task:
 
 
 def _brain_file(loaded: LoadedBrain) -> str | None:
-    """A bundled brain's name, or the path of the file that it came from; None: it came from no file."""
+    """A bundled brain's name, or the path of the file that it came from, as every system reads it; None: it came from
+    no file."""
     if loaded.path is None:
         return None
-    return next((name for name, path in brains.bundled_files().items() if path == loaded.path), str(loaded.path))
+    return next((name for name, path in brains.bundled_files().items() if path == loaded.path), loaded.path.as_posix())
 
 
 def of_robot(error: BaseException, number: int, count: int) -> BaseException:

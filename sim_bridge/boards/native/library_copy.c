@@ -19,12 +19,13 @@
 
 #ifdef _WIN32
 
-static bool write_copy(char *path, const unsigned char *bytes, size_t size) {
-  char folder[MAX_PATH];
-  if (GetTempPathA(sizeof folder, folder) == 0 || GetTempFileNameA(folder, "bot", 0, path) == 0) {
+/* Names of files in wide characters: a user's name need not be of the system's code page. */
+static bool write_copy(wchar_t *path, const unsigned char *bytes, size_t size) {
+  wchar_t folder[MAX_PATH + 1];
+  if (GetTempPathW(MAX_PATH + 1, folder) == 0 || GetTempFileNameW(folder, L"bot", 0, path) == 0) {
     return false;
   }
-  FILE *file = fopen(path, "wb");
+  FILE *file = _wfopen(path, L"wb");
   if (file == NULL) {
     return false;
   }
@@ -33,19 +34,19 @@ static bool write_copy(char *path, const unsigned char *bytes, size_t size) {
 }
 
 bool library_load(library_copy *library, const unsigned char *bytes, size_t size, char *error, size_t error_size) {
-  char path[MAX_PATH] = "";
+  wchar_t path[MAX_PATH] = L"";
   *library = (library_copy){NULL, NULL};
   if (!write_copy(path, bytes, size)) {
     snprintf(error, error_size, "cannot write a temporary copy of the firmware library");
     return false;
   }
-  library->handle = (void *)LoadLibraryA(path);
+  library->handle = (void *)LoadLibraryW(path);
   if (library->handle == NULL) {
     snprintf(error, error_size, "cannot load the firmware library: error %lu", GetLastError());
-    DeleteFileA(path);
+    DeleteFileW(path);
     return false;
   }
-  library->path = _strdup(path);
+  library->path = _wcsdup(path);
   return true;
 }
 
@@ -56,7 +57,7 @@ void *library_symbol(const library_copy *library, const char *name) {
 void library_unload(library_copy *library) {
   if (library->handle != NULL) {
     FreeLibrary((HMODULE)library->handle);
-    DeleteFileA(library->path);
+    DeleteFileW(library->path);
     free(library->path);
     *library = (library_copy){NULL, NULL};
   }

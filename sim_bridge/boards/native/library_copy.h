@@ -8,7 +8,7 @@
 
 typedef struct {
   void *handle;
-  char *path; /* the copy, where it cannot be removed while it is loaded; otherwise NULL */
+  void *path; /* the copy's, where it cannot be removed while it is loaded; otherwise NULL */
 } library_copy;
 
 /* Loads a library from its bytes. */
