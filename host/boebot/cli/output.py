@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
 from boebot.errors import printable
-from boebot.record import figures
-from boebot.running.loop import Progress
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
     from rich.table import Table
+
+    from boebot.running.loop import Progress
 
 
 def line(text: str = "", file: TextIO | None = None) -> None:
@@ -80,6 +80,8 @@ def print_table(values: Mapping[str, Any]) -> None:
 
 def table(values: Mapping[str, Any]) -> Table:
     """The same, not yet printed."""
+    from boebot.record import figures  # here: what prints no figures loads no numpy
+
     rows = empty_table(show_header=False)
     rows.add_column(style="dim")
     rows.add_column(justify="right", overflow="fold")
