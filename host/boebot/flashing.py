@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
+from boebot import missing
 from boebot.boards import is_live
 from boebot.errors import BoardError, CallError
 from boebot.image.program import BOOT_SECTIONS
@@ -25,6 +26,7 @@ BARS = 100  # marks that avrdude prints while it writes and reads back
 LIFE = re.compile(rb"#|\navrdude: ")  # what it prints of what went well
 SILENCE_S = 15.0  # of avrdude, which tries for minutes where a byte was lost
 LEAST_S, PER_BYTE_S = 30.0, 0.005  # for all of it; a byte takes 0.25 ms on a computer that does nothing else
+_PACKAGES = {"apt_get": "avrdude", "brew": "avrdude", "winget": "AVRDudes.AVRDUDE"}
 _SIGNATURE = re.compile(r"device signature = 0x([0-9a-f]{6})(?: \(probably (\w+)\))?")
 _DIFFERS = re.compile(r"(?is)verification.*(mismatch|error)|(mismatch|error).*verification")
 _EXPECTED = "1e950f"  # ATmega328P (data sheet 28.3)
@@ -71,7 +73,7 @@ def _avrdude(
     if len(flash) > ROOM:
         raise BoardError(f"the program has {len(flash)} bytes; expected {ROOM} at most, before the boot loader")
     if shutil.which("avrdude") is None:
-        raise BoardError("avrdude, which writes programs into boards, is missing; expected it installed, as by apt")
+        raise BoardError(missing.program("Writing programs into boards", "avrdude", **_PACKAGES))
     path = _path(port)
     if holder := None if path.startswith("net:") else holder_of(path):
         raise BoardError(f"{port} is busy: {holder} has it open")

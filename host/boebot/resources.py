@@ -30,13 +30,6 @@ def folder(kind: str) -> Path:
     return in_checkout if checkout() is not None else installed
 
 
-def remedy(target: str) -> str:
-    """What to do about a file of the kit that is missing: a target of make where there is a makefile."""
-    return (
-        f"build it with `make {target}`" if checkout() is not None else "this installation of boebot does not have it"
-    )
-
-
 def version() -> str:
     """This kit's version, `boebot.__version__`."""
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from boebot import resources
+from boebot import missing, resources
 from boebot.cli import options, output, quantity, streams
 from boebot.errors import BoebotError, TimingError
 
@@ -208,7 +208,7 @@ def _image(elf: Path | None, robot: RobotDescription) -> Path | None:
     robot.expect_kit()
     image = resources.folder("images") / f"{robot.pin_map}.elf"
     if not image.is_file():
-        raise TimingError(f"there is no image {image}; {resources.remedy('firmware')}, or name one by --elf F")
+        raise TimingError(f"there is no image {image}; {missing.built('firmware')}, or name one by --elf F")
     return image
 
 

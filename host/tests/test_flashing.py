@@ -16,7 +16,7 @@ def flashed(port: str, data: bytes = b"\x01\x02") -> None:
 
 def test_avrdude_that_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(BoardError, match=r"^avrdude, which writes programs into boards, is missing; expected it"):
+    with pytest.raises(BoardError, match=r"needs avrdude, which is not installed: expected it on the PATH$"):
         flashed("/dev/robot")
 
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+from boebot import missing
 from boebot.errors import BoebotError, CallError
 
 SUITE = "boebot_hil"
@@ -31,7 +32,7 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
     """
     found = find_spec(SUITE)
     if find_spec("pytest") is None or found is None or found.origin is None:
-        raise CallError("tests need pytest; expected it here: pip install 'boebot[hil]'")
+        raise CallError(missing.package("boebot test", "pytest", "hil"))
     from boebot.boards import is_live
     from boebot.sketch import cache
 

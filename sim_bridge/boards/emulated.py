@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from boebot import resources
+from boebot import missing, resources
 from boebot.errors import BoardError
 from boebot.files import regular
 from sim_bridge import _core
@@ -23,7 +23,7 @@ def native_library(pin_map: str) -> Path:
         path = folder / f"firmware-{pin_map}{suffix}"
         if path.is_file():
             return path
-    raise BoardError(f"there is no firmware for this computer for pin map {pin_map!r}; {resources.remedy('setup')}")
+    raise BoardError(f"there is no firmware for this computer for pin map {pin_map!r}; {missing.built('setup')}")
 
 
 def native_board(library: Path) -> EmulatedBoard:
@@ -51,7 +51,7 @@ def avr_image(pin_map: str) -> Path:
     """
     image = resources.folder("images") / f"{pin_map}.elf"
     if not image.is_file():
-        raise BoardError(f"there is no firmware image {image.name}; {resources.remedy('firmware')}")
+        raise BoardError(f"there is no firmware image {image.name}; {missing.built('firmware')}")
     return image
 
 

@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 from serial.tools import list_ports
 
-from boebot import flashing, resources
+from boebot import flashing, missing, resources
 from boebot.boards import BoardRequest, open_port
 from boebot.brains import load_program
 from boebot.cli import options, output
@@ -88,7 +88,7 @@ def _program(file: Path | None, robot: RobotDescription) -> Path:
     if file is None:
         image = resources.folder("images") / f"{robot.pin_map}.elf"
         if not image.is_file():
-            raise BoardError(f"there is no firmware image {image.name}; {resources.remedy('firmware')}")
+            raise BoardError(f"there is no firmware image {image.name}; {missing.built('firmware')}")
         return image
     with output.progress_bar(f"building {file}", math.inf) as progress:
         loaded = load_program(str(file), progress)

@@ -33,7 +33,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from boebot import system
+from boebot import missing, system
 from boebot.errors import BoebotError, CallError, SketchError
 from boebot.sketch import cache, core_directory, servo
 from boebot.sketch.find import LIBRARIES, PROJECT, Sketch, below, find
@@ -44,7 +44,7 @@ HERE = Path(__file__).resolve().parent
 BOARDS = sorted(path.stem for path in HERE.glob("platforms/atmelavr/boards/*.json"))  # with the chip that is emulated
 CLOCK = "16000000L"  # Hz, of that chip
 SILENCE_S = 30.0  # of PlatformIO, after which it waits for what cannot be reached
-DEBIAN = "avr-gcc and what Debian has in arduino-core-avr and avr-libc"
+DEBIAN = "arduino-core-avr gcc-avr avr-libc"  # its packages: Arduino's framework and the compiler
 FULL = "No space left on device"  # what tools say of a disk, in the language that they are set to here
 FURTHER_ERRORS = 3  # that are shown after the first one
 SKETCH_INI = """\
@@ -169,6 +169,12 @@ class _Tools:
     versions: str
     is_prepared: bool
 
+    @property
+    def expected(self) -> str:
+        """Where PlatformIO can have compiler and framework from."""
+        here = "" if self.is_prepared else missing.installer(apt_get=DEBIAN)
+        return f"expected its registry within reach{here and ', or here: '}{here}"
+
     @classmethod
     def found(cls) -> _Tools:
         """With the distribution's packages where all of them are there, else with PlatformIO's registry.
@@ -178,13 +184,12 @@ class _Tools:
         """
         kits = [one.read_bytes() for one in sorted(HERE.rglob("*.*")) if one.suffix in (".py", ".json")]
         compiler, framework = shutil.which("avr-gcc"), core_directory.ARDUINO / "platform.txt"
-        is_here = importlib.util.find_spec("platformio") is not None
-        if is_here and importlib.util.find_spec("SCons") and compiler and framework.is_file():
+        if importlib.util.find_spec("platformio") is None:
+            raise BoebotError(missing.package("Building sketches", "PlatformIO", "firmware"))
+        if importlib.util.find_spec("SCons") and compiler and framework.is_file():
             files = [one.stat() for one in (Path(compiler).resolve(), framework)]
             told = [version("platformio"), version("scons"), *((one.st_size, one.st_mtime_ns) for one in files)]
             return cls(_hash(kits, told), True)
-        if not is_here:
-            raise BoebotError("sketches are built by PlatformIO; expected it here: pip install 'boebot[firmware]'")
         return cls(_hash(kits), False)
 
 
@@ -260,9 +265,8 @@ class _PlatformIO:
                     heard_s = now_s
                 if now_s - heard_s > SILENCE_S:
                     last = log.read_text("utf-8", "replace").strip().rpartition("\n")[2]
-                    silent = f"PlatformIO says nothing more for {SILENCE_S:g} s"
-                    other = "" if self.tools.is_prepared else f", or here {DEBIAN}"
-                    raise BoebotError(f"{silent} after {last!r}; expected its registry within reach{other}; see {log}")
+                    silent = f"PlatformIO says nothing more for {SILENCE_S:g} s after {last!r}"
+                    raise BoebotError(f"{silent}; {self.tools.expected}; see {log}")
                 if self.progress is not None:
                     self.progress(now_s - begin_s)
         return process.returncode, log.read_text("utf-8", "replace")
@@ -278,7 +282,7 @@ class _PlatformIO:
                 there = LIBRARIES if found.files else f"lib, or named by lib_deps in {PROJECT}"
                 what = f"there is no {header[1]}; expected its library in {found.shown / there}"
             errors.append(f"{place}:{one['line']}: {what}")
-        errors = list(dict.fromkeys(errors or _NO_PLACE.findall(said))) or ["PlatformIO has failed"]
+        errors = list(dict.fromkeys(errors or _NO_PLACE.findall(said))) or [f"PlatformIO failed; {self.tools.expected}"]
         sentence = f"does not fit into {too_large[0]}" if too_large else f"does not compile: {errors[0]}"
         error = SketchError(f"{found.name} {sentence}")
         for note in (*errors[1 : 1 + FURTHER_ERRORS], f"all that was said is in {self.work / 'build.log'}"):

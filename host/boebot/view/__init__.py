@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from boebot.errors import BoebotError
+from boebot.missing import imported
 from boebot.record.run_folder import make_folder, write_whole
 
 if TYPE_CHECKING:
@@ -91,14 +92,9 @@ def save_for_foxglove(results: Sequence[Run], folder: Path) -> Path:
     Raises:
         BoebotError: Foxglove's schemas are not installed, or the folder cannot be written to.
     """
-    try:
-        from boebot.view import foxglove
-    except ImportError as error:
-        if "foxglove" not in str(error):
-            raise
-        raise BoebotError(
-            "Foxglove's schemas are not installed; expected the extra of that name: pip install 'boebot[foxglove]'"
-        ) from None
+    imported("foxglove_schemas_protobuf", "--as foxglove", "Foxglove's schemas", "foxglove")
+    from boebot.view import foxglove
+
     return write_whole(folder / "foxglove.mcap", partial(foxglove.write, results))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boebot.errors import BoebotError
+from boebot.missing import imported
 from boebot.view import tables
 
 if TYPE_CHECKING:
@@ -23,12 +23,7 @@ def of_robots(robots: Sequence[Run]) -> DataFrame:
     Raises:
         BoebotError: pandas is not installed.
     """
-    try:
-        import pandas
-    except ImportError:
-        raise BoebotError(
-            "to_pandas() needs the package pandas, which is not installed; pip install pandas gets it"
-        ) from None
+    pandas = imported("pandas", "to_pandas()", "pandas", "pandas")
     frames = {}
     for number, robot in enumerate(robots, 1):
         with tempfile.TemporaryDirectory() as folder:

@@ -183,7 +183,7 @@ def test_without_platformio_there_is_a_sentence(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("HOME", str(tmp_path))
-    with pytest.raises(BoebotError, match=r"sketches are built by PlatformIO; expected it here: pip install"):
+    with pytest.raises(BoebotError, match=r"PlatformIO, which is not installed: pip install 'boebot\[firmware\]'"):
         built(tmp_path / "a.ino")
 
 

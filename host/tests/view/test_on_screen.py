@@ -158,5 +158,5 @@ def test_robots_stand_below_each_other(together: TogetherResult) -> None:
 
 def test_without_pandas_it_is_one_sentence(result: RunResult, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(BoebotError, match=r"^to_pandas\(\) needs the package pandas, which is not installed; pip"):
+    with pytest.raises(BoebotError, match=r"^to_pandas\(\) needs pandas, which is not installed: pip"):
         result.to_pandas()

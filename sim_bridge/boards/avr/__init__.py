@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot import resources
+from boebot import missing
 from boebot.errors import AnalysisError, BoardError
 from boebot.image.program import Program, behind_bootloader, read_program
 from sim_bridge.boards.board import EmulatedBoard
@@ -61,7 +61,7 @@ def _extension() -> Any:
         if any(Path(__file__).parent.glob("_avr.*.so")):
             raise BoardError(f"the AVR emulator cannot be loaded: {error}") from error
         raise BoardError(
-            f"there is no AVR emulator; {resources.remedy('setup')}, or choose the native board (--on native)"
+            f"there is no AVR emulator; {missing.built('setup')}, or choose the native board (--on native)"
         ) from error
 
 

@@ -21,5 +21,7 @@ def test_bad_calls_are_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(CallError, match="no test can run, as pytest says above"):
         suite.run_suite(["native"], ["--no-such-option"])
     monkeypatch.setattr(suite, "find_spec", lambda name: None)
-    with pytest.raises(CallError, match=r"tests need pytest; expected it here: pip install 'boebot\[hil\]'"):
+    with pytest.raises(
+        CallError, match=r"boebot test needs pytest, which is not installed: pip install 'boebot\[hil\]'"
+    ):
         suite.run_suite(["native"], [])
