@@ -4,8 +4,6 @@
 #include "parts/ping.h"
 #include "state.h"
 
-#define WAVE_EDGES_MAXIMUM 10000000u
-
 /* The truth has where it was, and a cycle later where it is. */
 static void lift(robot *r, double x, double y, double heading) {
   const uint64_t at = r->sim->world_at;
@@ -74,19 +72,6 @@ void robot_release(robot *self, uint8_t pin) {
   if (is_shown) return;
   self->chassis.driven[pin] = BOARD_RELEASED;
   self->board->op->drive(self->board, 0, pin, BOARD_RELEASED);
-}
-
-int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
-  if (duration / half_cycles > WAVE_EDGES_MAXIMUM) return SIM_BAD_ARGUMENT;
-  take_pin(self, pin);
-  const uint64_t start = self->sim->world_at + PART_GUARD; /* edges up to there are queued already */
-  uint8_t level = self->chassis.driven[pin];
-  self->board->op->drive(self->board, start, pin, level); /* ends what was queued */
-  for (uint64_t at = start + half_cycles; at <= start + duration; at += half_cycles) {
-    level = level == BOARD_HIGH ? BOARD_LOW : BOARD_HIGH;
-    self->board->op->drive(self->board, at, pin, level);
-  }
-  return SIM_OK;
 }
 
 int robot_answer_ping(robot *self, int64_t echo_cycles) {

@@ -54,7 +54,7 @@ COMPILER_FLAGS = [
 ]
 
 # Ours that Python may call (what is between their marks).
-HEADERS = ("board.h", "board_access.h", "avr/avr_board.h", "avr/avr_spans.h", "avr/avr_debug.h", "avr/avr_checks.h")
+HEADERS = ("board.h", "avr/avr_board.h", "avr/avr_spans.h", "avr/avr_debug.h", "avr/avr_checks.h")
 
 
 def simavr_folder() -> Path:
@@ -87,7 +87,6 @@ def make_ffi() -> FFI:
         "\n".join(f'#include "{name}"' for name in HEADERS),
         sources=[
             *map(str, ours),
-            str(BOARDS / "board_access.c"),
             *(str(simavr / "sim" / f"{name}.c") for name in SIMAVR_SOURCES),
             str(simavr / CHIP_SOURCE),
         ],

@@ -18,6 +18,7 @@ from sim_bridge.bench.cover import Coverage, instructions, is_conditional
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level
 from sim_bridge.boards.emulated import avr_image
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
 # Each line that has code is named by what becomes of it: hit, or missed.
@@ -97,7 +98,7 @@ def covered(image: Path, *high: int) -> Coverage:
     """Of one run, with those pins high."""
     board = create(image)
     board.cover()
-    access = board.access()
+    access = BoardAccess(board)
     for pin in high:
         access.drive(pin, Level.HIGH)
     access.run(5000)

@@ -16,6 +16,7 @@ from sim_bridge.bench import cycles
 from sim_bridge.bench.cycles import Baseline, Cycles, table_of
 from sim_bridge.boards.avr import FUNCTION_IDS, Watch, create
 from sim_bridge.boards.board import Level, ResetCause
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import assemble, compiled
 from sim_bridge.tests.boards.symbols import entry_of
 
@@ -75,7 +76,7 @@ def test_the_shortest_and_the_longest_call_whatever_interrupts_them(tmp_path: Pa
     image = image_of(tmp_path, PROGRAM)
     board = create(image)
     seen = Cycles(board, image, ("work", "outer", "unused"))
-    board.access().run(100_000)
+    BoardAccess(board).run(100_000)
     work, outer = seen["work"], seen["outer"]
     assert (work.shortest, work.longest) == (SHORT, LONG)
     assert outer.shortest == outer.longest == 1 + CALL + SHORT + 1 + CALL + LONG + RETURN
@@ -96,7 +97,7 @@ def test_extremes_are_those_of_all_spans(tmp_path: Path) -> None:
     listed.record(Watch(entries))
     kept.record(Watch(entries, only_extremes=True))
     for board in (listed, kept):
-        access = board.access()
+        access = BoardAccess(board)
         access.run(40_000)
         access.reset(ResetCause.EXTERNAL)
         access.run(40_000)
@@ -114,7 +115,7 @@ def test_a_bound_stands_beside_what_was_seen_where_there_is_one(tmp_path: Path) 
     image = compiled(C_PROGRAM, tmp_path / "own.elf")
     board = create(image)
     seen = Cycles(board, image, ("scale", "wait_for_pin"))
-    access = board.access()
+    access = BoardAccess(board)
     access.run(2_000)
     access.drive(8, Level.HIGH)
     access.run(2_000)
@@ -137,7 +138,7 @@ def test_where_nothing_is_installed_that_bounds_there_are_none(tmp_path: Path, m
     image = image_of(tmp_path, PROGRAM)
     board = create(image)
     seen = Cycles(board, image, ("work",))
-    board.access().run(1000)
+    BoardAccess(board).run(1000)
     assert seen["work"].bound is None and seen["work"].why == "no package is installed that works bounds out"
 
 
@@ -188,7 +189,7 @@ def test_names_as_compilers_change_them(tmp_path: Path) -> None:
     image = image_of(tmp_path, source)
     board = create(image)
     seen = Cycles(board, image, ("pulse", "Servo::write", "scale"))
-    board.access().run(200)
+    BoardAccess(board).run(200)
     assert seen.rows() == {"pulse": [1 + RETURN] * 2, "Servo::write": [RETURN] * 2, "scale": [2 + RETURN] * 2}
 
 
