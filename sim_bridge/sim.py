@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 import struct
 import weakref
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -154,6 +156,8 @@ class Sim:
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
+        self._due: list[tuple[int, int, Callable[[], object]]] = []  # cycle, number, what is done then
+        self._numbers = count()
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
         _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
@@ -286,6 +290,20 @@ class Sim:
         cycle: int = (self.handle if handle is None else handle).now
         return cycle
 
+    def at(self, cycle: int, do: Callable[[], object]) -> None:
+        """What is done when that cycle has come, or next where it is past; it may let no time pass."""
+        heapq.heappush(self._due, (cycle, next(self._numbers), do))
+
+    @property
+    def next_due(self) -> int:
+        """The cycle for which something is due next; NEVER."""
+        return self._due[0][0] if self._due else NEVER
+
+    def do_due(self) -> None:
+        """Does what is due by now."""
+        while self.next_due <= self.cycle:
+            heapq.heappop(self._due)[2]()
+
     def run(self, cycles: int) -> None:
         """Runs for `cycles`, also past bytes from robots that are listened to.
 
@@ -297,15 +315,17 @@ class Sim:
             self.run_until(until)
 
     def run_until(self, cycle: int) -> None:
-        """Runs until that cycle, or until a robot speaks that is listened to (see `SimRobot.listen`).
+        """Runs until that cycle, or until a robot speaks that is listened to (see `SimRobot.listen`); what is due
+        meanwhile is done at its cycle.
 
         Raises:
             BoardError: a board's program crashed.
         """
         cycle = whole("run_until: the cycle", cycle, BoardError, least=0, most=NEVER)
         while True:  # in portions, or Ctrl-C would not be heard
-            until = min(cycle, self.cycle + PORTION_CYCLES)
+            until = min(cycle, self.cycle + PORTION_CYCLES, max(self.next_due, self.cycle))
             self.check(lib.sim_run_until(self.handle, until))
+            self.do_due()
             if until == cycle or self.cycle < until or self._anybody_speaks():
                 return
 
@@ -452,8 +472,8 @@ class SimRobot:
         return data
 
     def follow_line(self) -> None:
-        """From now on the outside's bit rate is always the board's own, as its registers say, and `receive_stamped`
-        says when each byte has come.
+        """From now on the outside's bit rate is always the board's own, as its registers say, and `received` says when
+        each byte has come.
 
         Raises:
             BoardError: the robot has no board.
@@ -462,13 +482,8 @@ class SimRobot:
         self.handle.is_stamped = True
         lib.robot_line_rate(self.handle, 0)
 
-    def receive_stamped(self) -> list[tuple[int, int]]:
-        """Bytes that left the board since the last call, each with the cycle at which it had come."""
-        data, cycles = self.received()
-        return list(zip(cycles, data, strict=True))
-
     def received(self) -> tuple[bytes, list[int]]:
-        """The same as bytes and their cycles."""
+        """Bytes that left the board since the last call, and the cycle at which each one had come."""
         data, at = self.receive(), self.handle.received_at
         cycles = np.frombuffer(ffi.buffer(at.data + at.start, at.count)[:], "<u8").tolist() if at.count else []
         at.start = at.count = 0
@@ -600,7 +615,7 @@ class SimRobot:
         sim = self.sim
         cycles = whole("wait: cycles", cycles, BoardError, least=0, most=CYCLES_MAXIMUM)
         quiet = whole("wait: quiet", quiet, BoardError, least=0, most=CYCLES_MAXIMUM) or 1
-        if cycles <= PORTION_CYCLES:
+        if cycles <= PORTION_CYCLES and sim.next_due > sim.cycle + cycles:
             if crashed := lib.robot_wait(self.handle, cycles, quiet):
                 sim.check(crashed)
         else:

@@ -22,9 +22,8 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import CallError
 from boebot.record.blocks import Group, merged
 from boebot.record.record import Record
-from sim_bridge._core import lib
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, FRAME, LEVELS, PINS, Edge, EmulatedBoard, Level, Reaction
-from sim_bridge.pins import streams_of
+from sim_bridge.boards.board import EDGE, FRAME, LEVELS, Edge, EmulatedBoard, Reaction
+from sim_bridge.pins import EDGES_KEPT, streams_of
 from sim_bridge.sessions.world import AVR, NATIVE, open_on
 
 SLICE_CYCLES = 8_000  # 0.5 ms, between two chances for sources
@@ -40,7 +39,8 @@ class Source(Protocol):
 
 
 class EdgeLog:
-    """All edges of a bench, oldest first, and those of each pin, sorted out where somebody asks for it."""
+    """All edges of a bench, oldest first, and those of each pin, sorted out where somebody asks for it: each once, so
+    that a wait that looks again and again takes no longer in a long run."""
 
     def __init__(self, new: Callable[[], NDArray[Any]]) -> None:
         """`new`: takes the edges (dtype EDGE) since it was last called."""
@@ -80,11 +80,13 @@ class Bench:
     """A board, powered on.
 
     Attributes:
-        session: what the host opens (BoardSession), with its serial line: `session.transport`.
+        session: what the host opens (BoardSession), with its serial line, `session.transport`: while somebody waits
+            there, whatever is on the bench goes on.
         board, robot, pins: the board itself, the robot that it is on, and what a test reaches for (sim_bridge/pins.py).
         edges: what the firmware did to each pin, from the beginning: `edges[13]`.
         driven: what the outside did, likewise; empty of a native board, which cannot be seen into.
         mark: the cycle of the last event that was waited for, or that the test itself made.
+        sources: what acts on the board from outside: each queues what it does before each slice of time.
         after_slice: who is called whenever time has passed.
     """
 
@@ -121,16 +123,17 @@ class Bench:
                 image=None if image is None else str(image),
                 arena=arena,
                 noise=noise,
-                pins=True,
                 **request,
             ),
         )
         self.session.transport.stamp()
+        self.session.transport.wait = lambda robot, cycles, quiet: self.run_until(self.now + cycles)
         self.pins, self.robot, self.mark = self.session.board, self.session.robot, 0
         self.board: EmulatedBoard = self.pins.board
         self.edges, self.driven = EdgeLog(self._new_edges), EdgeLog(self._new_driven)
         self.after_slice: list[Callable[[], None]] = []
         self.sources: list[Source] = []
+        self.pins.log_outside()
         self._outside = self.board.extension("outside log", "board_outside_log")
         self._frames: dict[str, list[NDArray[Any]]] = {"to_board": [], "from_board": []}
         self._edge_count = self._queued = 0
@@ -158,16 +161,16 @@ class Bench:
             BoardError: the program crashed, or a reaction lets time pass.
         """
         while (now := self.now) < cycle:
-            self.session.transport.do_due()
+            self.session.sim.do_due()
             longest = SLICE_CYCLES if self.sources or self.after_slice else LONGEST_CYCLES
-            end = min(cycle, now + longest, self.session.transport.next_due)
+            end = min(cycle, now + longest, self.session.sim.next_due)
             if end + AHEAD_CYCLES > self._queued:
                 self._queued = end + AHEAD_CYCLES
                 for source in self.sources:
                     source.queue(self, self._queued)
             met = self.robot.run_to_edge(end, edge_of)
-            if self.session.recorder is not None:
-                self.session.recorder.collect()
+            if self.pins.edge_count - self._edge_count > EDGES_KEPT // 4:  # before the simulator forgets them
+                self.edges.take()
             for look in self.after_slice:
                 look()
             if met:
@@ -181,7 +184,7 @@ class Bench:
 
     def at(self, cycle: int, action: Callable[[], object]) -> None:
         """Calls `action` when that cycle has come; it may let no time pass."""
-        self.session.transport.at(cycle / CLOCK_HZ, action)
+        self.session.sim.at(cycle, action)
 
     # ---- what the outside does ---------------------------------------------------------------------------------------
 
@@ -189,17 +192,10 @@ class Bench:
         """Calls `react(cycle, level)` at each edge that the firmware makes at a pin, at its cycle."""
         self.board.on_edge(pin, react)
 
-    def ahead(self, source: Source) -> None:
-        """From now on a source queues what it does before each slice of time."""
-        self.sources.append(source)
-
     def drive(self, pin: int, level: int, at: int = 0) -> None:
         """From cycle `at` (or now) on the outside drives a pin to LOW 0, HIGH 1, or RELEASED 2, and no part does any
         more; replaces what was queued for it from then on."""
-        if not (0 <= pin < PINS and 0 <= level <= Level.RELEASED and at >= 0):
-            self.pins.drive(pin, level, at)  # says what is wrong
-            return
-        lib.robot_drive(self.robot.handle, at, pin, level)  # directly: a reaction may be called at each edge of a bus
+        self.pins.drive(pin, level, at)
 
     def wave(self, pin: int, cycles: Sequence[int] | NDArray[Any], level: int) -> None:
         """Drives a pin to `level` (LOW, HIGH) at the first of these cycles, to the other one at the next, and so on."""
@@ -226,9 +222,7 @@ class Bench:
 
     def _new_edges(self) -> NDArray[Any]:
         before, self._edge_count = self._edge_count, self.pins.edge_count
-        if self._edge_count == before or self.session.recorder is None:
-            return np.empty(0, EDGE)
-        return self.session.recorder.edges()
+        return self.pins.pin_log(self._edge_count - before)
 
     def _new_driven(self) -> NDArray[Any]:
         logs = (self._outside.driven, self._outside.to_board, self._outside.from_board) if self._outside else ()

@@ -105,7 +105,7 @@ class Pin:
         first, half = self._cycle(after), CLOCK_HZ / hz / 2
         if count is None:
             self._begin()
-            self.bench.ahead(Square(self.number, half, first, Level.HIGH))
+            self.bench.sources.append(Square(self.number, half, first, Level.HIGH))
             return
         count = whole(f"{self}: the count", count, CallError, least=1, most=EDGES_MAXIMUM // 2)
         edges = np.arange(2 * count)

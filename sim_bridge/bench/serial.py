@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from boebot.arguments import number, shown
 from boebot.errors import CallError
-from boebot.link.transport import Stamping, Transport
+from boebot.link.transport import Transport, stamped_read
 from sim_bridge.bench.waiting import WaitError
 
 SLICE_S = 0.000_5  # of waiting, between two looks at what has come
@@ -132,13 +132,7 @@ class Serial:
 
     def _take(self, wait_s: float, quiet_s: float = 0.0) -> None:
         """Takes what comes in that time, of which `quiet_s` passes in any case."""
-        transport = self.line.transport
-        if isinstance(transport, Stamping):
-            pieces = transport.read_stamped(wait_s, quiet_s)
-        else:
-            data = transport.read(wait_s, quiet_s)
-            pieces = [(transport.now(), data)]
-        for end_s, data in pieces:
+        for end_s, data in stamped_read(self.line.transport)(wait_s, quiet_s):
             self._text += data
             self._ends_s += [end_s] * len(data)
             if end_s <= self._sent_s:

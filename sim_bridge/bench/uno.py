@@ -35,7 +35,6 @@ from sim_bridge.bench.waiting import Cannot
 from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_image
-from sim_bridge.sessions.session import SimTransport
 
 if TYPE_CHECKING:
     from boebot.boards import TruthNow
@@ -250,10 +249,8 @@ class Uno:
         self._fired[what] = inject(fault, self._robot, session, self._bad_line)
 
     def _bad_line(self) -> BadLine:
-        line = self.serial.line
-        if not isinstance(line.transport, BadLine):
-            line.transport = BadLine(line.transport, self._wanted.seed)
-        return line.transport
+        self.serial.line.transport = line = BadLine.around(self.serial.line.transport, self._wanted.seed)
+        return line
 
     def unfired(self) -> str:
         """In a sentence: those that changed nothing so far; or ""."""
@@ -397,9 +394,9 @@ def open_uno(on: str, wanted: Wanted, *, flash: bool = False, motors: bool = Fal
         wanted.image, on=on, robot=wanted.robot, arena=wanted.arena, seed=wanted.seed, noise=wanted.noise
     )  # fmt: skip
     if wanted.baud is not None:
-        bench.robot.line_rate(wanted.baud)
+        bench.session.transport.set_baud(wanted.baud)
     elif on == AVR:
-        bench.robot.follow_line()
+        bench.session.transport.follow()
     line = _line(bench)
     if on == AVR:
         line.is_heard = lambda: bool(bench.pins.read_memory(UCSR0B, 1)[0] & RXEN0)
@@ -408,17 +405,12 @@ def open_uno(on: str, wanted: Wanted, *, flash: bool = False, motors: bool = Fal
 
 
 def _line(bench: Bench) -> Line:
-    """The serial line of a board on a bench: while somebody waits there, whatever else is on the bench goes on."""
-
-    def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
-        bench.run_until(bench.now + cycles)
+    """The serial line of a board on a bench."""
 
     def mark(at_s: float) -> None:
         bench.mark = round(at_s * CLOCK_HZ)
 
-    transport = SimTransport(bench.robot, "bench", wait)
-    transport.stamp()
-    return Line(transport, waited_for=mark)
+    return Line(bench.session.transport, waited_for=mark)
 
 
 _holds: dict[str, bytes] = {}

@@ -12,9 +12,9 @@ import math
 import random
 from collections import deque
 from collections.abc import Callable, Sequence
-from functools import partial
+from typing import Self
 
-from boebot.link.transport import Stamping, Transport, stamp_now
+from boebot.link.transport import Transport, stamped_read
 
 TO_BOARD, TO_HOST = "to_board", "to_host"
 BOTH = (TO_BOARD, TO_HOST)
@@ -124,8 +124,13 @@ class BadLine:
         self.name, self.realtime = transport.name, transport.realtime
         self.is_killed = False
         self._faults: list[_Fault] = []
-        self._read = transport.read_stamped if isinstance(transport, Stamping) else partial(stamp_now, transport)
+        self._read = stamped_read(transport)
         self._late: dict[str, deque[tuple[float, bytes]]] = {way: deque() for way in BOTH}  # bytes and when due
+
+    @classmethod
+    def around(cls, transport: Transport, seed: int) -> Self:
+        """The transport itself where it fails already."""
+        return transport if isinstance(transport, cls) else cls(transport, seed)
 
     def add(
         self, name: str, value: float, begin_s: float, end_s: float = math.inf, ways: Sequence[str] = BOTH

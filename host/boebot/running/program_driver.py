@@ -85,9 +85,8 @@ class ProgramDriver(Driver):
 
     def bad_line(self, seed: int) -> BadLine:
         """See `boebot.running.driver.Driver`."""
-        if not isinstance(self._line, BadLine):
-            self._line = BadLine(self._line, seed)
-        return self._line
+        self._line = line = BadLine.around(self._line, seed)
+        return line
 
     def end(self) -> None:
         """What is still on the line; the program goes on while others do."""

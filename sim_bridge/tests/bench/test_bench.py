@@ -144,6 +144,6 @@ def test_source_of_edges_is_asked_ahead() -> None:
             def queue(self, bench: Bench, until: int) -> None:
                 asked.append((bench.now, until))
 
-        bench.ahead(Notes())
+        bench.sources.append(Notes())
         bench.run(20_000)
         assert asked[0] == (0, 8_512) and len(asked) == 3 and asked[-1][1] == 20_512
