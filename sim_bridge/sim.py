@@ -471,15 +471,17 @@ class SimRobot:
             data += self._view[:count]
         return data
 
-    def follow_line(self) -> None:
-        """From now on the outside's bit rate is always the board's own, as its registers say, and `received` says when
-        each byte has come.
+    def follow_line(self, off: float = 0.0) -> None:
+        """From now on the outside's bit rate is always the board's own, as its registers say, but for that share of it;
+        `received` says when each byte has come.
 
         Raises:
             BoardError: the robot has no board.
         """
         self._need_board("a line")
         self.handle.is_stamped = True
+        if (share := self.board.extension("line off", "double")) is not None:
+            share[0] = off
         lib.robot_line_rate(self.handle, 0)
 
     def received(self) -> tuple[bytes, list[int]]:

@@ -8,6 +8,7 @@ import random
 from boebot.boards import RESET_CAUSES
 from sim_bridge.boards.board import EEPROM_SIZE
 from sim_bridge.pins import BoardPins
+from sim_bridge.sim import SimRobot
 
 ERASED = 0xFF  # a cell of the EEPROM that nothing was written to
 
@@ -15,9 +16,9 @@ ERASED = 0xFF  # a cell of the EEPROM that nothing was written to
 class BoardFault:
     """One of them."""
 
-    def __init__(self, pins: BoardPins, baud: int, value: float) -> None:
-        """`baud`: the bit rate of the host's side of the line."""
-        self._pins, self._baud, self._value, self._fired = pins, baud, value, 0
+    def __init__(self, robot: SimRobot, pins: BoardPins, baud: int, value: float) -> None:
+        """`baud`: the bit rate of the host's side of the line; 0: it follows the board's."""
+        self._robot, self._pins, self._baud, self._value, self._fired = robot, pins, baud, value, 0
 
     @property
     def fired(self) -> int:
@@ -78,11 +79,17 @@ class RateOff(BoardFault):
 
     def begin(self) -> None:
         """See `BoardFault`."""
-        self._pins.line_rate(round(self._baud * (1.0 + self._value)))
+        self._set(self._value)
 
     def end(self) -> None:
         """See `BoardFault`."""
-        self._pins.line_rate(self._baud)
+        self._set(0.0)
+
+    def _set(self, off: float) -> None:
+        if self._baud:
+            self._robot.line_rate(round(self._baud * (1.0 + off)))
+        else:
+            self._robot.follow_line(off)
 
 
 KINDS: dict[str, type[BoardFault]] = {

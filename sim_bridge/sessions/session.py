@@ -89,7 +89,11 @@ class InWorld:
 
 
 class SimTransport:
-    """The board's serial line, in this process. Time passes only while `read` waits."""
+    """The board's serial line, in this process. Time passes only while `read` waits.
+
+    Attributes:
+        baud: bit rate of this side; 0: the board's own, whatever that is.
+    """
 
     realtime = False
     baud_given = False
@@ -131,7 +135,7 @@ class SimTransport:
     def follow(self) -> None:
         """From now on this side has the board's own bit rate, whatever that is."""
         self._robot.follow_line()
-        self._stamps = True
+        self._stamps, self.baud = True, 0
 
     def stamp(self) -> None:
         """From now on `read_stamped` says of each byte when it had come."""
@@ -181,7 +185,7 @@ class SimSession(InWorld):
     def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
         """See `boebot.boards.Session`."""
         if (name := f"{owner}.{kind}") in KINDS:
-            fault = KINDS[name](self.board, self.transport.baud, value)
+            fault = KINDS[name](self.robot, self.board, self.transport.baud, value)
             self.sim.at(_cycle(begin_s), fault.begin)
             self.sim.at(_cycle(end_s), fault.end)
             return lambda: fault.fired
