@@ -21,7 +21,7 @@ def uno() -> Iterator[Uno]:
 @pytest.mark.parametrize("baud", [None, 9600])
 @pytest.mark.parametrize(("share", "begins"), [(0.0001, b"r"), (-0.01, b"r"), (0.09, b"\xf2")])
 def test_a_rate_that_is_off_is_off_the_programs_own(baud: int | None, share: float, begins: bytes) -> None:
-    """1 % changes nothing (ATmega328P data sheet, table 20-3). A host that is 9 % too fast samples bit n of an "r", 0x72,
+    """1 % changes nothing (ATmega328P data sheet, table 20-3). A host that is 9 % too fast samples bit n of "r", 0x72,
     at (n + 1.5) / 1.09 of the board's bits from the start on: bits 0 to 4 as they are, then bits 4, 5 and 6 again."""
     faults = (f"serial.rate={share}@0s..20ms",)
     with open_uno("avr", Wanted(image=programs.image(SERVO), baud=baud, faults=faults)) as uno:
