@@ -213,7 +213,7 @@ class PinRecorder:
         return streams_of({"pins": self.edges(), **log})
 
     def edges(self) -> NDArray[Any]:
-        """The output edges (dtype EDGE) since somebody took them."""
+        """The output edges (dtype EDGE) since the last call."""
         self._take()
         edges = np.concatenate(self._kept)
         self._kept.clear()

@@ -11,5 +11,5 @@ class WaitError(AssertionError):
     __module__ = "uno"  # as reports name it, whose lines are short
 
 
-class Cannot(BoebotError):  # noqa: N818 (no error of anybody's: a test that meets it is skipped)
+class Cannot(BoebotError):  # noqa: N818 (not a failure: the plugin skips the test)
     """The board under test cannot be asked that, as its kind has no such thing: a test is skipped, with this reason."""

@@ -162,7 +162,7 @@ class EmulatedBoard:
     def on_edge(self, pin: int, react: Reaction) -> None:
         """From now on `react(cycle, level)` is called at each edge of what the firmware does to a pin, within the run
         and at its cycle: what it drives or sends comes when it says, however the run is cut. It cannot let time pass.
-        What it raises ends the run, and is raised by who lets the board run."""
+        What it raises ends the run, and is raised by the call that runs the board."""
         board = self.handle
         self._reactions.setdefault(checked_pin("on_edge", pin), []).append(react)
         if self._in_c is None:

@@ -33,23 +33,24 @@ int sim_place_shape(sim *self, int shape, double x, double y, double heading) {
   return SIM_OK;
 }
 
-/* Takes a pin from its part. Returns 1 if a resistor pulls it up when nothing drives it. */
-static int take_pin(robot *r, uint8_t pin) {
-  int pulled_up = 0;
+/* Takes a pin from its part, or gives it back. Returns what the part does there (PART_DRIVES, ...); 0: none drives it. */
+static int override(robot *r, uint8_t pin, int overridden) {
+  int role = 0;
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     for (int k = 0; k < PART_PINS; k++) {
       if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
-      p->overridden = 1;
-      pulled_up |= (p->pins[k].role & PART_PULLED_UP) != 0;
+      p->overridden = overridden;
+      role |= p->pins[k].role;
+      if (!overridden) part_show(p, k);
     }
   }
-  return pulled_up;
+  return role;
 }
 
 void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level) {
-  const int pulled_up = take_pin(self, pin);
-  if (level == BOARD_RELEASED && pulled_up) level = BOARD_HIGH;
+  const int role = override(self, pin, 1);
+  if (level == BOARD_RELEASED && (role & PART_PULLED_UP)) level = BOARD_HIGH;
   self->chassis.driven[pin] = level;
   self->board->op->drive(self->board, at, pin, level);
 }
@@ -59,17 +60,7 @@ void robot_drive_edges(robot *self, uint8_t pin, const uint64_t *at, const uint8
 }
 
 void robot_release(robot *self, uint8_t pin) {
-  int is_shown = 0;
-  for (int i = 0; i < self->part_count; i++) {
-    part *p = self->parts[i];
-    for (int k = 0; k < PART_PINS; k++) {
-      if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
-      p->overridden = 0;
-      is_shown = 1;
-      part_show(p, k);
-    }
-  }
-  if (is_shown) return;
+  if (override(self, pin, 0)) return;
   self->chassis.driven[pin] = BOARD_RELEASED;
   self->board->op->drive(self->board, 0, pin, BOARD_RELEASED);
 }
