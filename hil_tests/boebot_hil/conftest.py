@@ -14,7 +14,7 @@ import pytest
 from boebot.boards import is_live
 from boebot.errors import BoebotError
 from boebot_hil.rig import Rig
-from sim_bridge.bench.plugin import CANNOT
+from sim_bridge.bench.waiting import Cannot
 
 EMULATED = "only an emulated board gives its pins, its reset, its EEPROM"
 START_S = 4.0  # from a real board's reset to its first hello: a boot loader waits for one to three of them
@@ -27,7 +27,6 @@ def pytest_configure(config: pytest.Config) -> None:
         "soak: takes long",
         "soak_on_avr: takes long there",
         "soak_on_native: takes long there",
-        "unsanitized: of the kit's makers",
     ):
         config.addinivalue_line("markers", mark)
     Rig.may_move = config.getoption("--uno-motors")
@@ -49,7 +48,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skips what only an emulated board can be asked, where the board under test is behind a port, which has to answer.
+    """A board behind a port has to answer.
 
     Raises:
         UsageError: it does not.
@@ -57,12 +56,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if items and not config.option.collectonly:
         for url in filter(is_live, boards(config)):
             _expect_the_kits_firmware(url)
-    for item in items:
-        spec = getattr(item, "callspec", None)
-        under_test = [spec.params["board_url"]] if spec and "board_url" in spec.params else boards(config)
-        if all(map(is_live, under_test)) and item.get_closest_marker("emulated") is not None:
-            item.add_marker(pytest.mark.skip(reason=EMULATED))
-            item.user_properties.append((CANNOT, EMULATED))  # the plugin counts them
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Raises Cannot where only an emulated board can be asked, and the board under test is another."""
+    params: dict[str, str] = item.callspec.params if hasattr(item, "callspec") else {}
+    if item.get_closest_marker("emulated") and is_live(params.get("board_url", boards(item.config)[0])):
+        raise Cannot(EMULATED)
 
 
 def _expect_the_kits_firmware(url: str) -> None:

@@ -6,7 +6,7 @@ Every wait is in the board's own time and says what it waits for.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, ClassVar, TypeVar
 
@@ -15,6 +15,7 @@ import numpy as np
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import frame, messages
+from sim_bridge.bench.pins import pulses_of
 from sim_bridge.bench.waiting import Cannot
 
 _M = TypeVar("_M")  # a message
@@ -291,14 +292,5 @@ class Rig:
 
     def pulses(self, pin: int) -> np.ndarray:
         """Start and width, in cycles, of every high pulse that the board gave on `pin`: shape (n, 2)."""
-        return np.array(list(_pulses(self.board.pin_log(), pin)), dtype=np.int64).reshape(-1, 2)
-
-
-def _pulses(log: np.ndarray, pin: int) -> Iterator[tuple[int, int]]:
-    rise = None
-    for edge in log[log["pin"] == pin]:
-        if edge["level"] == 1:
-            rise = int(edge["cycle"])
-        elif rise is not None:
-            yield rise, int(edge["cycle"]) - rise
-            rise = None
+        log = self.board.pin_log()
+        return pulses_of(log[log["pin"] == pin])

@@ -232,9 +232,7 @@ class Pin:
 
     def all_pulses(self, since: int = 0, level: int = 1) -> NDArray[np.int64]:
         """Start and length, in cycles, of each pulse that has ended and began at `since` or later: shape (n, 2)."""
-        changes = self.edges(since)
-        cycles, begins = changes["cycle"].astype(np.int64), np.flatnonzero(changes["level"][:-1] == level)
-        return np.column_stack((cycles[begins], cycles[begins + 1] - cycles[begins]))
+        return pulses_of(self.edges(since), level)
 
     def frequency(self, periods: int = 8, within: float = WITHIN_S) -> float:
         """Hz, over that many whole periods, from rise to rise, from the mark on. Raises as `pulse`."""
@@ -289,6 +287,12 @@ class Pin:
             f"it had {count} edges meanwhile, and has been {names[Level(self._levels[-1])]} since "
             f"{self._cycles[-1] / CLOCK_HZ:.6f} s; now it is {self.bench.now / CLOCK_HZ:.6f} s{native}"
         )
+
+
+def pulses_of(changes: NDArray[Any], level: int = 1) -> NDArray[np.int64]:
+    """Start and length, in cycles, of the pulses among a pin's changes of level (dtype EDGE): shape (n, 2)."""
+    cycles, begins = changes["cycle"].astype(np.int64), np.flatnonzero(changes["level"][:-1] == level)
+    return np.column_stack((cycles[begins], cycles[begins + 1] - cycles[begins]))
 
 
 NATIVE = " (of the native board only what the firmware drives is seen)"
