@@ -320,7 +320,7 @@ class Uno:
             world=bench.session.arena,
             run_time=self.now,
             layout=bench.session.layout,
-            program=hashlib.sha256((image or self.elf()).read_bytes()).hexdigest(),
+            program=hashlib.sha256(file.read_bytes()).hexdigest() if (file := image or bench.board.elf) else None,
         )
         with RunFolder(folder) as run_folder:
             recording.begin(run_folder, [run], {}, {}, waits=True)
