@@ -24,13 +24,14 @@ class SentByte(NamedTuple):
 class BoardAccess(BoardMemory):
     """One board's operations, times in CPU cycles since power-on, pins by their Arduino numbers (A0 is 14)."""
 
-    def __init__(self, board: EmulatedBoard) -> None:
-        """Becomes the listener of the board, and keeps it alive."""
+    def __init__(self, board: EmulatedBoard, logs: bool = True) -> None:
+        """Becomes the listener of the board, and keeps it alive. `logs`: what `log` gives is kept until then."""
         ffi, log, volts = board.ffi, list[tuple[int, int, int]](), dict[int, float]()
         sink = ffi.callback("board_edge_sink", lambda _, *edge: log.append(edge))
         source = ffi.callback("board_analog_source", lambda _, cycle, channel: volts.get(channel, 0.0))
         board.called_by_c += [sink, source]
-        board.handle.sink = sink
+        if logs:
+            board.handle.sink = sink
         board.handle.op.analog(board.handle, source, ffi.NULL)
         self._listens_to: EmulatedBoard | None = board
         self._log, self._volts = log, volts

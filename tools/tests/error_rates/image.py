@@ -32,7 +32,7 @@ class Image:
 
     def __init__(self, pin_map: str = "shieldbot") -> None:
         self._board = avr.create(ROOT / "build" / "images" / f"{pin_map}.elf")
-        self._access = BoardAccess(self._board)
+        self._access = BoardAccess(self._board, logs=False)
         self._receiver, self._twin = Decoder(), Decoder(NO_SESSION, to_board=True)
         for decoder in (self._receiver, self._twin):
             decoder.feed(b"\0")
