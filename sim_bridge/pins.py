@@ -187,10 +187,6 @@ class BoardPins(BoardMemory):
         self._robot.handle.reset_at = self.cycle
         self.board.handle.op.reset(self.board.handle, causes[cause])
 
-    def line_rate(self, baud: int) -> None:
-        """Bit rate of the host's side of the serial line."""
-        self._robot.line_rate(baud)
-
 
 class PinRecorder:
     """The streams "pins" of a record, the output edges of a board, and of what the outside does "inputs", "line_in" and
