@@ -87,16 +87,10 @@ void robot_unplug(robot *self, int number, int unplugged) {
   part_unplug(p, unplugged);
 }
 
-/* Faults that a wheel, and the whole robot, can have. */
-static uint32_t faults_of_place(int number) {
-  return number == FAULTY_ROBOT ? FAULT_BIT(FAULT_LIFTED) : FAULT_BIT(FAULT_BLOCKED) | FAULT_BIT(FAULT_SLIPPING);
-}
-
 int robot_fault(robot *self, int number, int kind, double value, uint64_t begin, uint64_t end) {
   const uint64_t now = self->sim->now;
   part *of = number < 0 ? NULL : self->parts[number];
   if (begin < now) begin = now;
-  if (end <= begin || (of == NULL && !(faults_of_place(number) & FAULT_BIT(kind)))) return SIM_BAD_ARGUMENT;
   fault **faults = realloc(self->faults, (size_t)(self->fault_count + 1) * sizeof *faults);
   if (faults == NULL) return SIM_NO_MEMORY;
   self->faults = faults;
