@@ -154,9 +154,9 @@ class BoardPins(BoardMemory):
 
     def supply(self, volts: float | None) -> None:
         """Holds the 5 V rail of board and servos at that voltage; None: what the regulator gives."""
-        held = (
-            0.0 if volts is None else number("supply: the voltage", volts, BoardError, least=0, most=SUPPLY_MAXIMUM_V)
-        )
+        held = 0.0  # not held
+        if volts is not None:
+            held = max(number("supply: the voltage", volts, BoardError, least=0, most=SUPPLY_MAXIMUM_V), 1e-6)
         self._with_board.held_supply = held / lib.SUPPLY_NOMINAL_V
         lib.robot_update_supply(self._robot.handle)
 

@@ -15,7 +15,7 @@ from boebot.devices.uart import Uart
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.pins import BoardPins, PinRecorder
-from sim_bridge.sessions.board_faults import KINDS
+from sim_bridge.sessions.board_faults import KINDS, Acting
 from sim_bridge.sim import NEVER, SimRobot
 from sim_bridge.vehicles import STEP_S
 
@@ -184,11 +184,11 @@ class SimSession(InWorld):
 
     def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
         """See `boebot.boards.Session`."""
-        if (name := f"{owner}.{kind}") in KINDS:
-            fault = KINDS[name](self.robot, self.board, self.transport.baud, value)
-            self.sim.at(_cycle(begin_s), fault.begin)
-            self.sim.at(_cycle(end_s), fault.end)
-            return lambda: fault.fired
+        if (act := KINDS.get(f"{owner}.{kind}")) is not None:
+            baud, acting = self.transport.baud, list[Acting]()
+            self.sim.at(_cycle(begin_s), lambda: acting.append(act(self.robot, baud, value)))
+            self.sim.at(_cycle(end_s), lambda: acting[0][0]())
+            return lambda: sum(fired() for _, fired in acting)
         return super().fault(owner, kind, value, begin_s, end_s)
 
     def texts(self) -> dict[str, str]:

@@ -161,8 +161,10 @@ class FaultKind(NamedTuple):
     """And at most."""
     words: tuple[str, ...] = ()
     """VALUE by name, the first one the default; the simulator gets its index."""
-    lasts: bool = True
-    """From START to END; False: it happens at START."""
+    when: Literal["a span", "until END", "once"] = "a span"
+    """From START to END, or to the end of the run; where it needs an END; or at START alone."""
+    harmless: float | None = None
+    """VALUE that changes nothing, if there is one."""
 
 
 class Run(Protocol):

@@ -81,11 +81,11 @@ class _Fault:
         self._frames = {way: bytearray() for way in ways}  # that have begun
 
     def holds(self, time_s: float) -> bool:
-        """It is on."""
+        """It acts at that time."""
         return self.begin_s <= time_s + _ROUNDING_S < self.end_s
 
     def through(self, way: str, data: bytes) -> bytes:
-        """What comes of bytes that pass."""
+        """The bytes as this fault leaves them."""
         if self.name == "serial.repeated":
             return self._repeated(self._chances[way], self._frames[way], data)
         if self.name in _DAMAGE:

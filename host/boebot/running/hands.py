@@ -9,6 +9,7 @@ bit for bit: `boebot replay --again` takes them from the record.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from operator import itemgetter
 
 import msgspec
@@ -116,7 +117,7 @@ class Hands:
         self.driver, self.task = driver, task
         self.held: Hand | None = None
         self._tally = Tally()
-        self.faults: list[tuple[Fault, Fired]] = []
+        self.faults: dict[str, Fired] = {}
         self.onlooker, self._number = onlooker, number
 
     @property
@@ -126,7 +127,7 @@ class Hands:
 
     def fired(self) -> dict[str, int]:
         """Of each fault how often it has fired."""
-        return {str(fault): fired() for fault, fired in self.faults}
+        return {fault: fired() for fault, fired in self.faults.items()}
 
     def before_step(self, time_s: float) -> None:
         """What is due."""
@@ -158,10 +159,9 @@ class Hands:
                 check_setting(self.driver.description, part, value)
                 self.driver.session.set_part(part, value)
             case Fault():
-                driver, seed = self.driver, self.task.seed
+                driver, bad_line = self.driver, partial(self.driver.bad_line, self.task.seed)
                 offset_s = driver.status().clock_offset
-                fired = inject(one, driver.description, driver.session, lambda: driver.bad_line(seed), offset_s)
-                self.faults.append((one, fired))
+                self.faults[str(one)] = inject(one, driver.description, driver.session, bad_line, offset_s)
                 driver.has_faults = True
             case _ if self.driver.is_program:
                 raise BoebotError("a program drives this robot, no brain: it takes what is typed, and buttons")
