@@ -53,9 +53,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     Raises:
         UsageError: it does not.
     """
-    if items and not config.option.collectonly:
-        for url in filter(is_live, boards(config)):
-            _expect_the_kits_firmware(url)
+    for url in filter(is_live, boards(config)) if items and not config.option.collectonly else ():
+        try:
+            with Rig.open(url) as rig:
+                rig.next_hello(within_s=START_S)
+        except AssertionError:
+            firmware = f"expected its firmware: boebot flash --on {url}"
+            raise pytest.UsageError(f"the board at {url} does not speak the kit's protocol; {firmware}") from None
+        except BoebotError as error:
+            raise pytest.UsageError(str(error)) from None
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -63,19 +69,6 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     params: dict[str, str] = item.callspec.params if hasattr(item, "callspec") else {}
     if item.get_closest_marker("emulated") and is_live(params.get("board_url", boards(item.config)[0])):
         raise Cannot(EMULATED)
-
-
-def _expect_the_kits_firmware(url: str) -> None:
-    why = ""
-    try:
-        with Rig.open(url) as rig:
-            rig.next_hello(within_s=START_S)
-    except AssertionError:
-        why = f"the board at {url} does not speak the kit's protocol; expected its firmware: boebot flash --on {url}"
-    except BoebotError as error:
-        why = str(error)
-    if why:
-        raise pytest.UsageError(why)
 
 
 @pytest.fixture

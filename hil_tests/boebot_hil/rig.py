@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -75,9 +74,7 @@ class Rig:
     def __enter__(self) -> Rig:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.session.close()
 
     @property
@@ -155,9 +152,11 @@ class Rig:
         self.answers.clear()
         return self.next(messages.Hello, within_s)
 
-    def first(self, kind: type[_M], such: Callable[[_M], bool], within_s: float, what: str) -> _M:
-        """The first message of that kind from now on that is such a one."""
-        begin = len(self.heard)
+    def first(
+        self, kind: type[_M], such: Callable[[_M], bool], within_s: float, what: str, since: int | None = None
+    ) -> _M:
+        """The first message of that kind that is such a one, from now on or behind the first `since` of `heard`."""
+        begin = len(self.heard) if since is None else since
         found: _M = self.wait_for(
             lambda: next((heard for heard in self.heard[begin:] if isinstance(heard, kind) and such(heard)), None),
             within_s,
@@ -169,17 +168,11 @@ class Rig:
         """Sends the next numbered request, again if it or its answer is lost, and returns the answer. Each repetition
         comes at another phase of the tick: what the board misses in one phase of each tick it hears in another."""
         self.answers.clear()
-        request = self.numbered(kind, *fields)
-
-        def answer() -> messages.Answer | None:
-            heard = (a for a in self.answers if isinstance(a, messages.Answer) and a.number == request.number)
-            return next(heard, None)
-
+        request, begin = self.numbered(kind, *fields), len(self.heard)
         for _ in range(4):
             self.send(request)
             with contextlib.suppress(AssertionError):
-                found: messages.Answer = self.wait_for(answer, within_s, "")
-                return found
+                return self.first(messages.Answer, lambda answer: answer.number == request.number, within_s, "", begin)
             self.listen(0.37 * TICK_S)
         raise AssertionError(f"waited in vain for the answer to {kind.__name__}")
 
@@ -258,15 +251,10 @@ class Rig:
 
     def open_session(self) -> messages.Hello:
         """Opens a session; another's has to end first. A lost frame is sent again, at another phase of the tick."""
-
-        def free() -> messages.Hello | None:
-            heard = (a for a in self.answers if isinstance(a, messages.Hello) and a.session == 0)
-            return next(heard, None)
-
         self.answers.clear()
         self.seed = 0
         self.decoder.seed = frame.NO_SESSION
-        hello = self.wait_for(free, 4.0, "a hello without a session")
+        hello = self.first(messages.Hello, lambda hello: hello.session == 0, 4.0, "a hello without a session")
         seed = hello.board_nonce ^ HOST_NONCE
         for attempt in range(5):
             self.send(messages.Open(messages.PROTOCOL_VERSION, hello.board_nonce, HOST_NONCE))

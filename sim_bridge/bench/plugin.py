@@ -35,11 +35,8 @@ if TYPE_CHECKING:
 
 MARK = "uno"
 JUDGED = pytest.StashKey[int]()  # of a test that passed so far: how many of its measurements were looked at
-MEASURED, CANNOT, CYCLES = (
-    "uno.measured.",
-    "uno.cannot",
-    "uno.cycles",
-)  # of the properties of a test's report, which reach JUnit's file
+# Names of the properties of a test's report, which reach JUnit's file.
+MEASURED, CANNOT, CYCLES = "uno.measured.", "uno.cannot", "uno.cycles"
 BASELINE, UPDATE = "uno-baseline.json", "update"
 MEASURED_FILE, COVER_FILE = "measured.json", "cover.info"
 LONGEST_NAME = 80  # letters of a folder's name, before its hash
@@ -65,12 +62,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="cycles of functions as they were: a change fails (uno-baseline.json, if it is there); update writes that",
     )
     group.addoption("--uno-cover", action="store_true", help="lines and conditional jumps that the tests have executed")
-    group.addoption(
-        "--uno-keep",
-        metavar="DIR",
-        default=".uno",
-        help="where what failing tests leave goes, and measured.json (.uno)",
-    )
+    keep_help = "where what failing tests leave goes, and measured.json (.uno)"
+    group.addoption("--uno-keep", metavar="DIR", default=".uno", help=keep_help)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -117,18 +110,17 @@ def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
     from sim_bridge.bench.uno import open_uno
 
     board = getattr(request, "param", None) or boards(request.config)[0]
-    failure = ""
     try:
         flash, motors = (request.config.getoption(name) for name in ("--uno-flash", "--uno-motors"))
         opened = open_uno(board, _wanted(request.node), flash=flash, motors=motors)
     except BoebotError as error:
         if _cannot(error):
             raise
-        failure = "\n".join([f"uno: {error}", *getattr(error, "__notes__", ())])
-    if failure:  # here, or the text of the error would be shown twice
-        pytest.fail(failure, pytrace=False)
+        sentence = "\n".join([f"uno: {error}", *getattr(error, "__notes__", ())])
+        raise pytest.fail.Exception(sentence, pytrace=False) from None
     request.node.stash[UNO] = opened
     yield opened
+    failure = ""
     try:
         request.config.stash[SESSION].take_cover(opened)
         request.node.user_properties += [(MEASURED + one.name, json.dumps(vars(one))) for one in opened.measured]
@@ -164,10 +156,6 @@ def _wanted(item: pytest.Item) -> Wanted:
     session = item.config.stash[SESSION]
     known = session.baseline.functions(item.nodeid) if session.baseline else ()
     asked |= {"cover": session.coverage is not None, "cycles": tuple(dict.fromkeys((*asked["cycles"], *known)))}
-    if asked.get("image") is None and asked.get("robot") is None:
-        raise CallError(
-            f"{item.name} says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot="
-        )
     if (image := asked.get("image")) is not None:
         asked["image"] = session.program(_file(item, image))
     return Wanted(**asked)

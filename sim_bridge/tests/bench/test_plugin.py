@@ -196,7 +196,7 @@ def test_robot(uno):
 
 
 BAD_MARKS = {
-    "": "test_it says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot=",
+    "": "there is nothing to test; expected image= or robot=, or both",
     "image='no.elf'": "there is no no.elf, neither in * nor in *",
     "image='text.elf'": "*text.elf*",
     "imgae='own.elf'": "*uno(imgae=...): expected one of image, robot, *; did you mean 'image'?",
