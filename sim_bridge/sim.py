@@ -591,8 +591,8 @@ class SimRobot:
         one = kinds[kind]
         most = len(one.words) - 1 if one.words else one.most
         value = arguments.number(f"{where}: its value", value, BoardError, least=one.least, most=most)
-        begin = whole(f"{where}: its begin", begin_cycle, BoardError, least=0, most=NEVER - 1)
-        end = whole(f"{where}: its end", end_cycle, BoardError, least=max(begin, self.sim.cycle) + 1, most=NEVER)
+        begin = max(whole(f"{where}: its begin", begin_cycle, BoardError, least=0, most=NEVER - 1), self.sim.cycle)
+        end = whole(f"{where}: its end", end_cycle, BoardError, least=begin + 1, most=NEVER)
         which = getattr(lib, f"FAULT_{kind.upper()}")
         slot = lib.robot_fault(self.handle, parts[owner], which, value, begin, end)
         if slot == lib.SIM_BAD_ARGUMENT:

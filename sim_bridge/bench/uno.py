@@ -241,12 +241,11 @@ class Uno:
             CallError: there is no such fault here.
             Cannot: the board is behind a port, where only the line and the host can fail.
         """
-        from boebot.running.faults import HOST, inject, read
+        from boebot.running.faults import AT_A_PORT, inject, read
 
         fault = read(what, self._robot)
-        hosts = fault.name.partition(".")[0] in HOST and fault.name != "serial.rate"
-        session: Any = None if hosts else self.bench("parts").session
-        self._fired[what] = inject(fault, self._robot, session, self._bad_line)
+        session: Any = None if fault.name in AT_A_PORT else self.bench("parts").session
+        self._fired[str(fault)] = inject(fault, self._robot, session, self._bad_line)
 
     def _bad_line(self) -> BadLine:
         self.serial.line.transport = line = BadLine.around(self.serial.line.transport, self._wanted.seed)

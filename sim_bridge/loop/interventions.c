@@ -88,9 +88,7 @@ void robot_unplug(robot *self, int number, int unplugged) {
 }
 
 int robot_fault(robot *self, int number, int kind, double value, uint64_t begin, uint64_t end) {
-  const uint64_t now = self->sim->now;
   part *of = number < 0 ? NULL : self->parts[number];
-  if (begin < now) begin = now;
   fault **faults = realloc(self->faults, (size_t)(self->fault_count + 1) * sizeof *faults);
   if (faults == NULL) return SIM_NO_MEMORY;
   self->faults = faults;

@@ -128,8 +128,9 @@ int robot_answer_ping(robot *self, int64_t echo_cycles);
 void robot_unplug(robot *self, int number, int unplugged);
 
 /* Lays a fault (FAULT_...) on the part of that number, or on a wheel or the whole robot, for the cycles from `begin`, now at
- * the earliest, up to `end`, which is later; `value` in the unit of the device's FAULTS. Wheels and motors take up a fault with a step of
- * the world. Returns its number, or an error: SIM_BAD_ARGUMENT, another one of its kind acts at the same time. One of a kind that the part does not have never fires. */
+ * the earliest, up to `end`, which is later; `value` in the unit of the device's FAULTS. Wheels and motors take up a fault
+ * with a step of the world. One of a kind that the part does not have never fires. Returns its number, or an error:
+ * SIM_BAD_ARGUMENT, another one of its kind acts at the same time. */
 int robot_fault(robot *self, int number, int kind, double value, uint64_t begin, uint64_t end);
 
 /* How often what went out was not what would have gone out without the fault of that number, so far. */

@@ -45,12 +45,8 @@ class _Chance:
         return found
 
 
-def _dropped(data: bytes, hits: Sequence[int]) -> bytes:
-    return bytes(byte for i, byte in enumerate(data) if i not in hits)
-
-
-def _doubled(data: bytes, hits: Sequence[int]) -> bytes:
-    return b"".join(data[i : i + 1] * (1 + (i in hits)) for i in range(len(data)))
+def _copied(data: bytes, hits: Sequence[int], copies: int) -> bytes:
+    return b"".join(data[i : i + 1] * (copies if i in hits else 1) for i in range(len(data)))
 
 
 def _flipped(data: bytes, hits: Sequence[int]) -> bytes:
@@ -61,8 +57,8 @@ def _flipped(data: bytes, hits: Sequence[int]) -> bytes:
 
 
 _DAMAGE: dict[str, tuple[int, Callable[[bytes, Sequence[int]], bytes]]] = {
-    "serial.dropped": (1, _dropped),
-    "serial.doubled": (1, _doubled),
+    "serial.dropped": (1, lambda data, hits: _copied(data, hits, 0)),
+    "serial.doubled": (1, lambda data, hits: _copied(data, hits, 2)),
     "serial.flipped": (8, _flipped),
 }
 """Units in a byte, and what becomes of bytes of which some units are hit."""

@@ -128,9 +128,8 @@ def _kind(name: str, robot: RobotDescription, fault: str) -> tuple[FaultKind, tu
         return there[name]
     owner = name.partition(".")[0]
     near = [one for one in there if one.partition(".")[0] == owner]
-    hint = did_you_mean(name, there) or (
-        f"; expected one of {', '.join(near)}" if near else "; boebot faults lists all"
-    )
+    others = f"expected one of {', '.join(near)}" if near else "boebot faults lists all"
+    hint = did_you_mean(name, there) or f"; {others}"
     raise CallError(f"fault {fault!r}: robot {robot.name!r} has no {name!r}{hint}")
 
 

@@ -97,8 +97,7 @@ def script(request: Request, tasks: Sequence[Task]) -> Repeated:
     deeds: list[tuple[float, Deed]] = [(time_s, Typed(text, scripted=True)) for text, time_s in request.typed]
     deeds += [(time_s, Set(part, float(value), scripted=True)) for part, value, time_s in request.inputs]
     deeds.sort(key=itemgetter(0))
-    faults: list[list[tuple[float, Deed]]] = [[(0.0, one) for one in task.faults] for task in tasks]
-    return Repeated([one + deeds * task.brain.is_program for one, task in zip(faults, tasks, strict=True)])
+    return Repeated([[*((0.0, one) for one in task.faults), *deeds * task.brain.is_program] for task in tasks])
 
 
 class Hands:

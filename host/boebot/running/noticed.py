@@ -38,7 +38,7 @@ FIGURES = {
 BOARD = {"bad": "board: checksum", "late": "board: late set-points", "duplicate": "board: request numbers"}
 DRAWN = [name for name in switches() if name not in ("coast_drag", "slip", "battery_sag")]  # with random draws
 _STILL_M_S, _STILL_S = 0.01, 0.3
-RESET = Fault("board.reset", None, 1.0)  # beside eeprom.corrupted: the firmware reads its memory as it starts
+RESET = Fault("board.reset", "external", 1.0)  # beside eeprom.corrupted: the firmware reads its memory as it starts
 
 NOTICED, HARMLESS = "noticed", "changes nothing"
 NOT_HERE, NEVER, BROKEN = "not by this kit", "cannot be noticed", "does not hold"
@@ -91,7 +91,6 @@ class _Run(Onlooker):
 
     def __init__(self, robot: RobotDescription, faults: list[Fault]) -> None:
         self.readings: dict[float, dict[str, Any]] = {}
-        self.saves = RESET in faults
         names = [name for name, device in robot.device.items() if device.on and device.READING is not None]
 
         def step(robot: Robot) -> None:
@@ -108,7 +107,7 @@ class _Run(Onlooker):
         """The board saves its parameters where it is going to read them."""
         assert robots[0].driver.link is not None
         self._link = robots[0].driver.link
-        if self.saves:
+        if RESET in robots[0].task.faults:
             self._link.parameters.save()
 
     def look(self, time_s: float, *, is_over: bool = False) -> None:
@@ -177,7 +176,7 @@ def _noticed(robot: RobotDescription, name: str, plain: _Run, beside: list[Fault
     verdict, why = (BROKEN if any(wrong) else NOTICED, "") if by else REASONS.get(name, ("", ""))
     return Noticed(
         name,
-        sum(count for fault, count in run.result.faults.items() if fault.startswith(name)),
+        next(iter(run.result.faults.values())),
         verdict,
         (*by, *([why] if why else [])),
         sign_s - BEGIN_S if by and sign_s is not None else None,
