@@ -24,9 +24,6 @@ def pytest_configure(config: pytest.Config) -> None:
     for mark in (
         "promise(heading, words...): what it proves, in the words of PROTOCOL.md",
         "emulated: reaches for what only an emulated board gives: its pins, its reset, its EEPROM",
-        "soak: takes long",
-        "soak_on_avr: takes long there",
-        "soak_on_native: takes long there",
     ):
         config.addinivalue_line("markers", mark)
     Rig.may_move = config.getoption("--uno-motors")
@@ -38,13 +35,7 @@ def boards(config: pytest.Config) -> list[str]:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "board_url" in metafunc.fixturenames:
-        urls = [
-            pytest.param(
-                url, marks=pytest.mark.soak if metafunc.definition.get_closest_marker(f"soak_on_{url}") else ()
-            )
-            for url in boards(metafunc.config)
-        ]
-        metafunc.parametrize("board_url", urls, scope="session")
+        metafunc.parametrize("board_url", boards(metafunc.config), scope="session")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -58,18 +58,12 @@ class Rig:
         self._probed = 0.0
 
     @classmethod
-    def open(
-        cls,
-        url: str,
-        robot: str | RobotDescription = "shieldbot",
-        arena: str = "empty",
-        noise: bool = False,
-        **request: Any,
-    ) -> Rig:
-        """A rig around the board at `url`, by default in an empty field and without noise; `request`: what else a
-        BoardRequest has."""
+    def open(cls, url: str, robot: str | RobotDescription = "shieldbot", **request: Any) -> Rig:
+        """A rig around the board at `url`; `request`: what else a BoardRequest has, by default an empty field without
+        noise."""
         described = load_robot(robot) if isinstance(robot, str) else robot
-        return cls(open_board(url, BoardRequest(robot=described, arena=arena, noise=noise, **request)))
+        asked: dict[str, Any] = {"arena": "empty", "noise": False} | request
+        return cls(open_board(url, BoardRequest(robot=described, **asked)))
 
     def __enter__(self) -> Rig:
         return self
@@ -142,10 +136,9 @@ class Rig:
 
     def next(self, kind: type[_M], within_s: float = 0.1) -> _M:
         """The next message of that kind, or one that has come since the last question."""
-        found: _M = self.wait_for(
+        return self.wait_for(
             lambda: next((a for a in reversed(self.answers) if isinstance(a, kind)), None), within_s, kind.__name__
         )
-        return found
 
     def next_hello(self, within_s: float = 1.0) -> messages.Hello:
         """The board's next hello."""
@@ -157,12 +150,11 @@ class Rig:
     ) -> _M:
         """The first message of that kind that is such a one, from now on or behind the first `since` of `heard`."""
         begin = len(self.heard) if since is None else since
-        found: _M = self.wait_for(
-            lambda: next((heard for heard in self.heard[begin:] if isinstance(heard, kind) and such(heard)), None),
+        return self.wait_for(
+            lambda: next((m for m in self.heard[begin:] if isinstance(m, kind) and such(m)), None),
             within_s,
             what,
         )
-        return found
 
     def request(self, kind: Any, *fields: int, within_s: float = 0.1) -> messages.Answer:
         """Sends the next numbered request, again if it or its answer is lost, and returns the answer. Each repetition
@@ -181,7 +173,7 @@ class Rig:
         self._number = (self._number + 1) & 0xFFFF
         return kind(self._number, *fields)
 
-    def wait_for(self, condition: Callable[[], Any], within_s: float, what: str) -> Any:
+    def wait_for(self, condition: Callable[[], _M | None], within_s: float, what: str) -> _M:
         """Listens until `condition()` is true; fails after `within_s` of the board's time."""
         end = self.transport.now() + within_s
         while not (value := condition()):
@@ -243,11 +235,10 @@ class Rig:
     def start(self, arm: bool = True) -> messages.Hello:
         """Waits for the board to be up, opens a session and arms the motors, where they may move."""
         self.alive = True
-        self.open_session()
+        hello = self.open_session()
         if arm and self._may_move:
             self.arm()
-        assert self.hello is not None
-        return self.hello
+        return hello
 
     def open_session(self) -> messages.Hello:
         """Opens a session; another's has to end first. A lost frame is sent again, at another phase of the tick."""

@@ -90,8 +90,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def boards(config: pytest.Config) -> list[str]:
     """Those under test."""
-    given: list[str] | None = config.getoption("--uno-on")
-    return given or ["avr"]
+    return config.getoption("--uno-on") or ["avr"]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -156,6 +155,8 @@ def _wanted(item: pytest.Item) -> Wanted:
     session = item.config.stash[SESSION]
     known = session.baseline.functions(item.nodeid) if session.baseline else ()
     asked |= {"cover": session.coverage is not None, "cycles": tuple(dict.fromkeys((*asked["cycles"], *known)))}
+    if not isinstance(robot := asked.get("robot"), str | None):
+        raise CallError(f"robot={robot!r}; expected its name or its .toml file")
     if (image := asked.get("image")) is not None:
         asked["image"] = session.program(_file(item, image))
     return Wanted(**asked)
@@ -392,13 +393,16 @@ class Session:
             seen = {name: [FunctionCycles(**row) for row in rows] for name, rows in self._cycles.items()}
             say(table_of(seen))
             if self.baseline and self.baseline.updates:
-                for name, found in seen.items():
-                    if name in self._failed:
-                        say(f"not written: {name}, which failed")
-                    else:
-                        self.baseline.put(name, found)
+                for name in seen.keys() - self._failed:
+                    self.baseline.put(name, seen[name])
                 self.baseline.write()
-                say(f"the others with calls are written to {self.baseline.path}")
+                say(f"written to {self.baseline.path}")
+                missing = [f"{name}, which failed" for name in seen if name in self._failed]
+                missing += [
+                    f"{one.name} of {name}, no call has ended" for name in seen for one in seen[name] if not one.calls
+                ]
+                for what in missing:
+                    say(f"not written: {what}")
         if self.coverage:
             terminalreporter.section("executed")
             say(self.coverage.table(self._root))

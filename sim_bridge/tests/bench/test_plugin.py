@@ -201,6 +201,7 @@ BAD_MARKS = {
     "image='text.elf'": "*text.elf*",
     "imgae='own.elf'": "*uno(imgae=...): expected one of image, robot, *; did you mean 'image'?",
     "'own.elf'": "*uno('own.elf'): expected a keyword, such as image='own.elf'",
+    "robot=['shieldbot']": "robot=['shieldbot']; expected its name or its .toml file",
     "robot='shieldbotx'": "*shieldbotx*did you mean*",
     "image='own.elf', faults=3": "*uno(faults=3): expected a text, or several",
     "image='own.elf', cycles=['']": "*uno(cycles=['']): expected a text, or several",
