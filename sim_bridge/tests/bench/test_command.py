@@ -12,6 +12,8 @@ import pytest
 from boebot.errors import CallError
 from sim_bridge.bench import command
 
+pytestmark = pytest.mark.unsanitized  # runs of pytest in processes, of the package that is installed
+
 
 def test_it_says_how_it_went(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither the settings nor the tests of the folder that it is called in are heeded."""
