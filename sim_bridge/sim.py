@@ -20,6 +20,7 @@ from boebot.arenas.floor_plan import Lateness, Shift
 from boebot.arguments import point, shown, whole
 from boebot.boards import TruthNow
 from boebot.description import robots
+from boebot.description.equipment import check_setting
 from boebot.devices.display import letters_of
 from boebot.devices.faults import BODY_FAULTS
 from boebot.errors import ArenaError, BoardError, BrainError
@@ -430,7 +431,11 @@ class Sim:
 
 
 class SimRobot:
-    """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
+    """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`.
+
+    Attributes:
+        touched: called when somebody has put it elsewhere or has worked one of its devices.
+    """
 
     def __init__(self, sim: Sim, number: int) -> None:
         self.sim, self.number = sim, number
@@ -438,6 +443,7 @@ class SimRobot:
         self._received = ffi.addressof(self._robot, "received")
         self._room = ffi.new("uint8_t[]", ROOM)
         self._view = ffi.buffer(self._room)
+        self.touched: Callable[[], object] = lambda: None
         self._displays: dict[str, int] | None = None  # numbers of parts that show letters, once somebody has asked
 
     @property
@@ -565,11 +571,11 @@ class SimRobot:
         """Works a device at its board, such as a button (0, 1) or a knob (0 to 1).
 
         Raises:
-            BoardError: it has none that can be set so.
+            BoebotError: it has none that can be set so.
         """
-        parts = self.parts
-        if device not in parts or lib.robot_set_part(self.handle, parts[device], value) != lib.SIM_OK:
-            raise BoardError(f"device {device!r} of robot {self.description.name!r} cannot be set to {value:g}")
+        check_setting(self.description, device, arguments.number(f"{device} is set: the value", value, BoardError))
+        done(lib.robot_set_part(self.handle, self.parts[device], value), device)
+        self.touched()
 
     def fault(self, owner: str, kind: str, value: float, begin_cycle: int, end_cycle: int = NEVER) -> Callable[[], int]:
         """Lays a fault on a device at its board, a wheel ("wheel_left", "wheel_right"), the "battery" or the whole
@@ -705,6 +711,7 @@ class SimRobot:
             raise ArenaError(
                 f"a robot cannot stand at {x:.2f} m, {y:.2f} m: a wall, a moving shape or another robot is in the way"
             )
+        self.touched()
 
     def _need_board(self, what: str) -> None:
         if not self.description.has_board:

@@ -27,6 +27,7 @@ from sim_bridge.pins import EDGES_KEPT, streams_of
 from sim_bridge.sessions.world import AVR, NATIVE, open_on
 
 SLICE_CYCLES = 8_000  # 0.5 ms, between two chances for sources
+UCSR0B, RXEN0, TXEN0 = 0xC1, 1 << 4, 1 << 3  # of the data space: receiver, transmitter (ATmega328P data sheet 20.11.3)
 AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
 LONGEST_CYCLES = 160_000  # of a slice: all edges in it are fewer than the simulator keeps
 
@@ -129,6 +130,7 @@ class Bench:
         self.session.transport.stamp()
         self.session.transport.wait = lambda robot, cycles, quiet: self.run_until(self.now + cycles)
         self.pins, self.robot, self.mark = self.session.board, self.session.robot, 0
+        self.robot.touched = self.acted
         self.board: EmulatedBoard = self.pins.board
         self.edges, self.driven = EdgeLog(self._new_edges), EdgeLog(self._new_driven)
         self.after_slice: list[Callable[[], None]] = []
@@ -175,6 +177,7 @@ class Bench:
                 look()
             if met:
                 return True
+        self.session.sim.do_due()
         return False
 
     def run(self, cycles: int) -> None:
@@ -187,6 +190,11 @@ class Bench:
         self.session.sim.at(cycle, action)
 
     # ---- what the outside does ---------------------------------------------------------------------------------------
+
+    def acted(self) -> None:
+        """The test has done something to the board: the mark. In a reaction it was a part that did."""
+        if self.board.reacts_at is None:
+            self.mark = self.now
 
     def on_edge(self, pin: int, react: Reaction) -> None:
         """Calls `react(cycle, level)` at each edge that the firmware makes at a pin, at its cycle."""
@@ -212,6 +220,10 @@ class Bench:
     def received(self) -> tuple[bytes, list[int]]:
         """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
         return self.robot.received()
+
+    def uses_line(self, what: int) -> bool:
+        """The program has switched its receiver (RXEN0) or transmitter (TXEN0) on; of a native board it always has."""
+        return self.board.extension("data", "uint8_t") is None or bool(self.pins.read_memory(UCSR0B, 1)[0] & what)
 
     def streams(self) -> Group:
         """The streams of a record that tell of its pins, its line and its robot, from the beginning."""

@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from boebot.arguments import whole
+from boebot.arguments import shown, whole
 from boebot.devices.device import pin_number
 from boebot.errors import CallError
 from sim_bridge._core import ffi, lib
@@ -82,10 +82,10 @@ class I2c:
         """The chip is there from now on, with pull-ups of its own.
 
         Raises:
-            CallError: no address, or another chip has it.
+            CallError: it is no I2cDevice, has no address, or another chip has it.
             BoardError: a device of the robot is at these pins.
         """
-        name, said = type(device).__name__, getattr(device, "address", None)
+        name, said = _name(device, I2cDevice), getattr(device, "address", None)
         address = whole(f"the address of {name}", said, CallError, least=0x08, most=0x77)
         if address in self._devices:
             raise CallError(f"there is a device at address 0x{address:02X} already; expected another address")
@@ -93,6 +93,7 @@ class I2c:
             answer = _called(self._board, "own_chips_answer", self._answer)
             _join(self._robot, "own_chips_kind", [SDA, SCL], ffi.new("own_chips_parameters *", (answer, ffi.NULL)))
         self._devices[address] = device
+        self._robot.touched()
 
     def _answer(self, _: Any, does: int, byte: int, cycle: int) -> int:
         """See own_chips.h."""
@@ -118,21 +119,24 @@ class Spi:
         """Raises Cannot where the board has no such pins."""
         self._board, self._robot = _pins_of(bench), bench.robot
         self._selected: SpiDevice | None = None
+        self._selects: set[int] = set()
         self._part: Any = None
 
     def add(self, device: SpiDevice) -> None:
         """The chip is there from now on.
 
         Raises:
-            CallError: it names no pin or no mode.
+            CallError: it is no SpiDevice, names no pin or no mode, or another chip is selected by that pin.
             BoardError: a device of the robot is at these pins.
         """
-        name, mode = type(device).__name__, device.mode
+        name, mode = _name(device, SpiDevice), device.mode
         whole(f"the mode of {name}", mode, CallError, least=0, most=3)
         try:
             select = pin_number(device.select)
         except ValueError as refused:
             raise CallError(f"select of {name}: {refused}") from None
+        if select in self._selects:
+            raise CallError(f"pin {device.select} selects another device; expected another one as select of {name}")
         if self._part is None:
             answer, made = _called(self._board, "own_spi_answer", self._answer), ffi.new("own_spi **")
             _join(
@@ -151,7 +155,9 @@ class Spi:
                 self._selected = None
                 lib.own_spi_select(self._part, -1, 0, cycle)
 
+        self._selects.add(select)
         self._board.on_edge(select, selects)
+        self._robot.touched()
 
     def _answer(self, _: Any, byte: int, cycle: int) -> int:
         """See own_spi.h."""
@@ -159,6 +165,13 @@ class Spi:
         answer = 0xFF if self._selected is None else _byte(self._selected, self._selected.transfer(byte))
         self._board.reacts_at = None
         return answer
+
+
+def _name(device: object, kind: type) -> str:
+    """Of a device's class. Raises CallError where that is not made from this one."""
+    if not isinstance(device, kind):
+        raise CallError(f"got {shown(device)}; expected an object whose class is made from {kind.__name__}")
+    return type(device).__name__
 
 
 def _called(board: AvrBoard, kind: str, answer: Callable[..., int]) -> Any:

@@ -7,6 +7,7 @@ are read and written where the source says so.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,14 +21,17 @@ from sim_bridge.boards.board import BoardMemory
 class Symbol:
     """A variable of a board's memory."""
 
-    def __init__(self, memory: BoardMemory, variable: Variable) -> None:
-        """Raises CallError where the type of the variable has no size that the image says."""
+    __slots__ = ("_before", "_memory", "variable")
+
+    def __init__(
+        self, memory: BoardMemory, variable: Variable, before: Callable[[str], object] = lambda name: None
+    ) -> None:
+        """`before`: called with its name before it is set. Raises CallError where the image does not say its size."""
         if variable.dtype.itemsize == 0:
             raise CallError(
                 f"{variable.name} is of a type whose size the image does not say; expected another variable"
             )
-        self.variable = variable
-        self._memory = memory
+        self.variable, self._memory, self._before = variable, memory, before
 
     @property
     def value(self) -> Any:
@@ -65,8 +69,10 @@ class Symbol:
         """Into what `cells` shows, at a place, and from there to the board."""
         kind, shape = holder[at].dtype, np.shape(holder[at])
         try:
-            holder[at] = value
-            fits = np.shape(value) == shape and (kind.kind not in "iub" or np.array_equal(holder[at], value))
+            with np.errstate(over="ignore"):
+                holder[at] = value
+            look: Any = {"f": np.isfinite, "V": np.shape}.get(kind.kind, np.asarray)
+            fits = np.shape(value) == shape and np.array_equal(look(holder[at]), look(value))
         except (OverflowError, ValueError, TypeError):
             fits = False
         if not fits:
@@ -75,6 +81,7 @@ class Symbol:
             )
             each = f"an array {shape} of " if shape else ""
             raise CallError(f"{self.variable.name}: {value!r} does not fit; expected {each}{expected}")
+        self._before(self.variable.name)
         self._memory.write_memory(self.variable.address, cells.tobytes())
 
 

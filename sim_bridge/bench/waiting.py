@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from boebot.errors import BoebotError
 
+LONGEST_S = 86_400.0  # that a test lets pass at once
+
 
 class WaitError(AssertionError):
     """What a test waited for did not come within its time. The text says what it was, and what came instead."""

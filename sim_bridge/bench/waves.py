@@ -12,7 +12,7 @@ from boebot.errors import CallError, did_you_mean
 from sim_bridge.boards.board import Level
 
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "ps": 1e-12, "fs": 1e-15}
-LEVELS = {"0": Level.LOW, "1": Level.HIGH}  # x and z: nothing is driven
+OF_VCD = {"0": Level.LOW, "1": Level.HIGH}  # x and z: nothing is driven
 
 
 def read_wave(path: Path, signal: str | None = None) -> NDArray[np.float64]:
@@ -43,7 +43,7 @@ def read_wave(path: Path, signal: str | None = None) -> NDArray[np.float64]:
                         raise ValueError("it has no $timescale")
                     time_s = token.time_change * unit_s
                 elif token.kind is TokenKind.CHANGE_SCALAR:
-                    level = LEVELS.get(token.scalar_change.value, Level.RELEASED)
+                    level = OF_VCD.get(token.scalar_change.value, Level.RELEASED)
                     changes.setdefault(token.scalar_change.id_code, []).append((time_s, level))
     except OSError as error:
         raise CallError(f"{path} cannot be read: {error.strerror}") from None

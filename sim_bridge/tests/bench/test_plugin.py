@@ -394,7 +394,7 @@ def test_no_ping(uno):
     assert [path.parent.name[:30] for path in users.path.glob(".uno/*/run")] == ["test_a_fault_that_did_not_fire"]
     result.stdout.fnmatch_lines_random([
         "uno: fault whisker_left.stuck=open@0s did not fire*",
-        "uno: fault 'ping.missing@0s': robot 'bare' has no 'ping.missing'*",
+        "uno: fault 'ping.missing@0s': the board is on no robot; expected one in the mark: robot='shieldbot'",
     ])  # fmt: skip
 
 

@@ -24,6 +24,9 @@ def test_answers(uno):
     uno.serial.expect(b"ready", within=0.1)  # from when the boot loader has begun the program
     uno.serial.send(b"+")
     uno.serial.expect(b"+", within=0.01)
+    uno.fault(f"serial.doubled=1@{uno.now}..{uno.now + 1}")
+    uno.serial.send(b"-")
+    uno.serial.expect(b"--", within=0.01)
 
 @pytest.mark.uno(image="own.elf", baud=9600, motors=False)
 def test_world(uno):

@@ -80,6 +80,8 @@ def test_elements_that_are_not_there(running: Running) -> None:
             running[name][key]
         with pytest.raises(CallError):
             running[name][key] = 1
+    with pytest.raises(CallError, match=r"share: 1e\+300 does not fit; expected a value of type float32"):
+        running["share"].value = 1e300
     with pytest.raises(CallError, match=r"table: 5 does not fit; expected an array \(3,\) of 0 to 255"):
         running["table"].value = 5
 
