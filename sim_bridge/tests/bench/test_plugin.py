@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import google.protobuf.descriptor_pb2  # noqa: F401 (first within a run of pytester it would be there twice)
 import pytest
 
 from boebot.result import RunResult, read_run
