@@ -25,7 +25,7 @@ from boebot.image.program import read_program
 from boebot.link.bad_line import BadLine
 from boebot.record.blocks import merged
 from boebot.record.record import Record
-from boebot.running.faults import HOST, OWNERS, inject, read, unfired
+from boebot.running.faults import AT_A_PORT, OWNERS, inject, read, unfired
 from boebot.running.program_driver import append_parts
 from boebot.showing import Showing
 from sim_bridge.bench.bench import RXEN0, Bench
@@ -264,7 +264,7 @@ class Uno:
         fault = read(what, self._robot)
         if fault.begin_s < self.now - ROUNDING_S - self.serial.line.allowance_s:
             raise CallError(f"fault {fault} is past: it is {self.now:g} s; expected a later START")
-        if owner not in HOST or fault.name == "serial.rate":
+        if fault.name not in AT_A_PORT:
             bench = self.bench("parts")
         session: Any = bench and bench.session
         self._fired[str(fault)] = inject(fault, self._robot, session, self._bad_line, self.serial.opened_s)
