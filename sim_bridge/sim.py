@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 import struct
 import weakref
+from bisect import insort
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -157,8 +156,7 @@ class Sim:
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
-        self._due: list[tuple[int, int, Callable[[], object]]] = []  # cycle, number, what is done then
-        self._numbers = count()
+        self._due: list[tuple[int, Callable[[], object]]] = []  # cycle, and what is done then
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
         _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
@@ -293,7 +291,7 @@ class Sim:
 
     def at(self, cycle: int, do: Callable[[], object]) -> None:
         """What is done when that cycle has come, or next where it is past; it may let no time pass."""
-        heapq.heappush(self._due, (cycle, next(self._numbers), do))
+        insort(self._due, (cycle, do), key=lambda one: one[0])
 
     @property
     def next_due(self) -> int:
@@ -303,7 +301,7 @@ class Sim:
     def do_due(self) -> None:
         """Does what is due by now."""
         while self.next_due <= self.cycle:
-            heapq.heappop(self._due)[2]()
+            self._due.pop(0)[1]()
 
     def run(self, cycles: int) -> None:
         """Runs for `cycles`, also past bytes from robots that are listened to.

@@ -28,6 +28,7 @@ from sim_bridge.sessions.world import AVR, NATIVE, open_on
 
 SLICE_CYCLES = 8_000  # 0.5 ms, between two chances for sources
 UCSR0B, RXEN0, TXEN0 = 0xC1, 1 << 4, 1 << 3  # of the data space: receiver, transmitter (ATmega328P data sheet 20.11.3)
+BARE = "bare"
 AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
 LONGEST_CYCLES = 160_000  # of a slice: all edges in it are fewer than the simulator keeps
 
@@ -73,7 +74,7 @@ class EdgeLog:
 @cache
 def bare(robot: str) -> RobotDescription:
     """A robot of which there is only the board: nothing is at its pins, it has 5 V, and nothing drives it anywhere."""
-    own = {"name": "bare", "title": "a board by itself"}
+    own = {"name": BARE, "title": "a board by itself"}
     return msgspec.structs.replace(load_robot(robot), **own, device={}, supply=None, imperfections={})
 
 
@@ -136,7 +137,6 @@ class Bench:
         self.after_slice: list[Callable[[], None]] = []
         self.sources: list[Source] = []
         self.pins.log_outside()
-        self._outside = self.board.extension("outside log", "board_outside_log")
         self._frames: dict[str, list[NDArray[Any]]] = {"to_board": [], "from_board": []}
         self._edge_count = self._queued = 0
         self._record = Record()  # but for what is in the logs
@@ -237,13 +237,10 @@ class Bench:
         return self.pins.pin_log(self._edge_count - before)
 
     def _new_driven(self) -> NDArray[Any]:
-        logs = (self._outside.driven, self._outside.to_board, self._outside.from_board) if self._outside else ()
-        if all(log.first == log.end for log in logs):
-            return np.empty(0, EDGE)
         found = self.pins.outside_log()
         for name, pieces in self._frames.items():
-            pieces.append(found[name])
-        return found["driven"]
+            pieces += [found[name]] if len(found.get(name, ())) else []
+        return found.get("driven", np.empty(0, EDGE))
 
     def close(self) -> None:
         """Frees board and world. May be called twice."""

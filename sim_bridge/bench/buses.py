@@ -25,10 +25,7 @@ from boebot.arguments import shown, whole
 from boebot.devices.device import pin_number
 from boebot.errors import CallError
 from sim_bridge._core import ffi, lib
-from sim_bridge.bench.bench import Bench
-from sim_bridge.bench.waiting import Cannot
-from sim_bridge.boards.avr import AvrBoard
-from sim_bridge.boards.board import Level
+from sim_bridge.boards.board import EmulatedBoard, Level
 from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots.wiring import add_part, done
 
@@ -73,9 +70,8 @@ class SpiDevice:
 class I2c:
     """Chips of a test's own at SDA (A4) and SCL (A5)."""
 
-    def __init__(self, bench: Bench) -> None:
-        """Raises Cannot where the board has no such pins."""
-        self._board, self._robot, self._devices = _pins_of(bench), bench.robot, dict[int, I2cDevice]()
+    def __init__(self, robot: SimRobot) -> None:
+        self._board, self._robot, self._devices = robot.board, robot, dict[int, I2cDevice]()
         self._spoken_to: I2cDevice | None = None
 
     def add(self, device: I2cDevice) -> None:
@@ -115,9 +111,8 @@ class I2c:
 class Spi:
     """Chips of a test's own at MISO (12), MOSI (11) and SCK (13)."""
 
-    def __init__(self, bench: Bench) -> None:
-        """Raises Cannot where the board has no such pins."""
-        self._board, self._robot = _pins_of(bench), bench.robot
+    def __init__(self, robot: SimRobot) -> None:
+        self._board, self._robot = robot.board, robot
         self._selected: SpiDevice | None = None
         self._selects: set[int] = set()
         self._part: Any = None
@@ -174,7 +169,7 @@ def _name(device: object, kind: type) -> str:
     return type(device).__name__
 
 
-def _called(board: AvrBoard, kind: str, answer: Callable[..., int]) -> Any:
+def _called(board: EmulatedBoard, kind: str, answer: Callable[..., int]) -> Any:
     """For C: what it raises ends the run."""
     board.called_by_c.append(ffi.callback(kind, answer, error=0, onerror=board.failed))
     return board.called_by_c[-1]
@@ -187,11 +182,3 @@ def _join(robot: SimRobot, kind: str, pins: list[int | str], parameters: Any) ->
 
 def _byte(device: object, value: int | None) -> int:
     return 0xFF if value is None else whole(f"what {type(device).__name__} sends", value, CallError, least=0, most=255)
-
-
-def _pins_of(bench: Bench) -> AvrBoard:
-    if not isinstance(bench.pins.board, AvrBoard):
-        raise Cannot(
-            f"the {bench.pins.board.description} has no two-wire bus and no SPI at its pins; the emulated Uno has"
-        )
-    return bench.pins.board

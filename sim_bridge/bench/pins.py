@@ -47,11 +47,6 @@ class Pulse:
     level: int
 
     @property
-    def start_s(self) -> float:
-        """When it began, s since power-on."""
-        return self.start / CLOCK_HZ
-
-    @property
     def us(self) -> float:
         """How long it is."""
         return self.cycles * 1e6 / CLOCK_HZ

@@ -36,53 +36,47 @@ class Symbol:
     @property
     def value(self) -> Any:
         """A number, an array of numpy, or bytes of what is neither."""
-        return _plain(self._cells()[0])
+        return self[()]
 
     @value.setter
     def value(self, value: Any) -> None:
         """Raises CallError where it does not fit."""
-        cells = self._cells()
-        self._put(cells, cells, 0, value)
+        self[()] = value
 
     def __getitem__(self, index: Any) -> Any:
         """An element of an array. Raises CallError: there is none."""
-        return _plain(self._cells()[0][self._checked(index)])
+        return _plain(self._element(self._cells(), index))
 
     def __setitem__(self, index: Any, value: Any) -> None:
         """Raises CallError where there is none, or it does not fit."""
         cells = self._cells()
-        self._put(cells, cells[0], self._checked(index), value)
-
-    def _cells(self) -> NDArray[Any]:
-        """An array of one: the variable, as its bytes are now."""
-        data = bytearray(self._memory.read_memory(self.variable.address, self.variable.dtype.itemsize))
-        return np.frombuffer(data, self.variable.dtype)
-
-    def _checked(self, index: Any) -> Any:
-        try:
-            np.empty(self.variable.dtype.shape)[index]
-        except IndexError as error:
-            raise CallError(f"{self.variable.name}[{index!r}]: {str(error).rstrip('.')}; expected an element") from None
-        return index
-
-    def _put(self, cells: NDArray[Any], holder: NDArray[Any], at: Any, value: Any) -> None:
-        """Into what `cells` shows, at a place, and from there to the board."""
-        kind, shape = holder[at].dtype, np.shape(holder[at])
+        before = self._element(cells, index)
+        kind, shape = before.dtype, np.shape(before)
+        look: Any = {"f": np.isfinite, "V": np.shape}.get(kind.kind, np.asarray)
         try:
             with np.errstate(over="ignore"):
-                holder[at] = value
-            look: Any = {"f": np.isfinite, "V": np.shape}.get(kind.kind, np.asarray)
-            fits = np.shape(value) == shape and np.array_equal(look(holder[at]), look(value))
+                cells[index] = value
+            fits = np.shape(value) == shape and np.array_equal(look(cells[index]), look(value))
         except (OverflowError, ValueError, TypeError):
             fits = False
         if not fits:
-            expected = (
-                f"{np.iinfo(kind).min} to {np.iinfo(kind).max}" if kind.kind in "iu" else f"a value of type {kind}"
-            )
-            each = f"an array {shape} of " if shape else ""
-            raise CallError(f"{self.variable.name}: {value!r} does not fit; expected {each}{expected}")
+            numbers = kind.kind in "iu" and f"{np.iinfo(kind).min} to {np.iinfo(kind).max}"
+            expected = (f"an array {shape} of " if shape else "") + (numbers or f"a value of type {kind}")
+            raise CallError(f"{self.variable.name}: {value!r} does not fit; expected {expected}")
         self._before(self.variable.name)
         self._memory.write_memory(self.variable.address, cells.tobytes())
+
+    def _cells(self) -> NDArray[Any]:
+        """The variable as its bytes are now."""
+        kind = self.variable.dtype
+        data = self._memory.read_memory(self.variable.address, kind.itemsize)
+        return np.frombuffer(bytearray(data), kind.base).reshape(kind.shape)
+
+    def _element(self, cells: NDArray[Any], index: Any) -> Any:
+        try:
+            return cells[index]
+        except IndexError as error:
+            raise CallError(f"{self.variable.name}[{index!r}]: {str(error).rstrip('.')}; expected an element") from None
 
 
 def _plain(value: Any) -> Any:

@@ -28,7 +28,7 @@ from boebot.record.record import Record
 from boebot.running.faults import AT_A_PORT, OWNERS, inject, read, unfired
 from boebot.running.program_driver import append_parts
 from boebot.showing import Showing
-from sim_bridge.bench.bench import RXEN0, Bench
+from sim_bridge.bench.bench import BARE, RXEN0, Bench
 from sim_bridge.bench.buses import I2c, Spi
 from sim_bridge.bench.measured import Measurement
 from sim_bridge.bench.pins import Pin
@@ -184,13 +184,13 @@ class Uno:
     def i2c(self) -> I2c:
         """The two-wire bus, for devices in Python (buses.py)."""
         self.avr("I2C bus")
-        return I2c(self.bench("I2C bus"))
+        return I2c(self.bench("I2C bus").robot)
 
     @cached_property
     def spi(self) -> Spi:
         """The SPI, likewise."""
         self.avr("SPI")
-        return Spi(self.bench("SPI"))
+        return Spi(self.bench("SPI").robot)
 
     @property
     def robot(self) -> SimRobot:
@@ -258,19 +258,18 @@ class Uno:
         """
         if not isinstance(what, str):
             raise CallError(f"fault: got {shown(what)}; expected a text, as 'board.reset@20ms'")
-        owner, bench = what.partition(".")[0], self._bench_or_none
-        if bench is not None and self._wanted.robot is None and owner not in OWNERS:
+        owner = what.partition(".")[0]
+        if self._robot.name == BARE and owner not in OWNERS:
             raise CallError(f"fault {what!r}: the board is on no robot; expected one in the mark: robot='shieldbot'")
         fault = read(what, self._robot)
         if fault.begin_s < self.now - ROUNDING_S - self.serial.line.allowance_s:
             raise CallError(f"fault {fault} is past: it is {self.now:g} s; expected a later START")
-        if fault.name not in AT_A_PORT:
-            bench = self.bench("parts")
+        bench = self._bench_or_none if fault.name in AT_A_PORT else self.bench("parts")
         session: Any = bench and bench.session
         self._fired[str(fault)] = inject(fault, self._robot, session, self._bad_line, self.serial.opened_s)
-        if bench is not None and owner == "board":
-            bench.at(round(fault.begin_s * CLOCK_HZ), self._begins_anew)
         if bench is not None:
+            if owner == "board":
+                bench.at(round(fault.begin_s * CLOCK_HZ), self._begins_anew)
             bench.acted()
             bench.session.sim.do_due()  # what begins now
 

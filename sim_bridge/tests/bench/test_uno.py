@@ -11,6 +11,7 @@ import pytest
 from boebot.errors import BoebotError
 from sim_bridge.bench.buses import I2cDevice, SpiDevice
 from sim_bridge.bench.uno import Uno, Wanted, open_uno
+from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.tests.bench import programs
 from sim_bridge.tests.bench.test_plugin import SERVO
 
@@ -82,7 +83,7 @@ def test_a_pulse_from_before_what_the_test_did_is_no_answer_to_it(act: str) -> N
         uno.serial.expect(b">")
         ACTS[act](uno)
         begun = uno.now
-        assert uno.pin(9).pulse().start_s >= begun
+        assert uno.pin(9).pulse().start >= round(begun * CLOCK_HZ)
 
 
 def test_what_cannot_be_is_one_sentence() -> None:
