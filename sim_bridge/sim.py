@@ -325,11 +325,8 @@ class Sim:
             until = min(cycle, self.cycle + PORTION_CYCLES, max(self.next_due, self.cycle))
             self.check(lib.sim_run_until(self.handle, until))
             self.do_due()
-            if until == cycle or self.cycle < until or self._anybody_speaks():
+            if until == cycle or self.cycle < until or any(robot.speaks for robot in self.robots):
                 return
-
-    def _anybody_speaks(self) -> bool:
-        return any(robot.speaks for robot in self.robots)
 
     def check(self, crashed: int) -> None:
         """Raises BoardError where a run has ended since the board of robot `crashed` - 1 crashed, or has not begun; and

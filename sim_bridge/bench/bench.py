@@ -63,11 +63,10 @@ class EdgeLog:
     def __getitem__(self, pin: int) -> list[Edge]:
         self.take()
         seen, found = self._found.get(pin, (0, []))
-        if seen < len(self._pieces):
-            for piece in self._pieces[seen:]:
-                of_pin = piece[piece["pin"] == pin]
-                found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]
-            self._found[pin] = (len(self._pieces), found)
+        for piece in self._pieces[seen:]:
+            of_pin = piece[piece["pin"] == pin]
+            found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]
+        self._found[pin] = (len(self._pieces), found)
         return found
 
 
@@ -118,16 +117,9 @@ class Bench:
         if on not in kinds:
             raise CallError(f"there is no board {on!r} for a bench; expected {' or '.join(kinds)}")
         described = load_robot(robot) if isinstance(robot, str) else robot or bare("shieldbot")
-        self.session = open_on(
-            kinds[on],
-            BoardRequest(
-                robot=described,
-                image=None if image is None else str(image),
-                arena=arena,
-                noise=noise,
-                **request,
-            ),
-        )
+        program = None if image is None else str(image)
+        asked = BoardRequest(robot=described, image=program, arena=arena, noise=noise, **request)
+        self.session = open_on(kinds[on], asked)
         self.session.transport.stamp()
         self.session.transport.wait = lambda robot, cycles, quiet: self.run_until(self.now + cycles)
         self.pins, self.robot, self.mark = self.session.board, self.session.robot, 0
@@ -216,10 +208,6 @@ class Bench:
         board.op.send(board, at, data, len(data))
 
     # ---- what the board does -----------------------------------------------------------------------------------------
-
-    def received(self) -> tuple[bytes, list[int]]:
-        """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
-        return self.robot.received()
 
     def uses_line(self, what: int) -> bool:
         """The program has switched its receiver (RXEN0) or transmitter (TXEN0) on; of a native board it always has."""

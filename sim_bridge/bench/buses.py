@@ -134,12 +134,8 @@ class Spi:
             raise CallError(f"pin {device.select} selects another device; expected another one as select of {name}")
         if self._part is None:
             answer, made = _called(self._board, "own_spi_answer", self._answer), ffi.new("own_spi **")
-            _join(
-                self._robot,
-                "own_spi_kind",
-                [MISO, MOSI, SCK],
-                ffi.new("own_spi_parameters *", (answer, ffi.NULL, made)),
-            )
+            parameters = ffi.new("own_spi_parameters *", (answer, ffi.NULL, made))
+            _join(self._robot, "own_spi_kind", [MISO, MOSI, SCK], parameters)
             self._part = made[0]
 
         def selects(cycle: int, level: Level) -> None:

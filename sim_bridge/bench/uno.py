@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from boebot import flashing
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     from sim_bridge.sim import SimRobot
 
 AVR, NATIVE = "avr", "native"
+Limit = float | None
 STACK_POINTER, RAM_END = 0x5D, 0x8FF  # of the data space; nothing has been called (ATmega328P data sheet 7.5)
 START_S = 2.0  # from a real board's reset to its program, at most: boot loaders wait for 1.4 s and less
 ALLOWANCE_S = 0.1  # of a wait on a port: USB, and a computer that has more to do (chosen)
@@ -284,29 +284,21 @@ class Uno:
     # ---- what was measured -------------------------------------------------------------------------------------------
 
     def measure(
-        self,
-        name: str,
-        value: float,
-        unit: str = "",
-        *,
-        low: float | None = None,
-        high: float | None = None,
-        marginal: float = 0.0,
+        self, name: str, value: float, unit: str = "", *, low: Limit = None, high: Limit = None, marginal: float = 0.0
     ) -> None:
         """Notes a value for the report. Outside of its limits the test fails when it has ended; nearer than `marginal`
         to one, it passes and is shown."""
         self.measured.append(Measurement.of(name, value, unit, low, high, marginal))
 
-    def save_pins(self, path: Path) -> bool:
-        """Writes what all pins did so far, for viewers of logic signals; False: of this board that is not known."""
+    def save_pins(self, path: Path) -> None:
+        """Writes what all pins did so far, for viewers of logic signals; nothing of a board at a port."""
         if self._bench_or_none is None:
-            return False
+            return
         from boebot.view import vcd
 
         bench = self._bench_or_none
         record, what = Record.of(bench.streams()), str(self._wanted.image or self._wanted.robot)
         vcd.write_boards([(bench.robot.description, record)], what, path)
-        return True
 
     def _put_aside(self) -> None:
         """What the robot's parts show, every 10 ms."""
@@ -364,9 +356,7 @@ class Uno:
     def __enter__(self) -> Uno:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -415,9 +405,8 @@ def _on_bench(on: str, wanted: Wanted) -> Uno:
         raise Cannot(f"the native board is the kit's own firmware; it cannot run {wanted.image.name}")
     if wanted.image is None and wanted.robot is None:
         raise CallError("there is nothing to test; expected image= or robot=, or both")
-    bench = Bench(
-        wanted.image, on=on, robot=wanted.robot, arena=wanted.arena, seed=wanted.seed, noise=wanted.noise
-    )  # fmt: skip
+    around: dict[str, Any] = {"robot": wanted.robot, "arena": wanted.arena, "seed": wanted.seed, "noise": wanted.noise}
+    bench = Bench(wanted.image, on=on, **around)
     transport = bench.session.transport
     if wanted.baud is not None:
         transport.set_baud(wanted.baud)
