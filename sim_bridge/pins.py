@@ -205,15 +205,10 @@ class PinRecorder:
 
     def drain(self) -> Group:
         """The streams since they were last drained: rows as of boebot.record.record."""
-        log = self._pins.outside_log()
-        return streams_of({"pins": self.edges(), **log})
-
-    def edges(self) -> NDArray[Any]:
-        """The output edges (dtype EDGE) since the last call."""
         self._take()
         edges = np.concatenate(self._kept)
         self._kept.clear()
-        return edges
+        return streams_of({"pins": edges, **self._pins.outside_log()})
 
     def _take(self) -> None:
         new = self._pins.edge_count - self._seen

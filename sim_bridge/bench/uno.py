@@ -399,8 +399,6 @@ def open_uno(on: str, wanted: Wanted, *, flash: bool = False, motors: bool = Fal
 
 
 def _on_bench(on: str, wanted: Wanted) -> Uno:
-    if on not in (AVR, NATIVE):
-        raise CallError(f"there is no board {on!r}; expected {AVR}, {NATIVE} or a port such as /dev/ttyACM0")
     if on == NATIVE and wanted.image is not None:
         raise Cannot(f"the native board is the kit's own firmware; it cannot run {wanted.image.name}")
     if wanted.image is None and wanted.robot is None:

@@ -47,10 +47,7 @@ def _rate_off(robot: SimRobot, baud: int, share: float) -> Acting:
     """What that changes shows on the line (boebot.link.bad_line)."""
 
     def is_off(by: float) -> None:
-        if baud:
-            robot.line_rate(round(baud * (1.0 + by)))
-        else:
-            robot.follow_line(by)
+        return robot.line_rate(round(baud * (1.0 + by))) if baud else robot.follow_line(by)
 
     is_off(share)
     return partial(is_off, 0.0), int

@@ -50,9 +50,8 @@ class Line:
 
     def make_bad(self, seed: int) -> BadLine:
         """What damages it from now on, once it has faults. What `record` gets is what the host sends and hears."""
-        if self.bad is None:
-            self.bad = BadLine(self.transport, seed)
-            self._read, self._write = self.bad.read_stamped, self.bad.write
+        self.bad = BadLine.around(self.bad or self.transport, seed)
+        self._read, self._write = self.bad.read_stamped, self.bad.write
         return self.bad
 
     def use_session(self, session: int) -> None:
