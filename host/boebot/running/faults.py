@@ -116,8 +116,8 @@ def _checked(fault: Fault, kind: FaultKind) -> Fault:
         raise CallError(f"fault {fault} never ends; expected an END, as in {name}@3s..4s")
     if fault.end_s is not None and kind.when == "once":
         raise CallError(f"fault {fault}: {name} happens at one time; expected no END")
-    if fault.end_s is not None and not fault.begin_s < fault.end_s:
-        raise CallError(f"fault {fault} ends at {fault.end_s:g} s; expected a time later than its begin")
+    if fault.end_s is not None and not fault.begin_s < fault.end_s < math.inf:
+        raise CallError(f"fault {fault} ends at {fault.end_s:g} s; expected a finite time later than its begin")
     return Fault(name, value, fault.begin_s, fault.end_s)
 
 

@@ -124,10 +124,6 @@ class Hands:
         """See above."""
         return self._tally.count
 
-    def fired(self) -> dict[str, int]:
-        """Of each fault how often it has fired."""
-        return {fault: fired() for fault, fired in self.faults.items()}
-
     def before_step(self, time_s: float) -> None:
         """What is due."""
         for one in self.onlooker.before_step(self._number, time_s):

@@ -300,13 +300,14 @@ def _faults(request: Request, task: Task) -> list[Fault]:
         if whose not in ("", str(task.number)):
             continue
         fault = read(what, task.board.robot)
-        owner = fault.name.partition(".")[0]
         if fault in found:
             raise CallError(f"fault {fault} is there twice; expected each once")
         if fault.begin_s >= request.seconds:
             raise CallError(f"fault {fault} is never: the run ends at {request.seconds:g} s; expected an earlier START")
-        if task.brain.is_program and (owner == "host" or fault.name == "serial.rate"):
-            has = "no host" if owner == "host" else "the bit rate that it sets"
+        if fault.name == "host.stopped" and (fault.end_s or 0.0) > request.seconds:
+            raise CallError(f"fault {fault} outlasts the run of {request.seconds:g} s; expected an earlier END")
+        if task.brain.is_program and fault.name.startswith(("host.", "serial.rate")):
+            has = "no host" if fault.name.startswith("host.") else "the bit rate that it sets"
             raise CallError(f"fault {fault} is of a brain's link; {task.brain.name} is a program, which has {has}")
         if is_live(task.on) and fault.name not in AT_A_PORT:
             raise CallError(f"fault {fault} is of a simulated robot; {task.on!r} is a port")
