@@ -39,7 +39,7 @@ help:
 	@echo "make test      all tests: Python, firmware units, whole circle, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
-	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the longest tasks of many seeds, other compilers and emulators, tests with each protection left out, error rates"
+	@echo "make soak      what takes long: all experiments at seed 1 and at others (SEEDS=2 3 4 5 6 7 8 9 10), a run in the emulator (SECONDS=3600), the longest tasks of many seeds, other compilers and emulators, tests with each protection left out, the board's tests again and again while all cores are busy, error rates"
 	@echo "make fuzz      many more random cases for the tests that take random input, FUZZ_SECONDS=60 of each fuzzer"
 	@echo "make firmware  build/images/*.elf and *.hex, built by PlatformIO"
 	@echo "make wheel     dist/*.whl, with images and arenas inside"
@@ -85,6 +85,10 @@ soak: experiments
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
 	@$(PYTHON_VENV) -m tools.qemu
 	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
+	@for core in $$(seq $(JOBS)); do while kill -0 $$$$ 2>/dev/null; do :; done & done; \
+	  for run in $$(seq 60); do [ $$run -le 50 ] && on=native || on=avr; \
+	  $(VENV)/bin/boebot test --on $$on -q >build/busy.log 2>&1 || \
+	  { cat build/busy.log; echo "All cores busy: run $$run of boebot test, on $$on, has failed"; exit 1; }; done
 	@PYTHONMALLOC=malloc tools/test_sanitized.sh
 	@tools/pio test -e native_quad
 	@tools/warnings.sh all

@@ -200,7 +200,7 @@ setup(
     | {"sim_bridge": "sim_bridge", "boebot_hil": "hil_tests/boebot_hil"},
     packages=[
         *find_namespace_packages("host", include=["boebot", "boebot.*"], exclude=["*.data*", "boebot.arenas.geometry"]),
-        "boebot_hil",  # the only tests that are installed: of whatever board somebody has
+        "boebot_hil",  # the only tests that are installed: they prove any board
         *find_namespace_packages("host", include=WITH_PARTS, exclude=["*.tests*", "*.generator"]),
         *find_namespace_packages(
             ".",

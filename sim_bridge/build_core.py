@@ -46,7 +46,7 @@ struct vehicles {
 typedef struct { brown_out_parameters parameters; uint32_t resets, upsets; ...; } brown_out;
 typedef struct { supply supply; ...; } battery;
 typedef struct { motor_position motor; ...; } turret;
-typedef struct { double supply; ...; } chassis;
+typedef struct { double supply; uint8_t driven[...]; ...; } chassis;
 struct robot {
   body *body;
   vehicles *vehicle;
@@ -70,7 +70,6 @@ SOURCES = [
     "world/sensors/*.c",
     "vehicles/*.c",
     "parts/*.c",
-    "boards/board_access.c",
     "boards/native/*.c",
     "loop/*.c",
 ]

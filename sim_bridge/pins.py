@@ -30,6 +30,8 @@ from sim_bridge.sim import CYCLES_MAXIMUM, SimRobot
 
 ECHO_MAXIMUM_US = 1e6
 SUPPLY_MAXIMUM_V = 30.0
+EDGES_MAXIMUM = 10_000_000  # of a square wave
+GUARD = 64  # cycles; BOARD_GUARD_CYCLES of board.h
 EDGES_KEPT = 1 << 20  # SIM_EDGES_KEPT of loop.h
 EDGES_SHOWN = 20_000  # newest ones that `BoardPins.now` looks at, of SHOWN cycles
 SHOWN = CLOCK_HZ // 10
@@ -99,7 +101,7 @@ class BoardPins(BoardMemory):
 
     def drive(self, pin: int, level: int, at_cycle: int | None = None) -> None:
         """Takes a pin from its part and drives it from `at_cycle` on (now)."""
-        at = self._sim.cycle + 64 if at_cycle is None else at_cycle
+        at = self._sim.cycle + GUARD if at_cycle is None else at_cycle
         at = max(0, whole("drive: at_cycle", at, BoardError, least=-CYCLES_MAXIMUM, most=CYCLES_MAXIMUM))
         level = whole("drive: the level", level, BoardError, least=0, most=Level.RELEASED)
         lib.robot_drive(self._with_board, at, checked_pin("drive", pin), level)
@@ -122,19 +124,20 @@ class BoardPins(BoardMemory):
     def square_wave(self, pin: int, period: int, seconds: float) -> None:
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
         half = whole("square_wave: the period", period, BoardError, least=2, most=2**32 - 1) // 2
-        seconds = number("square_wave: seconds", seconds, BoardError, least=0, most=CYCLES_MAXIMUM / CLOCK_HZ)
-        status = lib.robot_wave(self._with_board, checked_pin("square_wave", pin), half, round(seconds * CLOCK_HZ))
-        if status != lib.SIM_OK:
-            raise BoardError(f"square_wave: {seconds:g} s of {period} cycles have too many edges; expected fewer")
+        most = EDGES_MAXIMUM * half / CLOCK_HZ
+        seconds = number("square_wave: seconds", seconds, BoardError, least=0, most=most)
+        level = self._with_board.chassis.driven[checked_pin("square_wave", pin)]
+        start = self._sim.handle.world_at + GUARD  # edges up to there are queued already
+        edges = np.arange(0, round(seconds * CLOCK_HZ) + 1, half, dtype=np.uint64)
+        levels = (np.arange(len(edges)) + level) % 2
+        levels[0] = level  # ends what was queued
+        self.drive_edges(pin, start + edges, levels.astype(np.uint8))
 
-    def answer_ping(self, echo_us: float | None) -> None:
-        """Every trigger is answered by a pulse of that length (us), or by none at all."""
-        echo = -2
-        if echo_us is not None:
-            echo = round(
-                number("answer_ping: the pulse", echo_us, BoardError, least=0, most=ECHO_MAXIMUM_US) * CLOCK_HZ / 1e6
-            )
-        self._check(lib.robot_answer_ping(self._robot.handle, echo), "Ping")
+    def answer_ping(self, echo_us: float) -> None:
+        """Every trigger is answered by a pulse of that length (us)."""
+        echo_us = number("answer_ping: the pulse", echo_us, BoardError, least=0, most=ECHO_MAXIMUM_US)
+        if lib.robot_answer_ping(self._robot.handle, round(echo_us * CLOCK_HZ / 1e6)) != lib.SIM_OK:
+            raise BoardError("Ping: the robot has no such thing")
 
     def unplug(self, device: str) -> None:
         """Pulls the plug of a device of the robot's description: it hears and drives nothing."""
@@ -151,9 +154,9 @@ class BoardPins(BoardMemory):
 
     def supply(self, volts: float | None) -> None:
         """Holds the 5 V rail of board and servos at that voltage; None: what the regulator gives."""
-        held = (
-            0.0 if volts is None else number("supply: the voltage", volts, BoardError, least=0, most=SUPPLY_MAXIMUM_V)
-        )
+        held = 0.0  # not held
+        if volts is not None:
+            held = max(number("supply: the voltage", volts, BoardError, least=0, most=SUPPLY_MAXIMUM_V), 1e-6)
         self._with_board.held_supply = held / lib.SUPPLY_NOMINAL_V
         lib.robot_update_supply(self._robot.handle)
 
@@ -176,10 +179,6 @@ class BoardPins(BoardMemory):
         brown_out = self._robot.handle.brown_out
         return int(brown_out.resets), int(brown_out.upsets)
 
-    def place(self, x: float, y: float, heading: float) -> None:
-        """See `SimRobot.place`."""
-        self._robot.place(x, y, heading)
-
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""
         causes = {one.name.lower(): one for one in ResetCause}
@@ -187,15 +186,6 @@ class BoardPins(BoardMemory):
             raise BoardError(f"reset: there is no cause {shown(cause)}; expected one of {', '.join(causes)}")
         self._robot.handle.reset_at = self.cycle
         self.board.handle.op.reset(self.board.handle, causes[cause])
-
-    def line_rate(self, baud: int) -> None:
-        """Bit rate of the host's side of the serial line."""
-        self._robot.line_rate(baud)
-
-    @staticmethod
-    def _check(status: int, what: str) -> None:
-        if status != lib.SIM_OK:
-            raise BoardError(f"{what}: the robot has no such thing")
 
 
 class PinRecorder:
@@ -215,15 +205,10 @@ class PinRecorder:
 
     def drain(self) -> Group:
         """The streams since they were last drained: rows as of boebot.record.record."""
-        log = self._pins.outside_log()
-        return streams_of({"pins": self.edges(), **log})
-
-    def edges(self) -> NDArray[Any]:
-        """The output edges (dtype EDGE) since somebody took them."""
         self._take()
         edges = np.concatenate(self._kept)
         self._kept.clear()
-        return edges
+        return streams_of({"pins": edges, **self._pins.outside_log()})
 
     def _take(self) -> None:
         new = self._pins.edge_count - self._seen

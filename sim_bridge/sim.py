@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import weakref
+from bisect import insort
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,6 +19,7 @@ from boebot.arenas.floor_plan import Lateness, Shift
 from boebot.arguments import point, shown, whole
 from boebot.boards import TruthNow
 from boebot.description import robots
+from boebot.description.equipment import check_setting
 from boebot.devices.display import letters_of
 from boebot.devices.faults import BODY_FAULTS
 from boebot.errors import ArenaError, BoardError, BrainError
@@ -154,6 +156,7 @@ class Sim:
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
+        self._due: list[tuple[int, Callable[[], object]]] = []  # cycle, and what is done then
         self._outlines: list[object] = []
         self.members: dict[int, Member] = {}
         _kept[int(ffi.cast("uintptr_t", handle))] = (arena, self.members, self._outlines)
@@ -286,6 +289,20 @@ class Sim:
         cycle: int = (self.handle if handle is None else handle).now
         return cycle
 
+    def at(self, cycle: int, do: Callable[[], object]) -> None:
+        """What is done when that cycle has come, or next where it is past; it may let no time pass."""
+        insort(self._due, (cycle, do), key=lambda one: one[0])
+
+    @property
+    def next_due(self) -> int:
+        """The cycle for which something is due next; NEVER."""
+        return self._due[0][0] if self._due else NEVER
+
+    def do_due(self) -> None:
+        """Does what is due by now."""
+        while self.next_due <= self.cycle:
+            self._due.pop(0)[1]()
+
     def run(self, cycles: int) -> None:
         """Runs for `cycles`, also past bytes from robots that are listened to.
 
@@ -297,20 +314,19 @@ class Sim:
             self.run_until(until)
 
     def run_until(self, cycle: int) -> None:
-        """Runs until that cycle, or until a robot speaks that is listened to (see `SimRobot.listen`).
+        """Runs until that cycle, or until a robot speaks that is listened to (see `SimRobot.listen`); what is due
+        meanwhile is done at its cycle.
 
         Raises:
             BoardError: a board's program crashed.
         """
         cycle = whole("run_until: the cycle", cycle, BoardError, least=0, most=NEVER)
         while True:  # in portions, or Ctrl-C would not be heard
-            until = min(cycle, self.cycle + PORTION_CYCLES)
+            until = min(cycle, self.cycle + PORTION_CYCLES, max(self.next_due, self.cycle))
             self.check(lib.sim_run_until(self.handle, until))
-            if until == cycle or self.cycle < until or self._anybody_speaks():
+            self.do_due()
+            if until == cycle or self.cycle < until or any(robot.speaks for robot in self.robots):
                 return
-
-    def _anybody_speaks(self) -> bool:
-        return any(robot.speaks for robot in self.robots)
 
     def check(self, crashed: int) -> None:
         """Raises BoardError where a run has ended since the board of robot `crashed` - 1 crashed, or has not begun; and
@@ -410,7 +426,11 @@ class Sim:
 
 
 class SimRobot:
-    """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`."""
+    """One robot of a simulation: its line, its truth, its logs. Given by `Sim.add` and `Sim.robot`.
+
+    Attributes:
+        touched: called when somebody has put it elsewhere or has worked one of its devices.
+    """
 
     def __init__(self, sim: Sim, number: int) -> None:
         self.sim, self.number = sim, number
@@ -418,6 +438,7 @@ class SimRobot:
         self._received = ffi.addressof(self._robot, "received")
         self._room = ffi.new("uint8_t[]", ROOM)
         self._view = ffi.buffer(self._room)
+        self.touched: Callable[[], object] = lambda: None
         self._displays: dict[str, int] | None = None  # numbers of parts that show letters, once somebody has asked
 
     @property
@@ -451,24 +472,21 @@ class SimRobot:
             data += self._view[:count]
         return data
 
-    def follow_line(self) -> None:
-        """From now on the outside's bit rate is always the board's own, as its registers say, and `receive_stamped`
-        says when each byte has come.
+    def follow_line(self, off: float = 0.0) -> None:
+        """From now on the outside's bit rate is always the board's own, as its registers say, but for that share of it;
+        `received` says when each byte has come.
 
         Raises:
             BoardError: the robot has no board.
         """
         self._need_board("a line")
         self.handle.is_stamped = True
+        if (share := self.board.extension("line off", "double")) is not None:
+            share[0] = off
         lib.robot_line_rate(self.handle, 0)
 
-    def receive_stamped(self) -> list[tuple[int, int]]:
-        """Bytes that left the board since the last call, each with the cycle at which it had come."""
-        data, cycles = self.received()
-        return list(zip(cycles, data, strict=True))
-
     def received(self) -> tuple[bytes, list[int]]:
-        """The same as bytes and their cycles."""
+        """Bytes that left the board since the last call, and the cycle at which each one had come."""
         data, at = self.receive(), self.handle.received_at
         cycles = np.frombuffer(ffi.buffer(at.data + at.start, at.count)[:], "<u8").tolist() if at.count else []
         at.start = at.count = 0
@@ -548,11 +566,11 @@ class SimRobot:
         """Works a device at its board, such as a button (0, 1) or a knob (0 to 1).
 
         Raises:
-            BoardError: it has none that can be set so.
+            BoebotError: it has none that can be set so.
         """
-        parts = self.parts
-        if device not in parts or lib.robot_set_part(self.handle, parts[device], value) != lib.SIM_OK:
-            raise BoardError(f"device {device!r} of robot {self.description.name!r} cannot be set to {value:g}")
+        check_setting(self.description, device, arguments.number(f"{device} is set: the value", value, BoardError))
+        done(lib.robot_set_part(self.handle, self.parts[device], value), device)
+        self.touched()
 
     def fault(self, owner: str, kind: str, value: float, begin_cycle: int, end_cycle: int = NEVER) -> Callable[[], int]:
         """Lays a fault on a device at its board, a wheel ("wheel_left", "wheel_right"), the "battery" or the whole
@@ -574,8 +592,8 @@ class SimRobot:
         one = kinds[kind]
         most = len(one.words) - 1 if one.words else one.most
         value = arguments.number(f"{where}: its value", value, BoardError, least=one.least, most=most)
-        begin = whole(f"{where}: its begin", begin_cycle, BoardError, least=0, most=NEVER - 1)
-        end = whole(f"{where}: its end", end_cycle, BoardError, least=max(begin, self.sim.cycle) + 1, most=NEVER)
+        begin = max(whole(f"{where}: its begin", begin_cycle, BoardError, least=0, most=NEVER - 1), self.sim.cycle)
+        end = whole(f"{where}: its end", end_cycle, BoardError, least=begin + 1, most=NEVER)
         which = getattr(lib, f"FAULT_{kind.upper()}")
         slot = lib.robot_fault(self.handle, parts[owner], which, value, begin, end)
         if slot == lib.SIM_BAD_ARGUMENT:
@@ -600,7 +618,7 @@ class SimRobot:
         sim = self.sim
         cycles = whole("wait: cycles", cycles, BoardError, least=0, most=CYCLES_MAXIMUM)
         quiet = whole("wait: quiet", quiet, BoardError, least=0, most=CYCLES_MAXIMUM) or 1
-        if cycles <= PORTION_CYCLES:
+        if cycles <= PORTION_CYCLES and sim.next_due > sim.cycle + cycles:
             if crashed := lib.robot_wait(self.handle, cycles, quiet):
                 sim.check(crashed)
         else:
@@ -688,6 +706,7 @@ class SimRobot:
             raise ArenaError(
                 f"a robot cannot stand at {x:.2f} m, {y:.2f} m: a wall, a moving shape or another robot is in the way"
             )
+        self.touched()
 
     def _need_board(self, what: str) -> None:
         if not self.description.has_board:

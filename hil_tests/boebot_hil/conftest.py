@@ -14,7 +14,7 @@ import pytest
 from boebot.boards import is_live
 from boebot.errors import BoebotError
 from boebot_hil.rig import Rig
-from sim_bridge.bench.plugin import CANNOT
+from sim_bridge.bench.waiting import Cannot
 
 EMULATED = "only an emulated board gives its pins, its reset, its EEPROM"
 START_S = 4.0  # from a real board's reset to its first hello: a boot loader waits for one to three of them
@@ -24,10 +24,6 @@ def pytest_configure(config: pytest.Config) -> None:
     for mark in (
         "promise(heading, words...): what it proves, in the words of PROTOCOL.md",
         "emulated: reaches for what only an emulated board gives: its pins, its reset, its EEPROM",
-        "soak: takes long",
-        "soak_on_avr: takes long there",
-        "soak_on_native: takes long there",
-        "unsanitized: of the kit's makers",
     ):
         config.addinivalue_line("markers", mark)
     Rig.may_move = config.getoption("--uno-motors")
@@ -39,43 +35,31 @@ def boards(config: pytest.Config) -> list[str]:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "board_url" in metafunc.fixturenames:
-        urls = [
-            pytest.param(
-                url, marks=pytest.mark.soak if metafunc.definition.get_closest_marker(f"soak_on_{url}") else ()
-            )
-            for url in boards(metafunc.config)
-        ]
-        metafunc.parametrize("board_url", urls, scope="session")
+        metafunc.parametrize("board_url", boards(metafunc.config), scope="session")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skips what only an emulated board can be asked, where the board under test is behind a port, which has to answer.
+    """A board behind a port has to answer.
 
     Raises:
         UsageError: it does not.
     """
-    if items and not config.option.collectonly:
-        for url in filter(is_live, boards(config)):
-            _expect_the_kits_firmware(url)
-    for item in items:
-        spec = getattr(item, "callspec", None)
-        under_test = [spec.params["board_url"]] if spec and "board_url" in spec.params else boards(config)
-        if all(map(is_live, under_test)) and item.get_closest_marker("emulated") is not None:
-            item.add_marker(pytest.mark.skip(reason=EMULATED))
-            item.user_properties.append((CANNOT, EMULATED))  # the plugin counts them
+    for url in filter(is_live, boards(config)) if items and not config.option.collectonly else ():
+        try:
+            with Rig.open(url) as rig:
+                rig.next_hello(within_s=START_S)
+        except AssertionError:
+            firmware = f"expected its firmware: boebot flash --on {url}"
+            raise pytest.UsageError(f"the board at {url} does not speak the kit's protocol; {firmware}") from None
+        except BoebotError as error:
+            raise pytest.UsageError(str(error)) from None
 
 
-def _expect_the_kits_firmware(url: str) -> None:
-    why = ""
-    try:
-        with Rig.open(url) as rig:
-            rig.next_hello(within_s=START_S)
-    except AssertionError:
-        why = f"the board at {url} does not speak the kit's protocol; expected its firmware: boebot flash --on {url}"
-    except BoebotError as error:
-        why = str(error)
-    if why:
-        raise pytest.UsageError(why)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Raises Cannot where only an emulated board can be asked, and the board under test is another."""
+    params: dict[str, str] = item.callspec.params if hasattr(item, "callspec") else {}
+    if item.get_closest_marker("emulated") and is_live(params.get("board_url", boards(item.config)[0])):
+        raise Cannot(EMULATED)
 
 
 @pytest.fixture

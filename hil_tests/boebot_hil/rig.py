@@ -6,8 +6,7 @@ Every wait is in the board's own time and says what it waits for.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
-from types import TracebackType
+from collections.abc import Callable
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from boebot.boards import BoardRequest, BoardSession, open_board
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import frame, messages
+from sim_bridge.bench.pins import pulses_of
 from sim_bridge.bench.waiting import Cannot
 
 _M = TypeVar("_M")  # a message
@@ -58,25 +58,17 @@ class Rig:
         self._probed = 0.0
 
     @classmethod
-    def open(
-        cls,
-        url: str,
-        robot: str | RobotDescription = "shieldbot",
-        arena: str = "empty",
-        noise: bool = False,
-        **request: Any,
-    ) -> Rig:
-        """A rig around the board at `url`, by default in an empty field and without noise; `request`: what else a
-        BoardRequest has."""
+    def open(cls, url: str, robot: str | RobotDescription = "shieldbot", **request: Any) -> Rig:
+        """A rig around the board at `url`; `request`: what else a BoardRequest has, by default an empty field without
+        noise."""
         described = load_robot(robot) if isinstance(robot, str) else robot
-        return cls(open_board(url, BoardRequest(robot=described, arena=arena, noise=noise, **request)))
+        asked: dict[str, Any] = {"arena": "empty", "noise": False} | request
+        return cls(open_board(url, BoardRequest(robot=described, **asked)))
 
     def __enter__(self) -> Rig:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.session.close()
 
     @property
@@ -144,41 +136,35 @@ class Rig:
 
     def next(self, kind: type[_M], within_s: float = 0.1) -> _M:
         """The next message of that kind, or one that has come since the last question."""
-        found: _M = self.wait_for(
+        return self.wait_for(
             lambda: next((a for a in reversed(self.answers) if isinstance(a, kind)), None), within_s, kind.__name__
         )
-        return found
 
     def next_hello(self, within_s: float = 1.0) -> messages.Hello:
         """The board's next hello."""
         self.answers.clear()
         return self.next(messages.Hello, within_s)
 
-    def first(self, kind: type[_M], such: Callable[[_M], bool], within_s: float, what: str) -> _M:
-        """The first message of that kind from now on that is such a one."""
-        begin = len(self.heard)
-        found: _M = self.wait_for(
-            lambda: next((heard for heard in self.heard[begin:] if isinstance(heard, kind) and such(heard)), None),
+    def first(
+        self, kind: type[_M], such: Callable[[_M], bool], within_s: float, what: str, since: int | None = None
+    ) -> _M:
+        """The first message of that kind that is such a one, from now on or behind the first `since` of `heard`."""
+        begin = len(self.heard) if since is None else since
+        return self.wait_for(
+            lambda: next((m for m in self.heard[begin:] if isinstance(m, kind) and such(m)), None),
             within_s,
             what,
         )
-        return found
 
     def request(self, kind: Any, *fields: int, within_s: float = 0.1) -> messages.Answer:
         """Sends the next numbered request, again if it or its answer is lost, and returns the answer. Each repetition
         comes at another phase of the tick: what the board misses in one phase of each tick it hears in another."""
         self.answers.clear()
-        request = self.numbered(kind, *fields)
-
-        def answer() -> messages.Answer | None:
-            heard = (a for a in self.answers if isinstance(a, messages.Answer) and a.number == request.number)
-            return next(heard, None)
-
+        request, begin = self.numbered(kind, *fields), len(self.heard)
         for _ in range(4):
             self.send(request)
             with contextlib.suppress(AssertionError):
-                found: messages.Answer = self.wait_for(answer, within_s, "")
-                return found
+                return self.first(messages.Answer, lambda answer: answer.number == request.number, within_s, "", begin)
             self.listen(0.37 * TICK_S)
         raise AssertionError(f"waited in vain for the answer to {kind.__name__}")
 
@@ -187,7 +173,7 @@ class Rig:
         self._number = (self._number + 1) & 0xFFFF
         return kind(self._number, *fields)
 
-    def wait_for(self, condition: Callable[[], Any], within_s: float, what: str) -> Any:
+    def wait_for(self, condition: Callable[[], _M | None], within_s: float, what: str) -> _M:
         """Listens until `condition()` is true; fails after `within_s` of the board's time."""
         end = self.transport.now() + within_s
         while not (value := condition()):
@@ -249,23 +235,17 @@ class Rig:
     def start(self, arm: bool = True) -> messages.Hello:
         """Waits for the board to be up, opens a session and arms the motors, where they may move."""
         self.alive = True
-        self.open_session()
+        hello = self.open_session()
         if arm and self._may_move:
             self.arm()
-        assert self.hello is not None
-        return self.hello
+        return hello
 
     def open_session(self) -> messages.Hello:
         """Opens a session; another's has to end first. A lost frame is sent again, at another phase of the tick."""
-
-        def free() -> messages.Hello | None:
-            heard = (a for a in self.answers if isinstance(a, messages.Hello) and a.session == 0)
-            return next(heard, None)
-
         self.answers.clear()
         self.seed = 0
         self.decoder.seed = frame.NO_SESSION
-        hello = self.wait_for(free, 4.0, "a hello without a session")
+        hello = self.first(messages.Hello, lambda hello: hello.session == 0, 4.0, "a hello without a session")
         seed = hello.board_nonce ^ HOST_NONCE
         for attempt in range(5):
             self.send(messages.Open(messages.PROTOCOL_VERSION, hello.board_nonce, HOST_NONCE))
@@ -291,14 +271,5 @@ class Rig:
 
     def pulses(self, pin: int) -> np.ndarray:
         """Start and width, in cycles, of every high pulse that the board gave on `pin`: shape (n, 2)."""
-        return np.array(list(_pulses(self.board.pin_log(), pin)), dtype=np.int64).reshape(-1, 2)
-
-
-def _pulses(log: np.ndarray, pin: int) -> Iterator[tuple[int, int]]:
-    rise = None
-    for edge in log[log["pin"] == pin]:
-        if edge["level"] == 1:
-            rise = int(edge["cycle"])
-        elif rise is not None:
-            yield rise, int(edge["cycle"]) - rise
-            rise = None
+        log = self.board.pin_log()
+        return pulses_of(log[log["pin"] == pin])

@@ -8,6 +8,7 @@ import pytest
 
 from boebot.link import messages
 from boebot.link.messages import AnswerStatus, Devices, EventKind, Latch
+from boebot.link.transport import BaudSelectable
 from boebot_hil.rig import CYCLES_PER_S, HOST_NONCE, TICK_S, Rig
 
 WHISKER_LEFT, BUZZER = 5, 4
@@ -135,7 +136,8 @@ def test_telemetry_fills_no_more_than_half_of_the_line(rig: Rig, baud: int) -> N
     rig.set("baud_rate", baud // 100)
     assert rig.request(messages.SaveParameters, within_s=1.0).status == AnswerStatus.OK
     rig.board.reset("external")
-    rig.board.line_rate(baud)
+    assert isinstance(rig.transport, BaudSelectable)
+    rig.transport.set_baud(baud)
     hello = rig.start(arm=False)
     period = next(ticks for ticks in (1, 2, 5, 10) if FRAME_BYTES / (ticks * TICK_S) <= baud / 10 / 2)
     assert hello.telemetry_period == period

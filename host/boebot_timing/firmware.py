@@ -76,7 +76,7 @@ def load_firmware(path: Path) -> Firmware:
 
 
 def bounds_of(path: Path, entries: Collection[int]) -> dict[int, int | str]:
-    """For those who ask by the entry point `boebot.bounds` (boebot.guests.BoundsOf): of whatever program."""
+    """Of any program: the entry point `boebot.bounds` (boebot.guests.BoundsOf)."""
     try:
         worst = WorstCase(program_of(read_image(path)))
     except AnalysisError as error:

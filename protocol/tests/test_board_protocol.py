@@ -130,7 +130,7 @@ class Host:
         end = self.board.now + cycles
         while self.board.now < end:
             self.board.run_until(min(end, self.board.now + TICK // 4))
-            for byte, cycle in zip(*self.board.received(), strict=True):
+            for byte, cycle in zip(*self.board.robot.received(), strict=True):
                 if byte != 0:
                     self._block.append(byte)
                 elif self._block:

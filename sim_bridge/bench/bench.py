@@ -22,12 +22,13 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import CallError
 from boebot.record.blocks import Group, merged
 from boebot.record.record import Record
-from sim_bridge._core import lib
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, FRAME, LEVELS, PINS, Edge, EmulatedBoard, Level, Reaction
-from sim_bridge.pins import streams_of
+from sim_bridge.boards.board import EDGE, FRAME, LEVELS, Edge, EmulatedBoard, Reaction
+from sim_bridge.pins import EDGES_KEPT, streams_of
 from sim_bridge.sessions.world import AVR, NATIVE, open_on
 
 SLICE_CYCLES = 8_000  # 0.5 ms, between two chances for sources
+UCSR0B, RXEN0, TXEN0 = 0xC1, 1 << 4, 1 << 3  # of the data space: receiver, transmitter (ATmega328P data sheet 20.11.3)
+BARE = "bare"
 AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
 LONGEST_CYCLES = 160_000  # of a slice: all edges in it are fewer than the simulator keeps
 
@@ -40,7 +41,8 @@ class Source(Protocol):
 
 
 class EdgeLog:
-    """All edges of a bench, oldest first, and those of each pin, sorted out where somebody asks for it."""
+    """All edges of a bench, oldest first, and those of each pin, sorted out where somebody asks for it: each once, so
+    that a wait that looks again and again takes no longer in a long run."""
 
     def __init__(self, new: Callable[[], NDArray[Any]]) -> None:
         """`new`: takes the edges (dtype EDGE) since it was last called."""
@@ -61,18 +63,17 @@ class EdgeLog:
     def __getitem__(self, pin: int) -> list[Edge]:
         self.take()
         seen, found = self._found.get(pin, (0, []))
-        if seen < len(self._pieces):
-            for piece in self._pieces[seen:]:
-                of_pin = piece[piece["pin"] == pin]
-                found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]
-            self._found[pin] = (len(self._pieces), found)
+        for piece in self._pieces[seen:]:
+            of_pin = piece[piece["pin"] == pin]
+            found += [Edge(cycle, pin, LEVELS[level]) for cycle, _, level in of_pin.tolist()]
+        self._found[pin] = (len(self._pieces), found)
         return found
 
 
 @cache
 def bare(robot: str) -> RobotDescription:
     """A robot of which there is only the board: nothing is at its pins, it has 5 V, and nothing drives it anywhere."""
-    own = {"name": "bare", "title": "a board by itself"}
+    own = {"name": BARE, "title": "a board by itself"}
     return msgspec.structs.replace(load_robot(robot), **own, device={}, supply=None, imperfections={})
 
 
@@ -80,11 +81,13 @@ class Bench:
     """A board, powered on.
 
     Attributes:
-        session: what the host opens (BoardSession), with its serial line: `session.transport`.
+        session: what the host opens (BoardSession), with its serial line, `session.transport`: while somebody waits
+            there, whatever is on the bench goes on.
         board, robot, pins: the board itself, the robot that it is on, and what a test reaches for (sim_bridge/pins.py).
         edges: what the firmware did to each pin, from the beginning: `edges[13]`.
         driven: what the outside did, likewise; empty of a native board, which cannot be seen into.
         mark: the cycle of the last event that was waited for, or that the test itself made.
+        sources: what acts on the board from outside: each queues what it does before each slice of time.
         after_slice: who is called whenever time has passed.
     """
 
@@ -114,24 +117,18 @@ class Bench:
         if on not in kinds:
             raise CallError(f"there is no board {on!r} for a bench; expected {' or '.join(kinds)}")
         described = load_robot(robot) if isinstance(robot, str) else robot or bare("shieldbot")
-        self.session = open_on(
-            kinds[on],
-            BoardRequest(
-                robot=described,
-                image=None if image is None else str(image),
-                arena=arena,
-                noise=noise,
-                pins=True,
-                **request,
-            ),
-        )
+        program = None if image is None else str(image)
+        asked = BoardRequest(robot=described, image=program, arena=arena, noise=noise, **request)
+        self.session = open_on(kinds[on], asked)
         self.session.transport.stamp()
+        self.session.transport.wait = lambda robot, cycles, quiet: self.run_until(self.now + cycles)
         self.pins, self.robot, self.mark = self.session.board, self.session.robot, 0
+        self.robot.touched = self.acted
         self.board: EmulatedBoard = self.pins.board
         self.edges, self.driven = EdgeLog(self._new_edges), EdgeLog(self._new_driven)
         self.after_slice: list[Callable[[], None]] = []
         self.sources: list[Source] = []
-        self._outside = self.board.extension("outside log", "board_outside_log")
+        self.pins.log_outside()
         self._frames: dict[str, list[NDArray[Any]]] = {"to_board": [], "from_board": []}
         self._edge_count = self._queued = 0
         self._record = Record()  # but for what is in the logs
@@ -158,20 +155,21 @@ class Bench:
             BoardError: the program crashed, or a reaction lets time pass.
         """
         while (now := self.now) < cycle:
-            self.session.transport.do_due()
+            self.session.sim.do_due()
             longest = SLICE_CYCLES if self.sources or self.after_slice else LONGEST_CYCLES
-            end = min(cycle, now + longest, self.session.transport.next_due)
+            end = min(cycle, now + longest, self.session.sim.next_due)
             if end + AHEAD_CYCLES > self._queued:
                 self._queued = end + AHEAD_CYCLES
                 for source in self.sources:
                     source.queue(self, self._queued)
             met = self.robot.run_to_edge(end, edge_of)
-            if self.session.recorder is not None:
-                self.session.recorder.collect()
+            if self.pins.edge_count - self._edge_count > EDGES_KEPT // 4:  # before the simulator forgets them
+                self.edges.take()
             for look in self.after_slice:
                 look()
             if met:
                 return True
+        self.session.sim.do_due()
         return False
 
     def run(self, cycles: int) -> None:
@@ -181,25 +179,23 @@ class Bench:
 
     def at(self, cycle: int, action: Callable[[], object]) -> None:
         """Calls `action` when that cycle has come; it may let no time pass."""
-        self.session.transport.at(cycle / CLOCK_HZ, action)
+        self.session.sim.at(cycle, action)
 
     # ---- what the outside does ---------------------------------------------------------------------------------------
+
+    def acted(self) -> None:
+        """The test has done something to the board: the mark. In a reaction it was a part that did."""
+        if self.board.reacts_at is None:
+            self.mark = self.now
 
     def on_edge(self, pin: int, react: Reaction) -> None:
         """Calls `react(cycle, level)` at each edge that the firmware makes at a pin, at its cycle."""
         self.board.on_edge(pin, react)
 
-    def ahead(self, source: Source) -> None:
-        """From now on a source queues what it does before each slice of time."""
-        self.sources.append(source)
-
     def drive(self, pin: int, level: int, at: int = 0) -> None:
         """From cycle `at` (or now) on the outside drives a pin to LOW 0, HIGH 1, or RELEASED 2, and no part does any
         more; replaces what was queued for it from then on."""
-        if not (0 <= pin < PINS and 0 <= level <= Level.RELEASED and at >= 0):
-            self.pins.drive(pin, level, at)  # says what is wrong
-            return
-        lib.robot_drive(self.robot.handle, at, pin, level)  # directly: a reaction may be called at each edge of a bus
+        self.pins.drive(pin, level, at)
 
     def wave(self, pin: int, cycles: Sequence[int] | NDArray[Any], level: int) -> None:
         """Drives a pin to `level` (LOW, HIGH) at the first of these cycles, to the other one at the next, and so on."""
@@ -213,9 +209,9 @@ class Bench:
 
     # ---- what the board does -----------------------------------------------------------------------------------------
 
-    def received(self) -> tuple[bytes, list[int]]:
-        """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
-        return self.robot.received()
+    def uses_line(self, what: int) -> bool:
+        """The program has switched its receiver (RXEN0) or transmitter (TXEN0) on; of a native board it always has."""
+        return self.board.extension("data", "uint8_t") is None or bool(self.pins.read_memory(UCSR0B, 1)[0] & what)
 
     def streams(self) -> Group:
         """The streams of a record that tell of its pins, its line and its robot, from the beginning."""
@@ -226,18 +222,13 @@ class Bench:
 
     def _new_edges(self) -> NDArray[Any]:
         before, self._edge_count = self._edge_count, self.pins.edge_count
-        if self._edge_count == before or self.session.recorder is None:
-            return np.empty(0, EDGE)
-        return self.session.recorder.edges()
+        return self.pins.pin_log(self._edge_count - before)
 
     def _new_driven(self) -> NDArray[Any]:
-        logs = (self._outside.driven, self._outside.to_board, self._outside.from_board) if self._outside else ()
-        if all(log.first == log.end for log in logs):
-            return np.empty(0, EDGE)
         found = self.pins.outside_log()
         for name, pieces in self._frames.items():
-            pieces.append(found[name])
-        return found["driven"]
+            pieces += [found[name]] if len(found.get(name, ())) else []
+        return found.get("driven", np.empty(0, EDGE))
 
     def close(self) -> None:
         """Frees board and world. May be called twice."""

@@ -21,14 +21,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from boebot.arguments import whole
+from boebot.arguments import shown, whole
 from boebot.devices.device import pin_number
 from boebot.errors import CallError
 from sim_bridge._core import ffi, lib
-from sim_bridge.bench.bench import Bench
-from sim_bridge.bench.waiting import Cannot
-from sim_bridge.boards.avr import AvrBoard
-from sim_bridge.boards.board import Level
+from sim_bridge.boards.board import EmulatedBoard, Level
 from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots.wiring import add_part, done
 
@@ -73,19 +70,18 @@ class SpiDevice:
 class I2c:
     """Chips of a test's own at SDA (A4) and SCL (A5)."""
 
-    def __init__(self, bench: Bench) -> None:
-        """Raises Cannot where the board has no such pins."""
-        self._board, self._robot, self._devices = _pins_of(bench), bench.robot, dict[int, I2cDevice]()
+    def __init__(self, robot: SimRobot) -> None:
+        self._board, self._robot, self._devices = robot.board, robot, dict[int, I2cDevice]()
         self._spoken_to: I2cDevice | None = None
 
     def add(self, device: I2cDevice) -> None:
         """The chip is there from now on, with pull-ups of its own.
 
         Raises:
-            CallError: no address, or another chip has it.
+            CallError: it is no I2cDevice, has no address, or another chip has it.
             BoardError: a device of the robot is at these pins.
         """
-        name, said = type(device).__name__, getattr(device, "address", None)
+        name, said = _name(device, I2cDevice), getattr(device, "address", None)
         address = whole(f"the address of {name}", said, CallError, least=0x08, most=0x77)
         if address in self._devices:
             raise CallError(f"there is a device at address 0x{address:02X} already; expected another address")
@@ -93,6 +89,7 @@ class I2c:
             answer = _called(self._board, "own_chips_answer", self._answer)
             _join(self._robot, "own_chips_kind", [SDA, SCL], ffi.new("own_chips_parameters *", (answer, ffi.NULL)))
         self._devices[address] = device
+        self._robot.touched()
 
     def _answer(self, _: Any, does: int, byte: int, cycle: int) -> int:
         """See own_chips.h."""
@@ -114,33 +111,31 @@ class I2c:
 class Spi:
     """Chips of a test's own at MISO (12), MOSI (11) and SCK (13)."""
 
-    def __init__(self, bench: Bench) -> None:
-        """Raises Cannot where the board has no such pins."""
-        self._board, self._robot = _pins_of(bench), bench.robot
+    def __init__(self, robot: SimRobot) -> None:
+        self._board, self._robot = robot.board, robot
         self._selected: SpiDevice | None = None
+        self._selects: set[int] = set()
         self._part: Any = None
 
     def add(self, device: SpiDevice) -> None:
         """The chip is there from now on.
 
         Raises:
-            CallError: it names no pin or no mode.
+            CallError: it is no SpiDevice, names no pin or no mode, or another chip is selected by that pin.
             BoardError: a device of the robot is at these pins.
         """
-        name, mode = type(device).__name__, device.mode
+        name, mode = _name(device, SpiDevice), device.mode
         whole(f"the mode of {name}", mode, CallError, least=0, most=3)
         try:
             select = pin_number(device.select)
         except ValueError as refused:
             raise CallError(f"select of {name}: {refused}") from None
+        if select in self._selects:
+            raise CallError(f"pin {device.select} selects another device; expected another one as select of {name}")
         if self._part is None:
             answer, made = _called(self._board, "own_spi_answer", self._answer), ffi.new("own_spi **")
-            _join(
-                self._robot,
-                "own_spi_kind",
-                [MISO, MOSI, SCK],
-                ffi.new("own_spi_parameters *", (answer, ffi.NULL, made)),
-            )
+            parameters = ffi.new("own_spi_parameters *", (answer, ffi.NULL, made))
+            _join(self._robot, "own_spi_kind", [MISO, MOSI, SCK], parameters)
             self._part = made[0]
 
         def selects(cycle: int, level: Level) -> None:
@@ -151,7 +146,9 @@ class Spi:
                 self._selected = None
                 lib.own_spi_select(self._part, -1, 0, cycle)
 
+        self._selects.add(select)
         self._board.on_edge(select, selects)
+        self._robot.touched()
 
     def _answer(self, _: Any, byte: int, cycle: int) -> int:
         """See own_spi.h."""
@@ -161,7 +158,14 @@ class Spi:
         return answer
 
 
-def _called(board: AvrBoard, kind: str, answer: Callable[..., int]) -> Any:
+def _name(device: object, kind: type) -> str:
+    """Of a device's class. Raises CallError where that is not made from this one."""
+    if not isinstance(device, kind):
+        raise CallError(f"got {shown(device)}; expected an object whose class is made from {kind.__name__}")
+    return type(device).__name__
+
+
+def _called(board: EmulatedBoard, kind: str, answer: Callable[..., int]) -> Any:
     """For C: what it raises ends the run."""
     board.called_by_c.append(ffi.callback(kind, answer, error=0, onerror=board.failed))
     return board.called_by_c[-1]
@@ -174,11 +178,3 @@ def _join(robot: SimRobot, kind: str, pins: list[int | str], parameters: Any) ->
 
 def _byte(device: object, value: int | None) -> int:
     return 0xFF if value is None else whole(f"what {type(device).__name__} sends", value, CallError, least=0, most=255)
-
-
-def _pins_of(bench: Bench) -> AvrBoard:
-    if not isinstance(bench.pins.board, AvrBoard):
-        raise Cannot(
-            f"the {bench.pins.board.description} has no two-wire bus and no SPI at its pins; the emulated Uno has"
-        )
-    return bench.pins.board

@@ -4,7 +4,7 @@ other tools read, and as a table.
 
 A line is executed where one of its instructions was. A conditional jump is an instruction that goes on straight or
 elsewhere: a branch by a flag, or a skip (AVR instruction set manual: BRBC, BRBS, CPSE, SBRC, SBRS, SBIC, SBIS). So one
-`if` may have several, and one without an effect, to the next instruction, is none. Copies of a function, and two images
+`if` may have several, and a jump to the next instruction does not count. Copies of a function, and two images
 with one source file, have theirs each.
 
 Format of lcov's text: geninfo(1), "FILES".
@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ STRAIGHT, ELSEWHERE = 1, 2  # bits of AvrBoard.cover
 CONDITIONAL = ((0xF800, 0xF000), (0xFC00, 0x1000), (0xFC08, 0xFC00), (0xFD00, 0x9900))  # mask, value: see above
 TWO_WORDS = ((0xFC0F, 0x9000), (0xFE0C, 0x940C))  # LDS and STS, JMP and CALL
 OFFSET = 0x03F8  # of a branch, in words
+
+Place = tuple[str, int, int, bool]
+"""Of an instruction: its source file and line, its address, whether it is a conditional jump."""
 
 
 class File:
@@ -60,7 +64,9 @@ class Coverage:
     """Over all runs, of one image or several."""
 
     def __init__(self) -> None:
-        self._runs: dict[str, tuple[Image, NDArray[np.uint8]]] = {}
+        self._runs: dict[str, tuple[Sequence[Place], NDArray[np.uint8]]] = {}  # by image
+        self.not_counted: set[str] = set()
+        """Why a run is not among them, in sentences."""
 
     def add(self, path: Path, covered: NDArray[np.uint8]) -> None:
         """Another run: its ELF file, and what the board kept.
@@ -73,51 +79,59 @@ class Coverage:
         main = [each.address for each in image.symbols if each.name == "main"]
         if not any(address in image.sources for address in main or image.sources):  # libgcc's code has lines
             raise CallError(f"{path} says nothing of source lines; expected a program built with avr-gcc -gdwarf-4")
-        key = hashlib.sha256(image.code).hexdigest()
-        before = self._runs.get(key)
-        self._runs[key] = (image, covered if before is None else covered | before[1])
+        places: Sequence[Place]
+        places, before = self._runs.get(key := hashlib.sha256(image.code).hexdigest(), ((), covered))
+        places = places or [(*image.sources[at], at, is_conditional(opcode)) for at, opcode in instructions(image)]
+        self._runs[key] = (places, covered | before)
 
-    def as_dict(self) -> dict[str, str]:
-        """What was found so far, for another process, as JSON knows it: the bits of each image, by its path."""
-        return {str(Path(image.path).resolve()): covered.tobytes().hex() for image, covered in self._runs.values()}
+    def as_dict(self) -> dict[str, Any]:
+        """What was found so far, for another process, as JSON knows it: the file of an image may have gone by then."""
+        runs = {key: (places, covered.tobytes().hex()) for key, (places, covered) in self._runs.items()}
+        return {"runs": runs, "not_counted": sorted(self.not_counted)}
 
-    def merge(self, found: Mapping[str, str]) -> None:
-        """Takes what another process has found (`as_dict`). Raises as `add`."""
-        for path, covered in found.items():
-            self.add(Path(path), np.frombuffer(bytes.fromhex(covered), np.uint8))
+    def merge(self, found: Mapping[str, Any]) -> None:
+        """Adds what another process has found (`as_dict`)."""
+        self.not_counted.update(found["not_counted"])
+        for key, (places, bits) in found["runs"].items():
+            covered = np.frombuffer(bytes.fromhex(bits), np.uint8)
+            self._runs[key] = (places, covered | self._runs.get(key, ((), covered))[1])
 
-    def lcov(self, root: Path, *, everything: bool = False) -> str:
-        """Of the files below `root`, by their paths from there; `everything`: of others, too, by whole paths."""
-        return "".join(file.lcov(name) for name, file in self._files(root, everything).items())
+    def lcov(self, root: Path) -> str:
+        """Of the files below `root`, by their paths from there."""
+        return "".join(file.lcov(name) for name, file in self._files(root).items() if not Path(name).is_absolute())
 
-    def table(self, root: Path, *, everything: bool = False) -> str:
-        """The same for people."""
-        counts = {name: file.counts() for name, file in self._files(root, everything).items()}
+    def table(self, root: Path) -> str:
+        """The same for people, and how much lies outside of `root`."""
+        counts = {name: file.counts() for name, file in self._files(root).items()}
+        outside = {name: counts.pop(name)[0] for name in [*counts] if Path(name).is_absolute()}
         counts["in all"] = tuple(sum(each[column] for each in counts.values()) for column in range(4))
         rows = [("file", "lines", "executed", "", "conditional jumps", "both ways", "")]
         for name, (lines, hit, jumps, both) in counts.items():
             rows.append((name, str(lines), str(hit), _share(hit, lines), str(jumps), str(both), _share(both, jumps)))
-        return text_table(rows, "<>>>>>>")
+        missing = sorted(self.not_counted)
+        if outside:
+            most = max(outside, key=lambda name: outside[name])
+            missing.append(f"{sum(outside.values()):,} lines outside of {root}, most of them in {most}")
+        return "\n".join([text_table(rows, "<>>>>>>"), *(f"not counted: {what}" for what in missing)])
 
-    def _files(self, root: Path, everything: bool) -> dict[str, File]:
-        """By their names, in the order of these."""
+    def _files(self, root: Path) -> dict[str, File]:
+        """Those below `root` by their paths from there, others by their whole paths; in the order of these."""
         files: dict[str, File] = defaultdict(File)
-        for key, (image, covered) in self._runs.items():
-            names = {path: _name(path, root.resolve(), everything) for path, _ in {*image.sources.values()}}
-            for at, opcode in instructions(image):
-                (path, line), bits = image.sources[at], int(covered[at // 2])
-                if (name := names[path]) is None or line == 0:
+        for key, (places, covered) in self._runs.items():
+            names = {path: _name(path, root.resolve()) for path in {path for path, *_ in places}}
+            for path, line, at, is_jump in places:
+                if line == 0:
                     continue
-                files[name].lines[line] |= bits > 0
-                if is_conditional(opcode):
-                    files[name].jumps[line, key, at] = bits
+                file, bits = files[names[path]], int(covered[at // 2])
+                file.lines[line] |= bits > 0
+                if is_jump:
+                    file.jumps[line, key, at] = bits
         return dict(sorted(files.items()))
 
 
-def _name(path: str, root: Path, everything: bool) -> str | None:
-    """Of a source file: from the root, or whole; None: it is left out."""
+def _name(path: str, root: Path) -> str:
     whole = Path(root, path).resolve()
-    return whole.relative_to(root).as_posix() if whole.is_relative_to(root) else path if everything else None
+    return whole.relative_to(root).as_posix() if whole.is_relative_to(root) else str(whole)
 
 
 def instructions(image: Image) -> Iterator[tuple[int, int]]:

@@ -3,12 +3,14 @@ the most that a call can take, as far as a package is installed that works it ou
 the group `boebot.bounds`); and a baseline, the file with what they took before.
 
 A call lasts from the function's first instruction to the end of its return, what it calls included, interrupts that
-came in between not. A call that a reset cuts short, or that has not returned yet, does not count.
+came in between not. A call that a reset cuts short, or that has not returned yet, does not count; one that `longjmp`
+leaves ends there.
 """
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,8 +28,6 @@ from sim_bridge.boards.avr import AvrBoard, Watch
 from sim_bridge.boards.board import CLOCK_HZ
 
 PARTS = (".part.", ".cold")  # in the names of what the compiler took out of a function
-Rows = Mapping[str, Sequence[int]]
-"""Shortest and longest call by function, in cycles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,13 @@ class Cycles:
 
         Raises:
             AnalysisError: it cannot be read.
-            CallError: it has no such function, or copies or parts of it.
+            CallError: it has no symbols, no such function, or copies or parts of it.
             BoardError: too many functions.
         """
         self._board, self._image = board, image
         labels = [each for each in read_image(image).symbols if each.kind != "STT_OBJECT"]
+        if not labels:
+            raise CallError(f"{image.name} has no symbols; expected an ELF file that is not stripped")
         self._entries = {name: self._entry(labels, name) for name in functions}
         board.record(Watch([*self._entries.values()], only_extremes=True))
 
@@ -78,30 +80,24 @@ class Cycles:
             CallError: that function is not recorded.
             BoardError: no call of it has ended.
         """
-        if name not in self._entries:
+        if (found := {each.name: each for each in self.seen()}.get(name)) is None:
             raise CallError(f"cycles of {name} are not recorded; expected cycles=({name!r},) in the mark of the test")
-        if not (found := self.seen([name])):
+        if not found.calls:
             now = self._board.handle.op.now(self._board.handle)
             raise BoardError(
                 f"no call of {name} has ended by {now / CLOCK_HZ:.6f} s; expected one (the compiler may have put its "
                 "code into its callers: __attribute__((noinline)))"
             )
-        return found[0]
-
-    def seen(self, names: Iterable[str] | None = None) -> list[FunctionCycles]:
-        """Of these functions, or all, of which a call has ended."""
-        found = []
-        for name, numbers in zip(self._entries, self._board.extremes().tolist(), strict=True):
-            if numbers[0] and (names is None or name in names):
-                bound = self._bounds[self._entries[name]]
-                whether = (bound, "") if isinstance(bound, int) else (None, bound)
-                found.append(FunctionCycles(name, *numbers, *whether))
         return found
 
-    def rows(self) -> dict[str, list[int]]:
-        """Shortest and longest call of each function of which one has ended, for a baseline."""
-        rows = zip(self._entries, self._board.extremes().tolist(), strict=True)
-        return {name: [shortest, longest] for name, (calls, shortest, longest, *_) in rows if calls}
+    def seen(self) -> list[FunctionCycles]:
+        """Of all functions, in their order; where no call has ended `calls` is 0, and its other figures are none."""
+        found = []
+        for (name, entry), numbers in zip(self._entries.items(), self._board.extremes().tolist(), strict=True):
+            bound = self._bounds[entry]
+            whether = (bound, "") if isinstance(bound, int) else (None, bound)
+            found.append(FunctionCycles(name, *numbers, *whether))
+        return found
 
     @cached_property
     def _bounds(self) -> Mapping[int, int | str]:
@@ -117,7 +113,8 @@ def table_of(seen: Mapping[str, Sequence[FunctionCycles]]) -> str:
     rows: list[tuple[str, ...]] = [("function", "calls", "shortest", "longest", "bound", "test")]
     for test, functions in seen.items():
         for each in functions:
-            figures = (each.calls, each.shortest, each.longest, each.bound)
+            shortest, longest = (each.shortest, each.longest) if each.calls else (None, None)
+            figures = (each.calls, shortest, longest, each.bound)
             rows.append((each.name, *("-" if figure is None else f"{figure:,}" for figure in figures), test))
     return text_table(rows, "<>>>><")
 
@@ -125,42 +122,44 @@ def table_of(seen: Mapping[str, Sequence[FunctionCycles]]) -> str:
 class Baseline:
     """A file with what functions took, by test: `{"cycles": {test: {function: [shortest, longest]}}}`."""
 
-    def __init__(self, path: Path, *, new: bool = False) -> None:
-        """`new`: there need be no such file yet.
+    def __init__(self, path: Path, *, updates: bool = False) -> None:
+        """`updates`: it will be written, and need not be there yet; nothing is compared with it.
 
         Raises:
-            CallError: there is none, or it is none of these.
+            CallError: there is none, it is none of these, or its folder cannot be written to.
         """
-        self.path = path
+        self.path, self.updates = path, updates
         try:
-            text = '{"cycles": {}}' if new and not path.exists() else path.read_text(encoding="utf-8")
+            text = '{"cycles": {}}' if updates and not path.exists() else path.read_text(encoding="utf-8")
             self._tests = msgspec.json.decode(text, type=_File).cycles
         except (OSError, ValueError, msgspec.MsgspecError) as error:
             reason = error.strerror if isinstance(error, OSError) else error
             raise CallError(
                 f"{path} is no baseline of cycles: {reason}; expected a file as an update writes it"
             ) from None
+        if updates and not os.access(path.parent, os.W_OK):
+            raise CallError(f"the folder {path.parent} cannot be written to; expected it, for {path.name}")
 
     def functions(self, test: str) -> list[str]:
-        """Those that the file names for a test."""
-        return sorted(self._tests.get(test, {}))
+        """Those with which a test is compared."""
+        return [] if self.updates else sorted(self._tests.get(test, {}))
 
-    def changes(self, test: str, rows: Rows) -> list[str]:
+    def changes(self, test: str, seen: Iterable[FunctionCycles]) -> list[str]:
         """What is other than in the file, a sentence for each."""
-        before, found = self._tests.get(test, {}), []
-        for name in sorted({*before, *rows}):
+        before, rows, found = self._tests.get(test, {}), _rows(seen), list[str]()
+        for name in () if self.updates else sorted({*before, *rows}):
             old, new = before.get(name), rows.get(name)
             if old is None:
                 found.append(f"{name} took {_span(new)}, and is not in {self.path}")
             elif new is None:
                 found.append(f"no call of {name} has ended; in {self.path} it took {_span(old)}")
-            elif tuple(old) != tuple(new):
+            elif old != new:
                 found.append(f"{name} took {_span(new)}; in {self.path} {_span(old)}")
         return found
 
-    def put(self, test: str, rows: Rows) -> None:
+    def put(self, test: str, seen: Iterable[FunctionCycles]) -> None:
         """Takes what a test saw in place of what the file says of it."""
-        self._tests[test] = {name: (shortest, longest) for name, (shortest, longest) in sorted(rows.items())}
+        self._tests[test] = dict(sorted(_rows(seen).items()))
 
     def write(self) -> None:
         """Raises BoebotError where the folder cannot be written to."""
@@ -172,6 +171,11 @@ class _File(msgspec.Struct):
     cycles: dict[str, dict[str, tuple[int, int]]]
 
 
-def _span(row: Sequence[int] | None) -> str:
+def _rows(seen: Iterable[FunctionCycles]) -> dict[str, tuple[int, int]]:
+    """Shortest and longest call by function, in cycles."""
+    return {each.name: (each.shortest, each.longest) for each in seen if each.calls}
+
+
+def _span(row: tuple[int, int] | None) -> str:
     shortest, longest = row or (0, 0)
     return f"{shortest:,} cycles" if shortest == longest else f"{shortest:,} to {longest:,} cycles"

@@ -24,15 +24,16 @@ from boebot.arguments import number, shown, whole
 from boebot.devices.device import pin_name, pin_number
 from boebot.errors import CallError
 from boebot.record.record import net_level
-from sim_bridge.bench.bench import Bench
-from sim_bridge.bench.waiting import Cannot, WaitError
+from sim_bridge.bench.bench import RXEN0, TXEN0, Bench
+from sim_bridge.bench.waiting import LONGEST_S, Cannot, WaitError
+from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import CLOCK_HZ, PINS, Level
 
 NET = np.dtype([("cycle", "<u8"), ("level", "u1")])  # RELEASED: it hangs in the air
 LEVELS = (Level.LOW, Level.HIGH, Level.RELEASED)
 WITHIN_S = 1.0  # that a wait takes at most, unless it says otherwise
 EDGES_MAXIMUM = 10_000_000  # of a wave
-UCSR0B, LINE_PINS = 0xC1, {0: 1 << 4, 1: 1 << 3}  # RXEN0, TXEN0: pins of the serial line (ATmega328P, 20.11.3)
+LINE_PINS = {0: RXEN0, 1: TXEN0}
 T = TypeVar("T")
 
 
@@ -44,11 +45,6 @@ class Pulse:
     """cycle"""
     cycles: int
     level: int
-
-    @property
-    def start_s(self) -> float:
-        """When it began, s since power-on."""
-        return self.start / CLOCK_HZ
 
     @property
     def us(self) -> float:
@@ -73,6 +69,8 @@ class Square:
 class Pin:
     """A pin by its number, 0..13 or "A0".."A5". Pins 0 and 1 are the serial line's while the program uses that."""
 
+    __slots__ = ("_cycles", "_does", "_levels", "_seen", "bench", "number")
+
     def __init__(self, bench: Bench, name: int | str) -> None:
         """Raises CallError where there is no such pin."""
         try:
@@ -87,7 +85,7 @@ class Pin:
     def __str__(self) -> str:
         return f"pin {pin_name(self.number)}"
 
-    # ---- driven ------------------------------------------------------------------------------------------------------
+    # ---- driven: all of them raise CallError where the program drives it ---------------------------------------------
 
     def drive(self, level: int, after: float = 0.0) -> None:
         """Drives it to 0 or 1 from `after` seconds from now on, until `release`; no part drives it any more."""
@@ -104,8 +102,8 @@ class Pin:
         hz = number(f"{self}: the frequency", hz, CallError, least=1e-3, most=CLOCK_HZ / 2)
         first, half = self._cycle(after), CLOCK_HZ / hz / 2
         if count is None:
-            self._begin()
-            self.bench.ahead(Square(self.number, half, first, Level.HIGH))
+            self._begin(first)
+            self.bench.sources.append(Square(self.number, half, first, Level.HIGH))
             return
         count = whole(f"{self}: the count", count, CallError, least=1, most=EDGES_MAXIMUM // 2)
         edges = np.arange(2 * count)
@@ -136,22 +134,24 @@ class Pin:
             raise CallError(
                 f"{self}: the wave has a time that is less than one before, a level that is not 0, 1 or 2, or no row"
             )
+        number(f"{self}: the wave's last time", float(times[-1]), CallError, most=LONGEST_S)
         self._drive(self._cycle(after) + np.round(times * CLOCK_HZ), levels)
 
     def _cycle(self, after: float) -> int:
-        after = number(f"{self}: after", after, CallError, least=0.0, most=1e6)
+        after = number(f"{self}: after", after, CallError, least=0.0, most=LONGEST_S)
         return self.bench.now + round(after * CLOCK_HZ)
 
     def _drive(self, cycles: NDArray[Any], levels: NDArray[Any]) -> None:
-        self._begin()
+        self._begin(cycles[0])
         self.bench.pins.drive_edges(self.number, cycles.astype(np.uint64), levels.astype(np.uint8))
 
-    def _begin(self) -> None:
-        """The test does something to the pin: the bench's mark, but in a reaction, which is a part's; a wave ends."""
+    def _begin(self, first: float = math.inf) -> None:
+        """The test does something to the pin, drives it from that cycle on: a wave ends."""
         self._expect_no_line()
-        bench = self.bench
-        if bench.board.reacts_at is None:
-            bench.mark = bench.now
+        bench, program = self.bench, self.bench.pins.output(self.number)
+        if program <= Level.HIGH and first <= bench.now and bench.board.reacts_at is None:
+            raise CallError(f"{self}: the program drives it, to {program}; expected a pin that it reads")
+        bench.acted()
         bench.sources[:] = [one for one in bench.sources if not (isinstance(one, Square) and one.pin == self.number)]
 
     # ---- looked at ---------------------------------------------------------------------------------------------------
@@ -187,10 +187,9 @@ class Pin:
                     del self._cycles[-1], self._levels[-1]
 
     def _expect_no_line(self) -> None:
-        if (bit := LINE_PINS.get(self.number)) is None:
-            return
-        if self.bench.board.extension("data", "uint8_t") is None or self.bench.pins.read_memory(UCSR0B, 1)[0] & bit:
-            raise Cannot(f"{self} is the serial line's while the program uses that; expected the line itself")
+        if self.number in LINE_PINS and self.bench.uses_line(LINE_PINS[self.number]):
+            kind = CallError if isinstance(self.bench.board, AvrBoard) else Cannot  # which no program there can leave
+            raise kind(f"{self} is the serial line's while the program uses that; expected uno.serial, or another pin")
 
     # ---- waited for --------------------------------------------------------------------------------------------------
 
@@ -232,9 +231,7 @@ class Pin:
 
     def all_pulses(self, since: int = 0, level: int = 1) -> NDArray[np.int64]:
         """Start and length, in cycles, of each pulse that has ended and began at `since` or later: shape (n, 2)."""
-        changes = self.edges(since)
-        cycles, begins = changes["cycle"].astype(np.int64), np.flatnonzero(changes["level"][:-1] == level)
-        return np.column_stack((cycles[begins], cycles[begins + 1] - cycles[begins]))
+        return pulses_of(self.edges(since), level)
 
     def frequency(self, periods: int = 8, within: float = WITHIN_S) -> float:
         """Hz, over that many whole periods, from rise to rise, from the mark on. Raises as `pulse`."""
@@ -268,7 +265,7 @@ class Pin:
 
     def _wait(self, found: Callable[[int], T | None], event: Callable[[T], int], within: float, what: str) -> T:
         """What is found at last; its event's cycle is then the mark."""
-        within = number(f"{self}: within", within, CallError, least=0.0, most=1e6)
+        within = number(f"{self}: within", within, CallError, least=0.0, most=LONGEST_S)
         bench = self.bench
         mark, begin, end = bench.mark, bench.now, bench.now + round(within * CLOCK_HZ)
         self._look()
@@ -289,6 +286,12 @@ class Pin:
             f"it had {count} edges meanwhile, and has been {names[Level(self._levels[-1])]} since "
             f"{self._cycles[-1] / CLOCK_HZ:.6f} s; now it is {self.bench.now / CLOCK_HZ:.6f} s{native}"
         )
+
+
+def pulses_of(changes: NDArray[Any], level: int = 1) -> NDArray[np.int64]:
+    """Start and length, in cycles, of the pulses among a pin's changes of level (dtype EDGE): shape (n, 2)."""
+    cycles, begins = changes["cycle"].astype(np.int64), np.flatnonzero(changes["level"][:-1] == level)
+    return np.column_stack((cycles[begins], cycles[begins + 1] - cycles[begins]))
 
 
 NATIVE = " (of the native board only what the firmware drives is seen)"

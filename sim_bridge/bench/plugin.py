@@ -1,8 +1,10 @@
-"""The pytest plugin: the fixture `uno`, an Uno with the program that a test's mark names; what it measured, and what is
-left of it where it fails.
+"""The pytest plugin: the fixture `uno`, an Uno with the program that a test's mark names, and what it measured.
 
     @pytest.mark.uno(image="own.elf")
     def test_servo(uno): ...
+
+A test that fails leaves a folder with its name: pins.vcd for GTKWave and PulseView, serial.txt, run with its record
+where there is a robot, and again.txt, the command that repeats it.
 
 pytest loads this file in every session wherever the kit is installed, so that it imports nothing but pytest and the
 standard library until the fixture is used.
@@ -11,13 +13,16 @@ standard library until the fixture is used.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import os
+import re
 import shlex
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Collection, Generator, Iterator
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -25,19 +30,16 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from sim_bridge.bench.cover import Coverage
     from sim_bridge.bench.cycles import Baseline
     from sim_bridge.bench.uno import Uno, Wanted
 
 MARK = "uno"
-PASSED = pytest.StashKey[bool]()
-MEASURED, CANNOT, CYCLES = (
-    "uno.measured.",
-    "uno.cannot",
-    "uno.cycles",
-)  # of the properties of a test's report, which reach JUnit's file
-DEFAULT_BOARD = "avr"
+JUDGED = pytest.StashKey[int]()  # of a test that passed so far: how many of its measurements were looked at
+# Names of the properties of a test's report, which reach JUnit's file.
+MEASURED, CANNOT, CYCLES = "uno.measured.", "uno.cannot", "uno.cycles"
 BASELINE, UPDATE = "uno-baseline.json", "update"
+MEASURED_FILE, COVER_FILE = "measured.json", "cover.info"
+LONGEST_NAME = 80  # letters of a folder's name, before its hash
 UNO: pytest.StashKey[Uno] = pytest.StashKey()
 SESSION: pytest.StashKey[Session] = pytest.StashKey()
 KEYWORDS = ("image", "robot", "arena", "seed", "noise", "baud", "motors", "cycles", "faults")
@@ -60,28 +62,35 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="cycles of functions as they were: a change fails (uno-baseline.json, if it is there); update writes that",
     )
     group.addoption("--uno-cover", action="store_true", help="lines and conditional jumps that the tests have executed")
-    group.addoption(
-        "--uno-keep",
-        metavar="DIR",
-        default=".uno",
-        help="where what failing tests leave goes, and measured.json (.uno)",
-    )
+    keep_help = "where what failing tests leave goes, and measured.json (.uno)"
+    group.addoption("--uno-keep", metavar="DIR", default=".uno", help=keep_help)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Its mark; and refuses a port that several processes would open."""
+    """Its mark; and refuses a board that is none, a port that several processes would open, and a file that is no
+    baseline."""
     config.addinivalue_line("markers", f"uno({'=, '.join(KEYWORDS)}=): what the fixture `uno` has in it")
-    config.stash[SESSION] = Session(config)
-    config.pluginmanager.register(config.stash[SESSION], "uno-session")
-    ports = [board for board in boards(config) if board not in ("avr", "native")]
-    if ports and (getattr(config.option, "numprocesses", None) or hasattr(config, "workerinput")):
-        raise pytest.UsageError(f"--uno-on={ports[0]}: one process at a time can have it open; expected no -n")
+    config.stash[SESSION] = session = Session(config)
+    config.pluginmanager.register(session, "uno-session")
+    for board in {*boards(config)} - {"avr", "native"}:
+        from boebot.boards import is_live
+
+        if not is_live(board):
+            raise pytest.UsageError(f"there is no board {board!r}; expected avr, native or a port such as /dev/ttyACM0")
+        if getattr(config.option, "numprocesses", None) or hasattr(config, "workerinput"):
+            raise pytest.UsageError(f"--uno-on={board}: one process at a time can have it open; expected no -n")
+    if config.getoption("--uno-baseline") is not None:
+        from boebot.errors import CallError
+
+        try:
+            _ = session.baseline
+        except CallError as error:
+            raise pytest.UsageError(str(error)) from None
 
 
 def boards(config: pytest.Config) -> list[str]:
     """Those under test."""
-    given: list[str] | None = config.getoption("--uno-on")
-    return given or [DEFAULT_BOARD]
+    return config.getoption("--uno-on") or ["avr"]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -100,21 +109,23 @@ def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
     from sim_bridge.bench.uno import open_uno
 
     board = getattr(request, "param", None) or boards(request.config)[0]
-    failure = ""
     try:
         flash, motors = (request.config.getoption(name) for name in ("--uno-flash", "--uno-motors"))
         opened = open_uno(board, _wanted(request.node), flash=flash, motors=motors)
     except BoebotError as error:
         if _cannot(error):
             raise
-        failure = "\n".join([f"uno: {error}", *getattr(error, "__notes__", ())])
-    if failure:  # here, or the text of the error would be shown twice
-        pytest.fail(failure, pytrace=False)
+        sentence = "\n".join([f"uno: {error}", *getattr(error, "__notes__", ())])
+        raise pytest.fail.Exception(sentence, pytrace=False) from None
     request.node.stash[UNO] = opened
     yield opened
+    failure = ""
     try:
         request.config.stash[SESSION].take_cover(opened)
-        failure = opened.unfired() if request.node.stash.get(PASSED, False) else ""
+        request.node.user_properties += [(MEASURED + one.name, json.dumps(vars(one))) for one in opened.measured]
+        if (judged := request.node.stash.get(JUDGED, None)) is not None:
+            failure = "\n".join(filter(None, [*_beyond(opened, judged), opened.unfired()]))
+            failure += f"\n{_keep(request.node, opened)}" if failure else ""
     finally:
         opened.close()
     if failure:
@@ -136,13 +147,16 @@ def _wanted(item: pytest.Item) -> Wanted:
             raise CallError(f"@pytest.mark.uno({unknown}=...): expected one of {', '.join(KEYWORDS)}{hint}")
         asked |= mark.kwargs
     for name in ("cycles", "faults"):
-        asked[name] = (given,) if isinstance(given := asked.get(name, ()), str) else tuple(given)
+        given = asked.get(name, ())
+        several = (given,) if isinstance(given, str) else given
+        if not isinstance(several, Collection) or not all(isinstance(one, str) and one for one in several):
+            raise CallError(f"@pytest.mark.uno({name}={given!r}): expected a text, or several")
+        asked[name] = tuple(several)
     session = item.config.stash[SESSION]
-    asked |= {"cover": session.covers, "cycles": tuple(dict.fromkeys((*asked["cycles"], *session.functions(item))))}
-    if asked.get("image") is None and asked.get("robot") is None:
-        raise CallError(
-            f"{item.name} says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot="
-        )
+    known = session.baseline.functions(item.nodeid) if session.baseline else ()
+    asked |= {"cover": session.coverage is not None, "cycles": tuple(dict.fromkeys((*asked["cycles"], *known)))}
+    if not isinstance(robot := asked.get("robot"), str | None):
+        raise CallError(f"robot={robot!r}; expected its name or its .toml file")
     if (image := asked.get("image")) is not None:
         asked["image"] = session.program(_file(item, image))
     return Wanted(**asked)
@@ -182,11 +196,20 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     test when it has ended."""
     result = yield from _judged(item)
     if (opened := item.stash.get(UNO, None)) is not None:
-        wrong = [str(one) for one in opened.measured if one.verdict == "fail"]
-        if wrong := wrong + item.config.stash[SESSION].changes(item, opened):
+        wrong = _beyond(opened)
+        if opened.recorded is not None and (baseline := item.config.stash[SESSION].baseline):
+            wrong += baseline.changes(item.nodeid, opened.recorded.seen())
+        if wrong:
             pytest.fail("\n".join(wrong), pytrace=False)
-    item.stash[PASSED] = True
+        item.stash[JUDGED] = len(opened.measured)
+    elif any(mark.name == MARK for mark in item.own_markers):
+        pytest.fail(f"uno: {item.name} has the mark, and no board; expected the fixture: def test(uno)", pytrace=False)
     return result
+
+
+def _beyond(opened: Uno, begin: int = 0) -> list[str]:
+    """What was measured beyond its limits, in sentences, without the first `begin` measurements."""
+    return [one.text for one in opened.measured[begin:] if one.verdict == "fail"]
 
 
 def _judged(item: pytest.Item) -> Generator[None, object, object]:
@@ -216,39 +239,50 @@ def _end_at_the_test(item: pytest.Item, trace: TracebackType | None) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """What a test measured goes into its report, and to files what there was at the board where it fails."""
+    """The cycles of a test go into its report, and to files what there was at the board where it fails."""
     opened = item.stash.get(UNO, None)
-    if opened is not None and call.when == "call":
-        item.user_properties += [(MEASURED + one.name, json.dumps(one.as_dict())) for one in opened.measured]
-        if opened.recorded is not None and (seen := opened.recorded.seen()):
-            item.user_properties.append((CYCLES, json.dumps([dataclasses.asdict(one) for one in seen])))
+    if opened is not None and call.when == "call" and opened.recorded is not None:
+        seen = [dataclasses.asdict(one) for one in opened.recorded.seen()]
+        item.user_properties.append((CYCLES, json.dumps(seen)))
     report = yield
     if opened is not None and call.when != "teardown":
-        _keep(item, opened, report)
+        shutil.rmtree(_folder(item), ignore_errors=True)  # of an earlier time
+        if report.failed:
+            report.sections.append(("uno", _keep(item, opened)))
     return report
 
 
-def _keep(item: pytest.Item, opened: Uno, report: pytest.TestReport) -> None:
-    """Of a test that failed its files, of one that passed none of an earlier time."""
-    from sim_bridge.bench import evidence
+def _folder(item: pytest.Item) -> Path:
+    """Where what a test leaves goes."""
+    short = re.sub(r"[^\w.]+", "-", item.nodeid.rpartition("/")[2])[:LONGEST_NAME].strip("-")
+    name = f"{short}-{hashlib.sha256(item.nodeid.encode()).hexdigest()[:8]}"
+    return Path(item.config.rootpath, item.config.getoption("--uno-keep"), name)
 
-    folder = evidence.folder_of(item.config.rootpath / item.config.getoption("--uno-keep"), item.nodeid)
-    if not report.failed:
-        shutil.rmtree(folder, ignore_errors=True)
-        return
-    again = _command(item.config, item.nodeid)
-    try:
-        evidence.keep(opened, folder, again)
-        shown = os.path.relpath(folder) if folder.is_relative_to(Path.cwd()) else folder
-        report.sections.append(("uno", f"kept in {shown}\nagain: {again}"))
-    except Exception as error:  # whatever is wrong with it, the test's own failure is what counts
-        report.sections.append(("uno", f"nothing is kept: {type(error).__name__}: {error}"))
+
+def _keep(item: pytest.Item, opened: Uno) -> str:
+    """Writes what happened at the board; says where that is, and how to repeat the test."""
+    folder, again = _folder(item), _command(item.config, item.nodeid)
+    said = [f"kept in {os.path.relpath(folder) if folder.is_relative_to(Path.cwd()) else folder}", f"again: {again}"]
+    for name, write in (
+        ("again.txt", lambda file: file.write_text(f"{again}\n", encoding="utf-8")),
+        ("serial.txt", lambda file: file.write_bytes(opened.serial.heard)),
+        ("pins.vcd", opened.save_pins),
+        ("run", opened.save_record),
+    ):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write(folder / name)
+        except Exception as error:  # the test's own failure is what counts
+            said.append(f"without {name}: {error}")
+    return "\n".join(said)
 
 
 def _command(config: pytest.Config, name: str) -> str:
     """What repeats one test."""
     options = [f"--uno-on={board}" for board in config.getoption("--uno-on") or ()]
     options += [f"--uno-{name}" for name in ("flash", "motors") if config.getoption(f"--uno-{name}")]
+    if (baseline := config.getoption("--uno-baseline")) not in (None, UPDATE):
+        options.append(f"--uno-baseline={os.path.relpath(config.invocation_params.dir / baseline, config.rootpath)}")
     there = "" if Path.cwd() == config.rootpath else f"cd {shlex.quote(str(config.rootpath))} && "
     return there + shlex.join(["pytest", *options, name])
 
@@ -263,9 +297,13 @@ class Session:
         self._measured: dict[str, list[dict[str, Any]]] = {}
         self._cannot: Counter[str] = Counter()
         self._cycles: dict[str, list[dict[str, Any]]] = {}
-        self.covers: bool = config.getoption("--uno-cover")
-        self._coverage: Coverage | None = None
-        self._not_covered: set[str] = set()
+        self._ran = False
+        self._failed: set[str] = set()
+        self.coverage = None
+        if config.getoption("--uno-cover"):
+            from sim_bridge.bench.cover import Coverage
+
+            self.coverage = Coverage()
 
     def program(self, file: Path) -> Path:
         """The ELF or HEX file, which is built once; what is wrong with it is said of each test. Raises BoebotError."""
@@ -284,68 +322,50 @@ class Session:
             raise found
         return found
 
-    # ---- cycles, as they were before -----------------------------------------------------------------------------
-
-    @property
-    def _updates(self) -> bool:
-        return bool(self._config.getoption("--uno-baseline") == UPDATE)
-
-    def _baseline(self) -> Baseline:
+    @cached_property
+    def baseline(self) -> Baseline | None:
+        """What functions took before, to be compared with or updated; None: there is no such file. Raises CallError
+        where it is none, or cannot be written."""
+        given = self._config.getoption("--uno-baseline")
+        own = given in (None, UPDATE)
+        path = self._root / BASELINE if own else self._config.invocation_params.dir / given
+        if given is None and not path.exists():
+            return None
         from sim_bridge.bench.cycles import Baseline
 
-        given = self._config.getoption("--uno-baseline")
-        return Baseline(self._root / (BASELINE if given in (None, UPDATE) else given), new=self._updates)
-
-    def functions(self, item: pytest.Item) -> list[str]:
-        """Those that the baseline has for a test."""
-        return [] if self._updates or not self._has_baseline() else self._baseline().functions(item.nodeid)
-
-    def _has_baseline(self) -> bool:
-        given = self._config.getoption("--uno-baseline")
-        return given is not None or (self._root / BASELINE).exists()
-
-    def changes(self, item: pytest.Item, opened: Uno) -> list[str]:
-        """What took other cycles than before, in sentences."""
-        if opened.recorded is None or self._updates or not self._has_baseline():
-            return []
-        return self._baseline().changes(item.nodeid, opened.recorded.rows())
+        return Baseline(path, updates=given == UPDATE)
 
     # ---- coverage ------------------------------------------------------------------------------------------------
 
     def take_cover(self, opened: Uno) -> None:
         """What a test's program has executed."""
-        if not self.covers:
+        if self.coverage is None:
             return
         from boebot.errors import BoebotError
-        from sim_bridge.bench.cover import Coverage
 
-        self._coverage = self._coverage or Coverage()
         try:
-            self._coverage.add(opened.elf(), opened.avr("coverage").cover())
+            self.coverage.add(opened.elf(), opened.avr("coverage").cover())
         except BoebotError as error:
-            self._not_covered.add(str(error))
+            self.coverage.not_counted.add(str(error))
 
     def pytest_sessionfinish(self) -> None:
-        """A process of xdist's sends what it has."""
-        if hasattr(self._config, "workeroutput"):
-            covered = self._coverage.as_dict() if self._coverage else {}
-            self._config.workeroutput["uno_cover"] = [covered, sorted(self._not_covered)]
+        """A worker of xdist's sends what it has covered."""
+        if self.coverage and hasattr(self._config, "workeroutput"):
+            self._config.workeroutput["uno_cover"] = self.coverage.as_dict()
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
-        """Takes it."""
-        covered, not_covered = getattr(node, "workeroutput", {}).get("uno_cover", ({}, ()))
-        self._not_covered.update(not_covered)
-        if covered:
-            from sim_bridge.bench.cover import Coverage
-
-            self._coverage = self._coverage or Coverage()
-            self._coverage.merge(covered)
+        """The controller merges what a worker has covered."""
+        if self.coverage and (found := getattr(node, "workeroutput", {}).get("uno_cover")):
+            self.coverage.merge(found)
 
     # ---- reports -------------------------------------------------------------------------------------------------
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Collects, of each test once."""
+        self._ran = True
+        if report.failed:
+            self._failed.add(report.nodeid)
         for name, value in report.user_properties if report.when == "teardown" else ():
             if name == CANNOT:
                 self._cannot[str(value)] += 1
@@ -355,33 +375,38 @@ class Session:
                 self._measured.setdefault(report.nodeid, []).append(json.loads(str(value)))
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Prints it, and writes its files."""
+        """Prints it, and writes its files in place of those of an earlier session."""
         say = terminalreporter.write_line
+        for name in (MEASURED_FILE, COVER_FILE) if self._ran else ():
+            (self._folder / name).unlink(missing_ok=True)
         if self._measured:
             terminalreporter.section("measured")
             for name, values in self._measured.items():
                 say(name)
                 for row in values:
-                    say(f"  {_in_words(row)}")
-            say(f"also in {self._write('measured.json', json.dumps(self._measured, indent=1))}")
+                    say(f"  {row['verdict']:8}  {row['text']}")
+            say(f"also in {self._write(MEASURED_FILE, json.dumps(self._measured, indent=1))}")
         if self._cycles:
             from sim_bridge.bench.cycles import FunctionCycles, table_of
 
             terminalreporter.section("cycles of functions")
             seen = {name: [FunctionCycles(**row) for row in rows] for name, rows in self._cycles.items()}
             say(table_of(seen))
-            if self._updates:
-                baseline = self._baseline()
-                for name, found in seen.items():
-                    baseline.put(name, {one.name: (one.shortest, one.longest) for one in found})
-                baseline.write()
-                say(f"written to {baseline.path}")
-        if self._coverage is not None:
+            if self.baseline and self.baseline.updates:
+                for name in seen.keys() - self._failed:
+                    self.baseline.put(name, seen[name])
+                self.baseline.write()
+                say(f"written to {self.baseline.path}")
+                missing = [f"{name}, which failed" for name in seen if name in self._failed]
+                missing += [
+                    f"{one.name} of {name}, no call has ended" for name in seen for one in seen[name] if not one.calls
+                ]
+                for what in missing:
+                    say(f"not written: {what}")
+        if self.coverage:
             terminalreporter.section("executed")
-            say(self._coverage.table(self._root))
-            say(f"also in {self._write('cover.info', self._coverage.lcov(self._root))}")
-        for sentence in sorted(self._not_covered):
-            say(f"not counted: {sentence}")
+            say(self.coverage.table(self._root))
+            say(f"also in {self._write(COVER_FILE, self.coverage.lcov(self._root))}")
         if self._cannot:
             terminalreporter.section(f"skipped, as the board cannot do it: {self._cannot.total()}")
             for reason, count in self._cannot.items():
@@ -392,10 +417,3 @@ class Session:
         file = self._folder / name
         file.write_text(f"{text.rstrip()}\n", encoding="utf-8")
         return file
-
-
-def _in_words(row: dict[str, Any]) -> str:
-    from sim_bridge.bench.measured import Measurement
-
-    measured = Measurement(**{name: value for name, value in row.items() if name != "verdict"})
-    return f"{measured.verdict:8}  {measured}"

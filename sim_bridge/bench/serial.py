@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 
 from boebot.arguments import number, shown
 from boebot.errors import CallError
-from boebot.link.transport import Stamping, Transport
-from sim_bridge.bench.waiting import WaitError
+from boebot.link.transport import Transport, stamped_read
+from sim_bridge.bench.waiting import LONGEST_S, WaitError
 
 SLICE_S = 0.000_5  # of waiting, between two looks at what has come
 PORTION_S = 0.25  # of time that only passes
 NOTHING_S = 1e-9
 SHOWN = 200  # bytes of what came, in the text of an error
-LONGEST_S = 3600.0
 
 
 @dataclass
@@ -26,7 +25,7 @@ class Line:
         transport: carries the bytes.
         is_heard: whether the board's receiver is on, so that a byte would not be lost.
         not_heard: why it would, in words.
-        waited_for: is called with the instant of what was waited for: the end of a byte's stop bit (s).
+        mark: is called with the instant of what was waited for, the end of a byte's stop bit, or of what was sent (s).
         starts_s: when a program that has said nothing yet has begun at the latest: a wait does not begin before.
         allowance_s: by which a wait is longer, as the way to a real board takes time that is not the board's.
     """
@@ -34,42 +33,41 @@ class Line:
     transport: Transport
     is_heard: Callable[[], bool] = lambda: True
     not_heard: str = ""
-    waited_for: Callable[[float], object] = lambda at_s: None
+    mark: Callable[[float], object] = lambda at_s: None
     starts_s: float = 0.0
     allowance_s: float = 0.0
 
 
 @dataclass
 class Serial:
-    """Bytes to and from a board. All times are of its own clock (s)."""
+    """Bytes to and from a board. All times are of its own clock (s).
+
+    Attributes:
+        heard: all that has come so far, where no time passes any more.
+    """
 
     line: Line
-    _text: bytearray = field(default_factory=bytearray)
+    heard: bytearray = field(default_factory=bytearray)
     _ends_s: list[float] = field(default_factory=list)  # of the stop bit of each byte
     _begin: int = 0  # index of the first byte that `expect` looks at
-    _sent_s: float = -1.0  # when the last byte sent began: what has come before is no answer
+    _sent_s: float = -1.0  # what has come until then is no answer
 
     def __post_init__(self) -> None:
-        self._opened_s = 0.0 if not self.line.transport.realtime else self.line.transport.now()
-
-    @property
-    def heard(self) -> bytes:
-        """All that has come so far, where no time passes any more."""
-        return bytes(self._text)
+        self.opened_s = 0.0 if not self.line.transport.realtime else self.line.transport.now()
 
     def stamped(self) -> Iterator[tuple[float, bytes]]:
         """The same byte by byte, with the end of its stop bit."""
-        return zip(self._ends_s, (bytes([byte]) for byte in self._text), strict=True)
+        return zip(self._ends_s, (bytes([byte]) for byte in self.heard), strict=True)
 
     @property
     def text(self) -> bytes:
         """All that the board has said so far."""
         self._take(0.0)
-        return bytes(self._text)
+        return bytes(self.heard)
 
     def now(self) -> float:
         """The board's clock, since it was opened."""
-        return self.line.transport.now() - self._opened_s
+        return self.line.transport.now() - self.opened_s
 
     def listen(self, seconds: float) -> None:
         """Lets that much time pass."""
@@ -77,9 +75,12 @@ class Serial:
         while (left_s := end_s - self.line.transport.now()) > NOTHING_S:
             self._take(min(left_s, PORTION_S), min(left_s, PORTION_S))
 
+    def forget(self) -> None:
+        """What the board has said until now is no answer: `expect` does not look at it any more."""
+        self._begin, self._sent_s = len(self.heard), self.line.transport.now()
+
     def send(self, data: bytes, *, within: float = 1.0) -> None:
-        """Sends bytes as soon as the board's receiver is on. What the board has said before is no answer: `expect` does
-        not look at it any more.
+        """Sends bytes as soon as the board's receiver is on. What the board has said before is no answer.
 
         Raises:
             WaitError: the receiver was off for `within` seconds.
@@ -94,7 +95,8 @@ class Serial:
                 raise WaitError(f"waited {within:g} s to send {bytes(data)!r}: {self.line.not_heard}")
             self._take(SLICE_S)
         self._take(0.0)
-        self._begin, self._sent_s = len(self._text), transport.now()
+        self.forget()
+        self.line.mark(transport.now())
         transport.write(bytes(data))
 
     def expect(self, what: bytes | re.Pattern[bytes], *, within: float = 1.0) -> re.Match[bytes]:
@@ -108,46 +110,42 @@ class Serial:
         if not isinstance(what, bytes | re.Pattern) or not what or isinstance(getattr(what, "pattern", b""), str):
             hint = f", as in b{what!r}" if what and isinstance(what, str) else ""
             raise CallError(f"expect: got {shown(what)}; expected bytes or a compiled pattern of bytes{hint}")
-        begin_s = self.line.transport.now() if self._text else max(self.line.transport.now(), self.line.starts_s)
+        if isinstance(what, re.Pattern) and what.search(b""):
+            raise CallError(f"expect: the pattern {what.pattern!r} is found where nothing came; expected one of bytes")
+        begin_s = self.line.transport.now() if self.heard else max(self.line.transport.now(), self.line.starts_s)
         end_s = begin_s + _seconds("expect", within) + self.line.allowance_s
         looked = self._begin
         while (found := self._find(what, looked)) is None:
             left_s = end_s - self.line.transport.now()
             if left_s <= 0:
                 raise WaitError(self._in_vain(what, within))
-            looked = max(looked, len(self._text))
+            looked = max(looked, len(self.heard))
             self._take(min(left_s, SLICE_S))
             looked = max(looked, self._begin)
         self._begin = found.end()
-        self.line.waited_for(self._ends_s[found.end() - 1])
+        self.line.mark(self._ends_s[found.end() - 1])
         return found
 
     def _find(self, what: bytes | re.Pattern[bytes], looked: int) -> re.Match[bytes] | None:
         """The match that ends first, of a byte from index `looked` on."""
         if isinstance(what, bytes):
-            at = self._text.find(what, self._begin)
-            return None if at < 0 else re.compile(re.escape(what)).match(self._text, at)
-        found = (what.search(self._text, self._begin, end) for end in range(looked + 1, len(self._text) + 1))
+            at = self.heard.find(what, self._begin)
+            return None if at < 0 else re.compile(re.escape(what)).match(self.heard, at)
+        found = (what.search(self.heard, self._begin, end) for end in range(looked + 1, len(self.heard) + 1))
         return next(filter(None, found), None)
 
     def _take(self, wait_s: float, quiet_s: float = 0.0) -> None:
         """Takes what comes in that time, of which `quiet_s` passes in any case."""
-        transport = self.line.transport
-        if isinstance(transport, Stamping):
-            pieces = transport.read_stamped(wait_s, quiet_s)
-        else:
-            data = transport.read(wait_s, quiet_s)
-            pieces = [(transport.now(), data)]
-        for end_s, data in pieces:
-            self._text += data
+        for end_s, data in stamped_read(self.line.transport)(wait_s, quiet_s):
+            self.heard += data
             self._ends_s += [end_s] * len(data)
             if end_s <= self._sent_s:
-                self._begin = len(self._text)
+                self._begin = len(self.heard)
 
     def _in_vain(self, what: bytes | re.Pattern[bytes], within: float) -> str:
         wanted = f"{what!r}" if isinstance(what, bytes) else f"the pattern {what.pattern!r}"
         allowed = f" (and {self.line.allowance_s:g} s for the port)" if self.line.allowance_s else ""
-        new, before = bytes(self._text[self._begin :]), bytes(self._text[: self._begin])
+        new, before = bytes(self.heard[self._begin :]), bytes(self.heard[: self._begin])
         saw = f"saw {_end_of(new)}" if new else "nothing came"
         earlier = f"; before that came {_end_of(before)}" if before else ""
         return f"waited {within:g} s{allowed} for {wanted} from the board: {saw}{earlier}"

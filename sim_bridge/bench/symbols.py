@@ -7,6 +7,7 @@ are read and written where the source says so.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,62 +21,62 @@ from sim_bridge.boards.board import BoardMemory
 class Symbol:
     """A variable of a board's memory."""
 
-    def __init__(self, memory: BoardMemory, variable: Variable) -> None:
-        """Raises CallError where the type of the variable has no size that the image says."""
+    __slots__ = ("_before", "_memory", "variable")
+
+    def __init__(
+        self, memory: BoardMemory, variable: Variable, before: Callable[[str], object] = lambda name: None
+    ) -> None:
+        """`before`: called with its name before it is set. Raises CallError where the image does not say its size."""
         if variable.dtype.itemsize == 0:
             raise CallError(
                 f"{variable.name} is of a type whose size the image does not say; expected another variable"
             )
-        self.variable = variable
-        self._memory = memory
+        self.variable, self._memory, self._before = variable, memory, before
 
     @property
     def value(self) -> Any:
         """A number, an array of numpy, or bytes of what is neither."""
-        return _plain(self._cells()[0])
+        return self[()]
 
     @value.setter
     def value(self, value: Any) -> None:
         """Raises CallError where it does not fit."""
-        cells = self._cells()
-        self._put(cells, cells, 0, value)
+        self[()] = value
 
     def __getitem__(self, index: Any) -> Any:
         """An element of an array. Raises CallError: there is none."""
-        return _plain(self._cells()[0][self._checked(index)])
+        return _plain(self._element(self._cells(), index))
 
     def __setitem__(self, index: Any, value: Any) -> None:
         """Raises CallError where there is none, or it does not fit."""
         cells = self._cells()
-        self._put(cells, cells[0], self._checked(index), value)
-
-    def _cells(self) -> NDArray[Any]:
-        """An array of one: the variable, as its bytes are now."""
-        data = bytearray(self._memory.read_memory(self.variable.address, self.variable.dtype.itemsize))
-        return np.frombuffer(data, self.variable.dtype)
-
-    def _checked(self, index: Any) -> Any:
+        before = self._element(cells, index)
+        kind, shape = before.dtype, np.shape(before)
+        look: Any = {"f": np.isfinite, "V": np.shape}.get(kind.kind, np.asarray)
         try:
-            np.empty(self.variable.dtype.shape)[index]
-        except IndexError as error:
-            raise CallError(f"{self.variable.name}[{index!r}]: {str(error).rstrip('.')}; expected an element") from None
-        return index
-
-    def _put(self, cells: NDArray[Any], holder: NDArray[Any], at: Any, value: Any) -> None:
-        """Into what `cells` shows, at a place, and from there to the board."""
-        kind, shape = holder[at].dtype, np.shape(holder[at])
-        try:
-            holder[at] = value
-            fits = np.shape(value) == shape and (kind.kind not in "iub" or np.array_equal(holder[at], value))
+            with np.errstate(over="ignore"):
+                cells[index] = value
+            fits = np.shape(value) == shape and np.array_equal(look(cells[index]), look(value))
         except (OverflowError, ValueError, TypeError):
             fits = False
         if not fits:
-            expected = (
-                f"{np.iinfo(kind).min} to {np.iinfo(kind).max}" if kind.kind in "iu" else f"a value of type {kind}"
-            )
-            each = f"an array {shape} of " if shape else ""
-            raise CallError(f"{self.variable.name}: {value!r} does not fit; expected {each}{expected}")
+            numbers = kind.kind in "iu" and f"{np.iinfo(kind).min} to {np.iinfo(kind).max}"
+            expected = (f"an array {shape} of " if shape else "") + (numbers or f"a value of type {kind}")
+            raise CallError(f"{self.variable.name}: {value!r} does not fit; expected {expected}")
+        self._before(self.variable.name)
         self._memory.write_memory(self.variable.address, cells.tobytes())
+
+    def _cells(self) -> NDArray[Any]:
+        """The variable as its bytes are now."""
+        kind = self.variable.dtype
+        data = self._memory.read_memory(self.variable.address, kind.itemsize)
+        return np.frombuffer(bytearray(data), kind.base).reshape(kind.shape)
+
+    def _element(self, cells: NDArray[Any], index: Any) -> Any:
+        try:
+            return cells[index]
+        except IndexError as error:
+            raise CallError(f"{self.variable.name}[{index!r}]: {str(error).rstrip('.')}; expected an element") from None
 
 
 def _plain(value: Any) -> Any:

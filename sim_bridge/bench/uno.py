@@ -10,46 +10,47 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from boebot import flashing
-from boebot.arguments import number
+from boebot.arguments import number, shown, whole
 from boebot.boards import is_live, open_port
 from boebot.description.robots import load_robot
-from boebot.devices.readings import Readings
 from boebot.devices.uart import Uart
 from boebot.errors import BoardError, BoebotError, CallError
 from boebot.image.program import read_program
 from boebot.link.bad_line import BadLine
 from boebot.record.blocks import merged
 from boebot.record.record import Record
-from sim_bridge.bench.bench import Bench
+from boebot.running.faults import AT_A_PORT, OWNERS, inject, read, unfired
+from boebot.running.program_driver import append_parts
+from boebot.showing import Showing
+from sim_bridge.bench.bench import BARE, RXEN0, Bench
 from sim_bridge.bench.buses import I2c, Spi
 from sim_bridge.bench.measured import Measurement
 from sim_bridge.bench.pins import Pin
 from sim_bridge.bench.serial import Line, Serial
-from sim_bridge.bench.waiting import Cannot
+from sim_bridge.bench.waiting import LONGEST_S, Cannot
 from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_image
-from sim_bridge.sessions.session import SimTransport
 
 if TYPE_CHECKING:
     from boebot.boards import TruthNow
-    from boebot.image.data import Variables
     from sim_bridge.bench.cycles import Cycles, FunctionCycles
     from sim_bridge.bench.symbols import Symbol
     from sim_bridge.sim import SimRobot
 
 AVR, NATIVE = "avr", "native"
-UCSR0B, RXEN0 = 0xC1, 0x10  # of the data space: the receiver is on (ATmega328P data sheet 20.11.3)
+Limit = float | None
+STACK_POINTER, RAM_END = 0x5D, 0x8FF  # of the data space; nothing has been called (ATmega328P data sheet 7.5)
 START_S = 2.0  # from a real board's reset to its program, at most: boot loaders wait for 1.4 s and less
 ALLOWANCE_S = 0.1  # of a wait on a port: USB, and a computer that has more to do (chosen)
-LONGEST_S = 86_400.0
 TICK_S, TICK_CYCLES = 0.01, 160_000  # of the record
+ROUNDING_S = 1e-6  # of a time that somebody has printed
+CHANNELS = [f"A{channel}" for channel in range(6)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +96,8 @@ class Uno:
         self._pins: dict[int | str, Pin] = {}
         self._robot = load_robot(wanted.robot or "shieldbot") if bench is None else bench.robot.description
         self._fired: dict[str, Callable[[], int]] = {}
-        self._record = Record()
+        self._record, self._showing = Record(), Showing()
+        self._showing.is_kept = True
         if bench is not None and wanted.robot is not None:
             bench.after_slice.append(self._put_aside)
         self.recorded: Cycles | None = None
@@ -104,22 +106,17 @@ class Uno:
         image = self._wanted.image.name if self._wanted.image else self._wanted.robot
         return f"<Uno: {image} on {self._on}, {self.now:.6f} s>"
 
-    def begin(self) -> Uno:
-        """Before time passes: what is to fail and to be recorded. Raises as `open_uno`, and is closed then."""
+    def begin(self) -> None:
+        """Before time passes: what is to fail and to be recorded. Raises as `open_uno`."""
         wanted = self._wanted
-        try:
-            for fault in wanted.faults:
-                self.fault(fault)
-            if wanted.cycles:
-                from sim_bridge.bench.cycles import Cycles
+        for fault in wanted.faults:
+            self.fault(fault)
+        if wanted.cycles:
+            from sim_bridge.bench.cycles import Cycles
 
-                self.recorded = Cycles(self.avr("cycles"), self.elf(), wanted.cycles)
-            if wanted.cover and self._bench_or_none is not None and self._on == AVR:
-                self.avr("coverage").cover()
-        except BoebotError:
-            self.close()
-            raise
-        return self
+            self.recorded = Cycles(self.avr("cycles"), self.elf(), wanted.cycles)
+        if wanted.cover and self._on == AVR:
+            self.avr("coverage").cover()
 
     def bench(self, what: str) -> Bench:
         """The bench that the board is on.
@@ -156,11 +153,16 @@ class Uno:
         """Lets time pass."""
         seconds = number("run: the time", seconds, CallError, least=0, most=LONGEST_S)
         self.serial.listen(seconds)
-        self.serial.line.waited_for(self.serial.line.transport.now())
+        self.serial.line.mark(self.serial.line.transport.now())
 
     def reset(self, cause: str = "external") -> None:
-        """Resets the microcontroller: power, external, brown_out or watchdog."""
+        """Resets the microcontroller: power, external, brown_out or watchdog. What it has said before is no answer."""
         self.bench("reset line").pins.reset(cause)
+        self._begins_anew()
+
+    def _begins_anew(self) -> None:
+        self.bench("reset line").acted()
+        self.serial.forget()
 
     # ---- what is at the board ----------------------------------------------------------------------------------------
 
@@ -173,21 +175,22 @@ class Uno:
         """
         return self._pins.setdefault(pin, Pin(self.bench("pins"), pin))
 
-    def analog(self, channel: int) -> Analog:
-        """An analog input, 0..5: `uno.analog(0).set(2.5)`, in volts."""
-        return Analog(self.bench("analog inputs"), channel)
+    def analog(self, channel: int | str) -> Analog:
+        """An analog input, 0..5 or "A0".."A5": `uno.analog(0).set(2.5)`, in volts."""
+        channel = CHANNELS.index(channel) if channel in CHANNELS else channel
+        return Analog(self.bench("analog inputs"), whole("analog: the channel", channel, CallError, least=0, most=5))
 
     @cached_property
     def i2c(self) -> I2c:
         """The two-wire bus, for devices in Python (buses.py)."""
         self.avr("I2C bus")
-        return I2c(self.bench("I2C bus"))
+        return I2c(self.bench("I2C bus").robot)
 
     @cached_property
     def spi(self) -> Spi:
         """The SPI, likewise."""
         self.avr("SPI")
-        return Spi(self.bench("SPI"))
+        return Spi(self.bench("SPI").robot)
 
     @property
     def robot(self) -> SimRobot:
@@ -212,15 +215,26 @@ class Uno:
     # ---- what is in the program --------------------------------------------------------------------------------------
 
     def symbol(self, name: str) -> Symbol:
-        """A variable of the program: `.value`, read or set, `[index]` of an array, `["member"]` of a structure.
+        """A variable of the program: `.value`, read or set, `[index]` of an array; a structure is its bytes.
 
         Raises:
             CallError: the image has no symbols. AnalysisError: it has no such variable.
         """
+        from boebot.image.data import read_variables
         from sim_bridge.bench.symbols import Symbol
 
-        elf = self.elf()
-        return Symbol(self.bench("memory").pins, _variables(elf, elf.stat().st_mtime_ns).find(name))
+        return Symbol(self.bench("memory").pins, read_variables(self.elf()).find(str(name)), self._before_set)
+
+    def _before_set(self, name: str) -> None:
+        """Raises CallError where the program has not come to main, before which all variables get their values."""
+        bench = self.bench("memory")
+        stack = int.from_bytes(bench.pins.read_memory(STACK_POINTER, 2), "little")
+        if stack == RAM_END or bench.pins.cycle == bench.pins.reset_cycle:
+            raise CallError(
+                f"{name} is set before the program begins, which gives it its first value then; expected a wait for "
+                "what the program does, or uno.run(0.01)"
+            )
+        bench.acted()
 
     def cycles(self, function: str) -> FunctionCycles:
         """What calls of a function took so far: `.shortest`, `.longest`, and the `.bound` where there is one.
@@ -242,59 +256,55 @@ class Uno:
             CallError: there is no such fault here.
             Cannot: the board is behind a port, where only the line and the host can fail.
         """
-        from boebot.running.faults import HOST, inject, read
-
+        if not isinstance(what, str):
+            raise CallError(f"fault: got {shown(what)}; expected a text, as 'board.reset@20ms'")
+        owner = what.partition(".")[0]
+        if self._robot.name == BARE and owner not in OWNERS:
+            raise CallError(f"fault {what!r}: the board is on no robot; expected one in the mark: robot='shieldbot'")
         fault = read(what, self._robot)
-        hosts = fault.name.partition(".")[0] in HOST and fault.name != "serial.rate"
-        session: Any = None if hosts else self.bench("parts").session
-        self._fired[what] = inject(fault, self._robot, session, self._bad_line)
+        if fault.begin_s < self.now - ROUNDING_S - self.serial.line.allowance_s:
+            raise CallError(f"fault {fault} is past: it is {self.now:g} s; expected a later START")
+        bench = self._bench_or_none if fault.name in AT_A_PORT else self.bench("parts")
+        session: Any = bench and bench.session
+        self._fired[str(fault)] = inject(fault, self._robot, session, self._bad_line, self.serial.opened_s)
+        if bench is not None:
+            if owner == "board":
+                bench.at(round(fault.begin_s * CLOCK_HZ), self._begins_anew)
+            bench.acted()
+            bench.session.sim.do_due()  # what begins now
 
     def _bad_line(self) -> BadLine:
-        line = self.serial.line
-        if not isinstance(line.transport, BadLine):
-            line.transport = BadLine(line.transport, self._wanted.seed)
-        return line.transport
+        self.serial.line.transport = line = BadLine.around(self.serial.line.transport, self._wanted.seed)
+        return line
 
     def unfired(self) -> str:
         """In a sentence: those that changed nothing so far; or ""."""
-        from boebot.running.faults import unfired
-
         return str(unfired({name: fired() for name, fired in self._fired.items()}) or "")
 
     # ---- what was measured -------------------------------------------------------------------------------------------
 
     def measure(
-        self,
-        name: str,
-        value: float,
-        unit: str = "",
-        *,
-        low: float | None = None,
-        high: float | None = None,
-        marginal: float = 0.0,
+        self, name: str, value: float, unit: str = "", *, low: Limit = None, high: Limit = None, marginal: float = 0.0
     ) -> None:
         """Notes a value for the report. Outside of its limits the test fails when it has ended; nearer than `marginal`
         to one, it passes and is shown."""
         self.measured.append(Measurement.of(name, value, unit, low, high, marginal))
 
-    def save_pins(self, path: Path) -> bool:
-        """Writes what all pins did so far, for viewers of logic signals; False: of this board that is not known."""
+    def save_pins(self, path: Path) -> None:
+        """Writes what all pins did so far, for viewers of logic signals; nothing of a board at a port."""
         if self._bench_or_none is None:
-            return False
+            return
         from boebot.view import vcd
 
         bench = self._bench_or_none
         record, what = Record.of(bench.streams()), str(self._wanted.image or self._wanted.robot)
         vcd.write_boards([(bench.robot.description, record)], what, path)
-        return True
 
     def _put_aside(self) -> None:
         """What the robot's parts show, every 10 ms."""
         bench = self.bench("robot")
         if (tick := bench.now // TICK_CYCLES) > self._record.count("readings"):
-            values = bench.session.readings()
-            readings = Readings(tick, 0, (0.0,) * len(values), values)
-            self._record.append_readings(bench.now / CLOCK_HZ, readings, 0.0, 0.0)
+            append_parts(self._record, self._showing, bench.session, bench.now / CLOCK_HZ, tick)
 
     def save_record(self, folder: Path) -> None:
         """Writes the record of the test as that of a run, for `boebot report`, where there is a robot."""
@@ -307,6 +317,9 @@ class Uno:
         bench, image = self._bench_or_none, self._wanted.image
         recording = Recording(1)
         (record,) = recording.records
+        self._showing.end()
+        for row in self._showing.take():
+            self._record.append(*row)
         record.put(merged([*self._record.groups(), bench.streams(), bench.robot.drain()]))
         for time_s, byte in self.serial.stamped():
             record.append("to_host", time_s, byte)
@@ -323,7 +336,7 @@ class Uno:
             world=bench.session.arena,
             run_time=self.now,
             layout=bench.session.layout,
-            program=hashlib.sha256((image or self.elf()).read_bytes()).hexdigest(),
+            program=hashlib.sha256(file.read_bytes()).hexdigest() if (file := image or bench.board.elf) else None,
         )
         with RunFolder(folder) as run_folder:
             recording.begin(run_folder, [run], {}, {}, waits=True)
@@ -343,15 +356,13 @@ class Uno:
     def __enter__(self) -> Uno:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
 @dataclass(frozen=True)
 class Analog:
-    """An analog input of a board."""
+    """The analog input of that number."""
 
     bench: Bench
     channel: int
@@ -359,14 +370,7 @@ class Analog:
     def set(self, volts: float) -> None:
         """The voltage there from now on."""
         self.bench.pins.analog(self.channel, volts)
-
-
-@cache
-def _variables(elf: Path, written_ns: int) -> Variables:
-    """`written_ns`: when the file was written; one that is built anew is read anew."""
-    from boebot.image.data import read_variables
-
-    return read_variables(elf)
+        self.bench.acted()
 
 
 # ---- opening ---------------------------------------------------------------------------------------------------------
@@ -383,42 +387,35 @@ def open_uno(on: str, wanted: Wanted, *, flash: bool = False, motors: bool = Fal
         Cannot: that kind of board cannot run the image.
         BoebotError: in one sentence: the image is none, the robot or arena is not there, the port is held.
     """
-    if is_live(on):
-        if wanted.motors and not motors:
-            raise Cannot("the program may turn motors; expected --uno-motors, or motors=False in the mark")
-        return _at_port(on, wanted, flash)
-    if on not in (AVR, NATIVE):
-        raise CallError(f"there is no board {on!r}; expected {AVR}, {NATIVE} or a port such as /dev/ttyACM0")
+    if is_live(on) and wanted.motors and not motors:
+        raise Cannot("the program may turn motors; expected --uno-motors, or motors=False in the mark")
+    uno = _at_port(on, wanted, flash) if is_live(on) else _on_bench(on, wanted)
+    try:
+        uno.begin()
+    except BoebotError:
+        uno.close()
+        raise
+    return uno
+
+
+def _on_bench(on: str, wanted: Wanted) -> Uno:
     if on == NATIVE and wanted.image is not None:
         raise Cannot(f"the native board is the kit's own firmware; it cannot run {wanted.image.name}")
     if wanted.image is None and wanted.robot is None:
         raise CallError("there is nothing to test; expected image= or robot=, or both")
-    bench = Bench(
-        wanted.image, on=on, robot=wanted.robot, arena=wanted.arena, seed=wanted.seed, noise=wanted.noise
-    )  # fmt: skip
+    around: dict[str, Any] = {"robot": wanted.robot, "arena": wanted.arena, "seed": wanted.seed, "noise": wanted.noise}
+    bench = Bench(wanted.image, on=on, **around)
+    transport = bench.session.transport
     if wanted.baud is not None:
-        bench.robot.line_rate(wanted.baud)
+        transport.set_baud(wanted.baud)
     elif on == AVR:
-        bench.robot.follow_line()
-    line = _line(bench)
-    if on == AVR:
-        line.is_heard = lambda: bool(bench.pins.read_memory(UCSR0B, 1)[0] & RXEN0)
-        line.not_heard = "the program has not switched its receiver on (Serial.begin)"
-    return Uno(on, wanted, line, bench).begin()
-
-
-def _line(bench: Bench) -> Line:
-    """The serial line of a board on a bench: while somebody waits there, whatever else is on the bench goes on."""
-
-    def wait(robot: SimRobot, cycles: int, quiet: int) -> None:
-        bench.run_until(bench.now + cycles)
+        transport.follow()
 
     def mark(at_s: float) -> None:
         bench.mark = round(at_s * CLOCK_HZ)
 
-    transport = SimTransport(bench.robot, "bench", wait)
-    transport.stamp()
-    return Line(transport, waited_for=mark)
+    not_heard = "the program has not switched its receiver on (Serial.begin)"
+    return Uno(on, wanted, Line(transport, lambda: bench.uses_line(RXEN0), not_heard, mark), bench)
 
 
 _holds: dict[str, bytes] = {}
@@ -444,4 +441,4 @@ def _at_port(url: str, wanted: Wanted, may_flash: bool) -> Uno:
     line = Line(transport, starts_s=transport.now() + START_S, allowance_s=ALLOWANCE_S)
     uno = Uno(url, wanted, line, None)
     line.is_heard = lambda: bool(uno.serial.heard) or transport.now() > line.starts_s
-    return uno.begin()
+    return uno

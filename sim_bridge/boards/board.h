@@ -89,6 +89,9 @@ typedef struct {
 
 #define BOARD_OUTSIDE_LOG "outside log" /* a board_outside_log */
 
+/* double: by which share the rate of an outside that follows the board's is off, from the next `line_rate` on. */
+#define BOARD_LINE_OFF "line off"
+
 /* python: begin */
 enum { BOARD_NOTES_MAXIMUM = 64 };
 

@@ -1,5 +1,4 @@
-"""Emulated boards as Python has them: what they remember, and one by itself, for tests and tools: drive its pins, send
-it bytes, see what it does; no world, no loop."""
+"""Emulated boards as Python has them: reactions to their edges, what they remember, places in their programs."""
 
 from __future__ import annotations
 
@@ -22,7 +21,6 @@ CLOCK_HZ = 16_000_000
 PINS = 20  # Arduino numbers 0..19, BOARD_PIN_COUNT of board.h
 DATA_SIZE = 0x900
 EEPROM_SIZE = 1024
-ROOM = 4096  # bytes that are read from the line at once
 
 EDGE = np.dtype(  # board_edge of board.h
     {"names": ["cycle", "pin", "level"], "formats": ["<u8", "u1", "u1"], "offsets": [0, 8, 9], "itemsize": 16}
@@ -74,13 +72,6 @@ class Edge(NamedTuple):
     cycle: int
     pin: int
     level: Level
-
-
-class SentByte(NamedTuple):
-    """A byte that left the board; `cycle` is the end of its stop bit."""
-
-    cycle: int
-    byte: int
 
 
 class Closes(Protocol):
@@ -171,7 +162,7 @@ class EmulatedBoard:
     def on_edge(self, pin: int, react: Reaction) -> None:
         """From now on `react(cycle, level)` is called at each edge of what the firmware does to a pin, within the run
         and at its cycle: what it drives or sends comes when it says, however the run is cut. It cannot let time pass.
-        What it raises ends the run, and is raised by who lets the board run."""
+        What it raises ends the run, and is raised by the call that runs the board."""
         board = self.handle
         self._reactions.setdefault(checked_pin("on_edge", pin), []).append(react)
         if self._in_c is None:
@@ -201,10 +192,6 @@ class EmulatedBoard:
         ended, self.ended = self.ended, None
         if ended is not None:
             raise ended
-
-    def access(self) -> BoardAccess:
-        """Its operations, for use without a simulated world."""
-        return BoardAccess(self)
 
     def close(self) -> None:
         """Frees the board. May be called twice.
@@ -339,118 +326,6 @@ def check_range(what: str, address: int, count: int, size: int) -> None:
     """Raises ValueError where those are no addresses of a memory of that size."""
     if address < 0 or count < 0 or address + count > size:
         raise ValueError(f"no {what} at 0x{address:X}..0x{address + count - 1:X}; the last address is 0x{size - 1:X}")
-
-
-class BoardAccess(BoardMemory):
-    """One board's operations, times in CPU cycles since power-on, pins by their Arduino numbers (A0 is 14)."""
-
-    def __init__(self, board: EmulatedBoard) -> None:
-        """Becomes the listener of the board, and keeps it alive.
-
-        Raises:
-            BoardError: it was built for another version of board.h.
-        """
-        self._listens_to: EmulatedBoard | None = board
-        self._access = board.lib.board_access_open(board.handle)
-        if not self._access:
-            raise BoardError("This board was built for another version of the board interface; build it again.")
-        self._bytes, self._cycles = board.ffi.new("uint8_t[]", ROOM), board.ffi.new("uint64_t[]", ROOM)
-
-    @property
-    def board(self) -> EmulatedBoard:
-        """The board itself."""
-        if self._listens_to is None:
-            raise BoardError("this board is closed")
-        return self._listens_to
-
-    def _call(self, operation: str, *arguments: Any) -> Any:
-        """One of the operations of board.h."""
-        board = self.board.handle
-        return getattr(board.op, operation)(board, *arguments)
-
-    @property
-    def now(self) -> int:
-        """The cycle up to which the board has run."""
-        return int(self._call("now"))
-
-    def advance(self, until: int) -> None:
-        """Runs until `until`, or up to an instruction's length beyond, or to an edge that ends the run. A crash raises
-        BoardError."""
-        if state := self._call("advance", until):
-            self.board.raise_ended()
-            if state == self.board.lib.BOARD_PAUSED:
-                return
-            raise BoardError(f"The board stopped: {self.fault}.")
-
-    def run(self, cycles: int) -> None:
-        """Runs `cycles` further."""
-        self.advance(self.now + cycles)
-
-    def drive(self, pin: int, level: Level, at: int = 0) -> None:
-        """From cycle `at` (or now) on the outside drives `pin`; replaces what was queued for it from then on."""
-        self._call("drive", at, pin, level)
-
-    def wave(self, pin: int, half: int, first: int, count: int, level: Level) -> None:
-        """Drives `pin` to `level` (LOW or HIGH) at cycle `first`, to the other one `half` cycles later, and so on,
-        `count` times."""
-        self.board.lib.board_access_drive_wave(self._access, first, half, count, pin, level)
-
-    def send(self, data: bytes | Iterable[int], at: int = 0) -> None:
-        """Puts bytes on the line towards the board, not before cycle `at`."""
-        data = bytes(data)
-        self._call("send", at, data, len(data))
-
-    def receive(self) -> list[SentByte]:
-        """Takes the bytes that left the board since the last call."""
-        data, cycles = self.received()
-        return [SentByte(cycle, byte) for cycle, byte in zip(cycles, data, strict=True)]
-
-    def received(self) -> tuple[bytes, list[int]]:
-        """Takes the bytes that left the board since the last call, and the cycle at which each one's stop bit ended."""
-        data, cycles, ffi = b"", [], self.board.ffi
-        while count := self._call("receive", self._bytes, self._cycles, ROOM):
-            data += ffi.buffer(self._bytes, count)[:]
-            cycles += ffi.unpack(self._cycles, count)
-        return data, cycles
-
-    def line_rate(self, baud: int) -> None:
-        """Sets the outside's bit rate."""
-        self._call("line_rate", baud)
-
-    def reset(self, cause: ResetCause = ResetCause.EXTERNAL) -> None:
-        """Resets the microcontroller at its next instruction."""
-        self._call("reset", cause)
-
-    def log(self) -> list[Edge]:
-        """Takes the output edges since the last call."""
-        return [Edge(cycle, pin, LEVELS[level]) for cycle, pin, level in self.edges().tolist()]
-
-    def edges(self) -> NDArray[Any]:
-        """The same as an array (dtype EDGE)."""
-        log = self._access.log
-        size = log.end * EDGE.itemsize
-        log.end = 0
-        return np.frombuffer(self.board.ffi.buffer(log.edges, size)[:] if size else b"", dtype=EDGE)
-
-    def analog(self, channel: int, volts: float) -> None:
-        """Sets the voltage at analog channel 0..5."""
-        self._access.volts[channel] = volts
-
-    def supply(self, volts: float) -> None:
-        """Sets the voltage at VCC and AVCC; 5 V if nobody does."""
-        self._access.supply = volts
-
-    @property
-    def fault(self) -> str | None:
-        """What is wrong after a crash, with function and line where they are known, or None."""
-        return self.board.fault()
-
-    def close(self) -> None:
-        """Lets go of the board."""
-        if self._listens_to is not None:
-            if not self._listens_to.is_closed:  # it would be written to
-                self._listens_to.lib.board_access_close(self._access)
-            self._listens_to = None
 
 
 # ---- places in the program: its ELF file is read only where something went wrong ------------------------------------

@@ -4,8 +4,6 @@
 #include "parts/ping.h"
 #include "state.h"
 
-#define WAVE_EDGES_MAXIMUM 10000000u
-
 /* The truth has where it was, and a cycle later where it is. */
 static void lift(robot *r, double x, double y, double heading) {
   const uint64_t at = r->sim->world_at;
@@ -35,23 +33,24 @@ int sim_place_shape(sim *self, int shape, double x, double y, double heading) {
   return SIM_OK;
 }
 
-/* Takes a pin from its part. Returns 1 if a resistor pulls it up when nothing drives it. */
-static int take_pin(robot *r, uint8_t pin) {
-  int pulled_up = 0;
+/* Takes a pin from its part, or gives it back. Returns what the part does there (PART_DRIVES, ...); 0: none drives it. */
+static int override(robot *r, uint8_t pin, int overridden) {
+  int role = 0;
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     for (int k = 0; k < PART_PINS; k++) {
       if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
-      p->overridden = 1;
-      pulled_up |= (p->pins[k].role & PART_PULLED_UP) != 0;
+      p->overridden = overridden;
+      role |= p->pins[k].role;
+      if (!overridden) part_show(p, k);
     }
   }
-  return pulled_up;
+  return role;
 }
 
 void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level) {
-  const int pulled_up = take_pin(self, pin);
-  if (level == BOARD_RELEASED && pulled_up) level = BOARD_HIGH;
+  const int role = override(self, pin, 1);
+  if (level == BOARD_RELEASED && (role & PART_PULLED_UP)) level = BOARD_HIGH;
   self->chassis.driven[pin] = level;
   self->board->op->drive(self->board, at, pin, level);
 }
@@ -61,32 +60,9 @@ void robot_drive_edges(robot *self, uint8_t pin, const uint64_t *at, const uint8
 }
 
 void robot_release(robot *self, uint8_t pin) {
-  int is_shown = 0;
-  for (int i = 0; i < self->part_count; i++) {
-    part *p = self->parts[i];
-    for (int k = 0; k < PART_PINS; k++) {
-      if (p->pins[k].pin != pin || !(p->pins[k].role & PART_DRIVES)) continue;
-      p->overridden = 0;
-      is_shown = 1;
-      part_show(p, k);
-    }
-  }
-  if (is_shown) return;
+  if (override(self, pin, 0)) return;
   self->chassis.driven[pin] = BOARD_RELEASED;
   self->board->op->drive(self->board, 0, pin, BOARD_RELEASED);
-}
-
-int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration) {
-  if (duration / half_cycles > WAVE_EDGES_MAXIMUM) return SIM_BAD_ARGUMENT;
-  take_pin(self, pin);
-  const uint64_t start = self->sim->world_at + PART_GUARD; /* edges up to there are queued already */
-  uint8_t level = self->chassis.driven[pin];
-  self->board->op->drive(self->board, start, pin, level); /* ends what was queued */
-  for (uint64_t at = start + half_cycles; at <= start + duration; at += half_cycles) {
-    level = level == BOARD_HIGH ? BOARD_LOW : BOARD_HIGH;
-    self->board->op->drive(self->board, at, pin, level);
-  }
-  return SIM_OK;
 }
 
 int robot_answer_ping(robot *self, int64_t echo_cycles) {
@@ -111,16 +87,8 @@ void robot_unplug(robot *self, int number, int unplugged) {
   part_unplug(p, unplugged);
 }
 
-/* Faults that a wheel, and the whole robot, can have. */
-static uint32_t faults_of_place(int number) {
-  return number == FAULTY_ROBOT ? FAULT_BIT(FAULT_LIFTED) : FAULT_BIT(FAULT_BLOCKED) | FAULT_BIT(FAULT_SLIPPING);
-}
-
 int robot_fault(robot *self, int number, int kind, double value, uint64_t begin, uint64_t end) {
-  const uint64_t now = self->sim->now;
   part *of = number < 0 ? NULL : self->parts[number];
-  if (begin < now) begin = now;
-  if (end <= begin || (of == NULL && !(faults_of_place(number) & FAULT_BIT(kind)))) return SIM_BAD_ARGUMENT;
   fault **faults = realloc(self->faults, (size_t)(self->fault_count + 1) * sizeof *faults);
   if (faults == NULL) return SIM_NO_MEMORY;
   self->faults = faults;

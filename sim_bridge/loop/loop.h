@@ -119,20 +119,18 @@ int robot_place(robot *self, double x, double y, double heading);
 int sim_place_shape(sim *self, int shape, double x, double y, double heading);
 
 /* For tests: a pin taken from its part and driven at a cycle, or at several, the earliest first; given back to it, or let go;
- * driven by a square wave of that half period for that long;
- * length of every echo pulse in cycles, -1: as the world says, -2: no pulse at all; the plug of the part of a number
- * pulled out (1) or put in again (0). Pins, levels and periods have been checked (pins.py). Return SIM_OK or an error. */
+ * length of every echo pulse in cycles, -1: as the world says; the plug of the part of a number pulled out (1) or put in
+ * again (0). Pins and levels have been checked (pins.py). Return SIM_OK or an error. */
 void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level);
 void robot_drive_edges(robot *self, uint8_t pin, const uint64_t *at, const uint8_t *levels, size_t count);
 void robot_release(robot *self, uint8_t pin);
-int robot_wave(robot *self, uint8_t pin, uint32_t half_cycles, uint64_t duration);
 int robot_answer_ping(robot *self, int64_t echo_cycles);
 void robot_unplug(robot *self, int number, int unplugged);
 
 /* Lays a fault (FAULT_...) on the part of that number, or on a wheel or the whole robot, for the cycles from `begin`, now at
- * the earliest, up to `end`; `value` in the unit of the device's FAULTS. Wheels and motors take up a fault with a step of
- * the world. Returns its number, or an error: SIM_BAD_ARGUMENT, there is no such fault of that part, another one of its kind
- * acts at the same time, or it never acts. */
+ * the earliest, up to `end`, which is later; `value` in the unit of the device's FAULTS. Wheels and motors take up a fault
+ * with a step of the world. One of a kind that the part does not have never fires. Returns its number, or an error:
+ * SIM_BAD_ARGUMENT, another one of its kind acts at the same time. */
 int robot_fault(robot *self, int number, int kind, double value, uint64_t begin, uint64_t end);
 
 /* How often what went out was not what would have gone out without the fault of that number, so far. */

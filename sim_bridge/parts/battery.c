@@ -30,7 +30,7 @@ static double analog(part *base, uint64_t cycle) {
   return v < 0.0 ? 0.0 : (v > SUPPLY_NOMINAL_V ? SUPPLY_NOMINAL_V : v);
 }
 
-static const part_operations OPERATIONS = {.step = step, .analog = analog, .faults = FAULT_BIT(FAULT_SAGGING)};
+static const part_operations OPERATIONS = {.step = step, .analog = analog};
 
 void battery_init(battery *self, const part_place *place, uint8_t channel, const battery_parameters *parameters) {
   memset(self, 0, sizeof *self);

@@ -52,7 +52,7 @@ static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   }
 }
 
-static const part_operations OPERATIONS = {.edge = edge, .faults = FAULT_BIT(FAULT_DIRTY)};
+static const part_operations OPERATIONS = {.edge = edge};
 
 void capacitor_init(capacitor *self, const part_place *place, uint8_t pin, const capacitor_parameters *parameters,
                     capacitor_decay decay_time) {

@@ -115,12 +115,7 @@ static void hold(const part *base, fault *f) {
   f->level = BOARD_HIGH;
 }
 
-static const part_operations OPERATIONS = {
-    .step = step,
-    .read = read,
-    .faults = FAULT_BIT(FAULT_MISSING) | FAULT_BIT(FAULT_EXTRA) | FAULT_BIT(FAULT_NOISY),
-    .hold = hold,
-};
+static const part_operations OPERATIONS = {.step = step, .read = read, .hold = hold};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   encoder *self = (encoder *)base;

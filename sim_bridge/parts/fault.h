@@ -1,8 +1,8 @@
 /* fault.h: what is wrong with a part from one cycle to another, by name, laid on it from outside.
  *
  * A part asks for its faults where they act, in its own file; without any that costs one compare. A fault has fired where
- * what went out was not what would have gone out without it. Draws are a function of (seed, robot, part, kind, cycle), with
- * noise switched off, too: the part's own sequence of draws is what it is without the fault.
+ * what went out was not what would have gone out without it. Draws depend on (seed, robot, part, kind, cycle) only, also when
+ * noise is off: the part's own sequence of draws is what it is without the fault.
  *
  * Some faults hold a pin at a level. What the part does there meanwhile goes out when the fault ends.
  */
@@ -36,7 +36,6 @@ enum {
 };
 /* python: end */
 
-#define FAULT_BIT(kind) (1u << (kind))
 #define FAULT_NEVER UINT64_MAX
 #define FAULT_NOISE 10000u /* the keys of kind k are higher by this times k + 1 than those of parts */
 

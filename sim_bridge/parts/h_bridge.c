@@ -98,11 +98,7 @@ static int read(part *base, double *values) {
   return 1;
 }
 
-static const part_operations OPERATIONS = {
-    .edge = edge,
-    .before_step = before_step,
-    .read = read,
-    .faults = FAULT_BIT(FAULT_DEAD) | FAULT_BIT(FAULT_WEAK) | FAULT_BIT(FAULT_REVERSED)};
+static const part_operations OPERATIONS = {.edge = edge, .before_step = before_step, .read = read};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   h_bridge *self = (h_bridge *)base;

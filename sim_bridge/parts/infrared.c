@@ -80,7 +80,7 @@ static void hold(const part *base, fault *f) {
   f->level = BOARD_LOW;
 }
 
-static const part_operations OPERATIONS = {.edge = edge, .faults = FAULT_BIT(FAULT_BLINDED), .hold = hold};
+static const part_operations OPERATIONS = {.edge = edge, .hold = hold};
 
 infrared *infrared_of(part *base) { return base->op == &OPERATIONS ? (infrared *)base : NULL; }
 

@@ -49,8 +49,7 @@ static int read(part *base, double *values) {
   return 2;
 }
 
-static const part_operations OPERATIONS = {
-    .step = step, .analog = analog, .read = read, .faults = FAULT_BIT(FAULT_DIRTY)};
+static const part_operations OPERATIONS = {.step = step, .analog = analog, .read = read};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   line_module *self = (line_module *)base;

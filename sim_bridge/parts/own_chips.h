@@ -1,5 +1,5 @@
-/* own_chips.h: chips on the two-wire bus whose bytes somebody else knows: a test, by a function that is called when they are
- * spoken to, from inside the board's run. One part for all such chips at two pins: it is asked for each address.
+/* own_chips.h: chips on the two-wire bus whose bytes a callback supplies (a test's Python class), from inside the board's
+ * run. One part for all such chips at two pins: it is asked for each address.
  */
 #ifndef PART_OWN_CHIPS_H
 #define PART_OWN_CHIPS_H

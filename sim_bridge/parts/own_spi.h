@@ -1,5 +1,5 @@
-/* own_spi.h: chips on SPI whose bytes somebody else knows, a test (ATmega328P data sheet 19, from the slave's side). One
- * part for all at MISO, MOSI and SCK: who selects a chip, by a pin of its own, says so. Most significant bit first.
+/* own_spi.h: chips on SPI whose bytes a callback supplies, a test's Python class (ATmega328P data sheet 19, from the
+ * slave's side). One part for all at MISO, MOSI and SCK. Most significant bit first.
  */
 #ifndef PART_OWN_SPI_H
 #define PART_OWN_SPI_H

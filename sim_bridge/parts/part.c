@@ -51,7 +51,7 @@ void part_put(part *self, uint64_t at, uint8_t pin, uint8_t level) {
 }
 
 int part_add_fault(part *self, fault *made) {
-  if (!(self->op->faults & FAULT_BIT(made->kind)) || fault_insert(&self->faults, made) != 0) return -1;
+  if (fault_insert(&self->faults, made) != 0) return -1;
   if (self->op->hold != NULL) self->op->hold(self, made);
   for (int i = 0; i < PART_PINS; i++) {
     if (self->pins[i].pin != made->pin || made->pin == PART_NO_PIN || self->overridden || self->unplugged) continue;

@@ -107,8 +107,6 @@ typedef struct {
   /* A person works it: a button, a knob. Returns 0, or -1: it cannot be set so. */
   int (*set)(part *self, double value);
 
-  uint32_t faults; /* FAULT_BIT of each kind that it can have */
-
   /* The pin that a fault of its holds, and the level, if it holds one. */
   void (*hold)(const part *self, fault *f);
 } part_operations;
@@ -162,7 +160,8 @@ static inline fault *part_fires(part *self, int kind, uint64_t cycle) {
   return f;
 }
 
-/* Lays a fault on the part. Returns 0, or -1: it can have none of that kind, or has another one at the same time. */
+/* Lays a fault on the part; one of a kind that it does not ask for never fires. Returns 0, or -1: another one of its kind
+ * acts at the same time. */
 int part_add_fault(part *self, fault *made);
 
 /* A contact at its first pin changes that from level `before` to `level`, and bounces: it flicks back up to four times, each

@@ -25,7 +25,7 @@ static void answer(ping *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
   const uint64_t length = self->answer >= 0 ? (uint64_t)self->answer : echo(self, &from);
   part_log_look(&self->part, cycle, LOOK_PING, &from, &self->mount, self->sonar.range_maximum, self->distance);
-  if (self->answer == PING_ANSWER_NONE || part_fires(&self->part, FAULT_MISSING, cycle) != NULL) return;
+  if (part_fires(&self->part, FAULT_MISSING, cycle) != NULL) return;
   const fault *late = part_fires(&self->part, FAULT_LATE, cycle);
   const fault *doubled = part_fires(&self->part, FAULT_DOUBLED, cycle);
   uint64_t end = pulse(self, cycle + self->delay + (late == NULL ? 0u : cycles_of(late->value)), length);
@@ -52,11 +52,7 @@ static int read(part *base, double *values) {
   return 2;
 }
 
-static const part_operations OPERATIONS = {
-    .edge = edge,
-    .read = read,
-    .faults = FAULT_BIT(FAULT_MISSING) | FAULT_BIT(FAULT_LATE) | FAULT_BIT(FAULT_DOUBLED),
-};
+static const part_operations OPERATIONS = {.edge = edge, .read = read};
 
 ping *ping_of(part *base) { return base->op == &OPERATIONS ? (ping *)base : NULL; }
 

@@ -17,7 +17,7 @@
 #include "../world/sensors/sonar.h"
 #include "part.h"
 
-enum { PING_ANSWER_WORLD = -1, PING_ANSWER_NONE = -2 };
+enum { PING_ANSWER_WORLD = -1 };
 
 typedef struct {
   part part;
@@ -30,9 +30,9 @@ typedef struct {
   uint64_t shortest;       /* echo pulse */
   uint64_t rest;           /* after the echo pulse */
   uint64_t ready;          /* triggers before this cycle are not heard */
-  int64_t answer;      /* length of every echo pulse, cycles; PING_ANSWER_WORLD, PING_ANSWER_NONE: no pulse at all */
-  double distance;     /* of the last reading, m; -1: none */
-  uint64_t ping_cycle; /* when it was triggered; 0: never */
+  int64_t answer;          /* length of every echo pulse, cycles; or PING_ANSWER_WORLD */
+  double distance;         /* of the last reading, m; -1: none */
+  uint64_t ping_cycle;     /* when it was triggered; 0: never */
   uint32_t pings;
 } ping;
 

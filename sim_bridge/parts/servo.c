@@ -21,11 +21,7 @@ static void before_step(part *base) {
   part_weaken(base, wheel);
 }
 
-static const part_operations OPERATIONS = {
-    .edge = edge,
-    .before_step = before_step,
-    .faults = FAULT_BIT(FAULT_DEAD) | FAULT_BIT(FAULT_WEAK) | FAULT_BIT(FAULT_OFFSET) | FAULT_BIT(FAULT_REVERSED),
-};
+static const part_operations OPERATIONS = {.edge = edge, .before_step = before_step};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   servo *self = (servo *)base;

@@ -29,8 +29,7 @@ static int read(part *base, double *values) {
   return 1;
 }
 
-static const part_operations OPERATIONS = {
-    .step = step, .read = read, .faults = FAULT_BIT(FAULT_STUCK) | FAULT_BIT(FAULT_BOUNCING), .hold = hold};
+static const part_operations OPERATIONS = {.step = step, .read = read, .hold = hold};
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   whisker *self = (whisker *)base;

@@ -6,10 +6,8 @@ somebody reads or writes.
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Callable, Mapping
-from itertools import count
 
 from boebot.boards import PinNow, TruthNow, WatchdogReset
 from boebot.description import robots
@@ -17,14 +15,13 @@ from boebot.devices.uart import Uart
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.pins import BoardPins, PinRecorder
-from sim_bridge.sessions.board_faults import KINDS
+from sim_bridge.sessions.board_faults import KINDS, Acting
 from sim_bridge.sim import NEVER, SimRobot
 from sim_bridge.vehicles import STEP_S
 
-NEVER_S = 1e9
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 
-Wait = Callable[[SimRobot, int, int], None]
+Wait = Callable[[SimRobot, int, int], object]
 """Lets time pass for a robot: (robot, cycles, quiet) at most `cycles`; after `quiet` of them only until bytes come."""
 
 
@@ -58,7 +55,7 @@ class InWorld:
 
     def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
         """See `boebot.boards.Session`."""
-        begin, end = (NEVER if at == math.inf else round(at * CLOCK_HZ) for at in (begin_s, end_s))
+        begin, end = _cycle(begin_s), _cycle(end_s)
         if end <= self.sim.cycle:
             return lambda: 0  # it was over before the first step of the brain was: it never acts
         return self.robot.fault(owner, kind, value, begin, end)
@@ -92,36 +89,24 @@ class InWorld:
 
 
 class SimTransport:
-    """The board's serial line, in this process. Time passes only while `read` waits."""
+    """The board's serial line, in this process. Time passes only while `read` waits.
+
+    Attributes:
+        baud: bit rate of this side; 0: the board's own, whatever that is.
+    """
 
     realtime = False
     baud_given = False
 
     def __init__(self, robot: SimRobot, name: str, wait: Wait = SimRobot.wait, pins: PinRecorder | None = None) -> None:
-        """`wait` lets time pass. `pins`: collects edges meanwhile."""
+        """`wait` lets time pass, and does what is due. `pins`: collects edges meanwhile."""
         self.name = name
         self.baud = _baud(robot.description)
         self._robot = robot
         self._sim = robot.sim
-        self._wait = wait
+        self.wait = wait
         self._pins = pins
         self._stamps = False
-        self._numbers = count()
-        self._due: list[tuple[int, int, Callable[[], object]]] = []  # cycle, number, what is done then
-
-    def at(self, time_s: float, do: Callable[[], object]) -> None:
-        """What is done at that time (s), or now where it is past."""
-        heapq.heappush(self._due, (round(time_s * CLOCK_HZ), next(self._numbers), do))
-
-    @property
-    def next_due(self) -> int:
-        """The cycle for which something is due next; NEVER."""
-        return self._due[0][0] if self._due else NEVER
-
-    def do_due(self) -> None:
-        """Does what is due by now."""
-        while self.next_due <= self._sim.cycle:
-            heapq.heappop(self._due)[2]()
 
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """Advances by `quiet_s`, then until bytes have come and the line is idle, at most by `wait_s` in all."""
@@ -132,27 +117,14 @@ class SimTransport:
         # of any time at all at least one cycle: a wait that lets no time pass would be repeated for ever
         cycles = int(wait_s * CLOCK_HZ + 0.5) or 1 if wait_s > 0.0 else 0
         quiet = int(quiet_s * CLOCK_HZ + 0.5) or 1 if quiet_s > 0.0 else 0
-        if not self._due or not self._wait_for_due(self._sim.cycle + cycles, self._sim.cycle + quiet):
-            self._wait(self._robot, cycles, quiet)
+        self.wait(self._robot, cycles, quiet)
         if self._pins is not None:
             self._pins.collect()
         if self._stamps:
-            return [(cycle / CLOCK_HZ, bytes([byte])) for cycle, byte in self._robot.receive_stamped()]
+            data, came = self._robot.received()
+            return [(cycle / CLOCK_HZ, bytes([byte])) for cycle, byte in zip(came, data, strict=True)]
         data = self._robot.receive()
         return [(self._robot.last_byte_cycle / CLOCK_HZ, data)] if data else []
-
-    def _wait_for_due(self, end: int, listen: int) -> bool:
-        """As `read_stamped` waits, and does what is due. False: nothing is until `end`, and no time has passed."""
-        if self.next_due > end:
-            return False
-        while (now := self._sim.cycle) < end or self.next_due <= now:
-            until = min(end, self.next_due)
-            if until > now:
-                self._wait(self._robot, until - now, min(max(listen - now, 0), until - now))
-                if self._sim.cycle < until:  # bytes have come
-                    break
-            self.do_due()
-        return True
 
     def set_baud(self, rate: int) -> None:
         """Another bit rate of this side of the line, from now on; what was received so far is forgotten."""
@@ -163,7 +135,7 @@ class SimTransport:
     def follow(self) -> None:
         """From now on this side has the board's own bit rate, whatever that is."""
         self._robot.follow_line()
-        self._stamps = True
+        self._stamps, self.baud = True, 0
 
     def stamp(self) -> None:
         """From now on `read_stamped` says of each byte when it had come."""
@@ -212,11 +184,11 @@ class SimSession(InWorld):
 
     def fault(self, owner: str, kind: str, value: float, begin_s: float, end_s: float) -> Callable[[], int]:
         """See `boebot.boards.Session`."""
-        if (name := f"{owner}.{kind}") in KINDS:
-            fault = KINDS[name](self.board, self.transport.baud, value)
-            self.transport.at(begin_s, fault.begin)
-            self.transport.at(min(end_s, NEVER_S), fault.end)
-            return lambda: fault.fired
+        if (act := KINDS.get(f"{owner}.{kind}")) is not None:
+            baud, acting = self.transport.baud, list[Acting]()
+            self.sim.at(_cycle(begin_s), lambda: acting.append(act(self.robot, baud, value)))
+            self.sim.at(_cycle(end_s), lambda: acting[0][0]())
+            return lambda: sum(fired() for _, fired in acting)
         return super().fault(owner, kind, value, begin_s, end_s)
 
     def texts(self) -> dict[str, str]:
@@ -262,6 +234,10 @@ class DirectSession(InWorld):
     def ended(self) -> str:
         """Why it can go no further, or ""."""
         return self.robot.ended
+
+
+def _cycle(time_s: float) -> int:
+    return NEVER if time_s == math.inf else round(time_s * CLOCK_HZ)
 
 
 def _baud(robot: robots.RobotDescription) -> int:

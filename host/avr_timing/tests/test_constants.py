@@ -13,6 +13,7 @@ from avr_timing.flow.instructions import decode
 from boebot.image.elf import read_image
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level
+from sim_bridge.tests.boards.access import BoardAccess
 
 PIN = 13  # PB5 goes high when the program has ended
 STORED = 0x200  # of the program in data memory: from here on the flags and 16 registers after each instruction
@@ -59,7 +60,7 @@ def test_known_values_are_those_of_the_emulator(tmp_path: Path, seed: int) -> No
     program, image = tmp_path / "program.S", tmp_path / "program.elf"
     program.write_text(source, encoding="ascii")
     subprocess.run(["avr-gcc", "-mmcu=atmega328p", "-o", str(image), str(program)], check=True)
-    board = create(image).access()
+    board = BoardAccess(create(image))
     board.run(50_000)
     assert [edge.level for edge in board.log() if edge.pin == PIN][-1] == Level.HIGH
     width = 1 + LAST - FIRST + 1

@@ -16,7 +16,8 @@ from avr_timing.flow.graph import load_program
 from avr_timing.interrupts.interrupts_off import InterruptsOff
 from avr_timing.program import Program
 from sim_bridge.boards.avr import create
-from sim_bridge.boards.board import BoardAccess, Level
+from sim_bridge.boards.board import Level
+from sim_bridge.tests.boards.access import BoardAccess
 
 PIN = 13  # PB5
 INPUT = 0x700  # of the programs in data memory, far from variables and stack
@@ -131,7 +132,7 @@ def build(folder: Path, source: str) -> Path:
 
 def measured(image: Path, given: Sequence[int]) -> int:
     """Cycles of `f` with these bytes as its input."""
-    board = create(image).access()
+    board = BoardAccess(create(image))
     board.write_memory(INPUT, bytes(given))
     return span(board)
 
@@ -260,7 +261,7 @@ PAINT = 0xA5
 def test_stack_goes_as_deep_as_bounded_with_nested_interrupts(tmp_path: Path) -> None:
     """COMPA comes within `deeper`, COMPB within COMPA: the lowest byte of the stack that is not as painted."""
     image = build(tmp_path, NESTED)
-    board = create(image).access()
+    board = BoardAccess(create(image))
     board.write_memory(INPUT, bytes((120, 200, *[1] * 6)))
     board.write_memory(0x800, bytes([PAINT]) * 0x100)
     board.run(CYCLES)
@@ -314,7 +315,7 @@ def test_interrupt_is_as_late_as_the_longest_stretch(tmp_path: Path, length: int
     assert stretch == length + 3
     late: list[int] = []
     for period in range(200, 230):  # so that they meet in every phase
-        board = create(image).access()
+        board = BoardAccess(create(image))
         board.write_memory(INPUT, bytes((period,)))
         board.run(60_000)
         late += board.read_memory(0x600, 2)

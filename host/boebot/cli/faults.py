@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,7 +16,7 @@ from boebot.running.faults import known
 if TYPE_CHECKING:
     from boebot.running.noticed import Noticed
 
-HEADINGS = ["name", "noticed by, or why not", "after", "wrong", "still"]
+HEADINGS = ["fault", "verdict", "by whom, or why", "after", "wrong", "still"]
 
 
 def faults(
@@ -46,17 +46,14 @@ def faults(
             for one in noticed(description, names):
                 found.append(one)
                 progress(len(found))
-        rows, titles, tables = [one._asdict() for one in found], HEADINGS, by_verdict(found)
+        rows, titles = [one._asdict() for one in found], HEADINGS
+        texts = [row_of(one, there[one.fault][0]) for one in found]
     else:
         rows = [{"name": name, "of": list(whose), **kind._asdict()} for name, (kind, whose) in there.items()]
-        titles = ["name", "value", "when", "what happens"]
-        tables = {"": [[name, *_said(there[name][0])] for name in names]}
+        titles, texts = ["name", "value", "when", "what happens"], [_listed(name, there[name][0]) for name in names]
     if json:
         output.print_json({"robot": robot, "faults": rows})
-        return
-    for heading, texts in tables.items():
-        if heading:
-            output.line(f"\n{heading}")
+    else:
         output.print_columns(titles, texts, whole=1)
 
 
@@ -66,20 +63,18 @@ def names_of(there: Mapping[str, tuple[FaultKind, tuple[str, ...]]]) -> list[str
     return [name for name, (_, whose) in there.items() if len(whose) > 1 or not members.issuperset(whose)]
 
 
-def by_verdict(found: Iterable[Noticed]) -> dict[str, list[list[str]]]:
-    """The tables of who notices what, by verdict: rows as in `HEADINGS`. "wrong": in that share of the steps a reading
-    claims to be valid and is another than without the fault; "still": after that time the wheels stood still."""
-    tables: dict[str, list[list[str]]] = {}
-    for one in found:
-        after, still = ("" if time_s is None else f"{time_s:.2f} s" for time_s in (one.after_s, one.still_s))
-        wrong = "" if one.wrong is None else f"{one.wrong:.0%}"
-        tables.setdefault(one.verdict, []).append([one.fault, ", ".join(one.by), after, wrong, still])
-    return tables
+def row_of(one: Noticed, kind: FaultKind) -> list[str]:
+    """Of the table of who notices what, as in `HEADINGS`. "wrong": in that share of the steps a reading claims to be
+    valid and is another than without the fault; "still": after that time the wheels stood still."""
+    after, still = ("" if time_s is None else f"{time_s:.2f} s" for time_s in (one.after_s, one.still_s))
+    wrong = "" if one.wrong is None else f"{one.wrong:.0%}"
+    value = kind.words[:1] if kind.default is None else (f"{kind.default:g}{kind.unit}",)
+    return ["=".join((one.fault, *value)), one.verdict, ", ".join(one.by), after, wrong, still]
 
 
-def _said(kind: FaultKind) -> list[Any]:
-    """Value with its range, whether it lasts, and what happens."""
+def _listed(name: str, kind: FaultKind) -> list[str]:
+    """With its range, or all words that there are."""
     value = ", ".join(kind.words)
     if kind.default is not None:
         value = f"{kind.default:g} {kind.unit}".rstrip() + f" ({kind.least:g} to {kind.most:g})"
-    return [value, "a span" if kind.lasts else "once", kind.does]
+    return [name, value, kind.when, kind.does]

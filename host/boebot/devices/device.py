@@ -80,7 +80,7 @@ def pin_number(pin: int | str) -> int:
     """
     if isinstance(pin, str) and len(pin) == 2 and pin[0] == "A" and pin[1] in "012345":
         return 14 + int(pin[1])
-    if isinstance(pin, int) and 0 <= pin <= 13:
+    if isinstance(pin, int) and not isinstance(pin, bool) and 0 <= pin <= 13:
         return pin
     raise ValueError(f"there is no pin {pin!r}; expected 0..13 or 'A0'..'A5'")
 
@@ -161,8 +161,10 @@ class FaultKind(NamedTuple):
     """And at most."""
     words: tuple[str, ...] = ()
     """VALUE by name, the first one the default; the simulator gets its index."""
-    lasts: bool = True
-    """From START to END; False: it happens at START."""
+    when: Literal["a span", "until END", "once"] = "a span"
+    """From START to END, or to the end of the run; where it needs an END; or at START alone."""
+    harmless: float | None = None
+    """VALUE that changes nothing, if there is one."""
 
 
 class Run(Protocol):

@@ -8,10 +8,10 @@ from typing import Final
 
 from boebot.devices.device import FaultKind
 
-DIRTY: Final = {"dirty": FaultKind("this share of the light is lost", default=0.5, most=0.99)}
+DIRTY: Final = {"dirty": FaultKind("this share of the light is lost", default=0.5, most=0.99, harmless=0.0)}
 MOTOR_FAULTS: Final = {
     "dead": FaultKind("it does not turn its wheel"),
-    "weak": FaultKind("it has this share of its torque", default=0.3),
+    "weak": FaultKind("it has this share of its torque", default=0.3, harmless=1.0),
     "reversed": FaultKind("it turns the other way"),
 }
 SAGGING: Final = {"sagging": FaultKind("the pack has this voltage at most", "V", default=4.6, most=30.0)}

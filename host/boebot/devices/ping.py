@@ -57,7 +57,7 @@ _SHADE, _ECHO = 0.10, 0.14
 SHOWN: Final = ("distance", "m", 1.0, 2)
 FAULTS: Final = {
     "missing": FaultKind("no echo pulse comes"),
-    "late": FaultKind("the echo pulse begins later by this", "s", default=0.01, most=1.0),
+    "late": FaultKind("the echo pulse begins later by this", "s", default=0.01, most=1.0, harmless=0.0),
     "doubled": FaultKind("so long after its end the echo pulse comes again", "s", default=0.001, least=1e-6, most=1.0),
 }
 """Of every range finder at a board."""

@@ -58,7 +58,7 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
     FAULTS: ClassVar = {
         **MOTOR_FAULTS,
-        "offset": FaultKind("it takes pulses for longer by this", "us", default=30.0, least=-500.0, most=500.0),
+        "offset": FaultKind("pulses count as longer by this", "us", 30.0, least=-500.0, most=500.0, harmless=0.0),
     }
 
     def checkup(self, readings: Sequence[Servo]) -> Checkup:

@@ -12,9 +12,9 @@ import math
 import random
 from collections import deque
 from collections.abc import Callable, Sequence
-from functools import partial
+from typing import Self
 
-from boebot.link.transport import Stamping, Transport, stamp_now
+from boebot.link.transport import Transport, stamped_read
 
 TO_BOARD, TO_HOST = "to_board", "to_host"
 BOTH = (TO_BOARD, TO_HOST)
@@ -45,12 +45,8 @@ class _Chance:
         return found
 
 
-def _dropped(data: bytes, hits: Sequence[int]) -> bytes:
-    return bytes(byte for i, byte in enumerate(data) if i not in hits)
-
-
-def _doubled(data: bytes, hits: Sequence[int]) -> bytes:
-    return b"".join(data[i : i + 1] * (1 + (i in hits)) for i in range(len(data)))
+def _copied(data: bytes, hits: Sequence[int], copies: int) -> bytes:
+    return b"".join(data[i : i + 1] * (copies if i in hits else 1) for i in range(len(data)))
 
 
 def _flipped(data: bytes, hits: Sequence[int]) -> bytes:
@@ -61,8 +57,8 @@ def _flipped(data: bytes, hits: Sequence[int]) -> bytes:
 
 
 _DAMAGE: dict[str, tuple[int, Callable[[bytes, Sequence[int]], bytes]]] = {
-    "serial.dropped": (1, _dropped),
-    "serial.doubled": (1, _doubled),
+    "serial.dropped": (1, lambda data, hits: _copied(data, hits, 0)),
+    "serial.doubled": (1, lambda data, hits: _copied(data, hits, 2)),
     "serial.flipped": (8, _flipped),
 }
 """Units in a byte, and what becomes of bytes of which some units are hit."""
@@ -81,11 +77,11 @@ class _Fault:
         self._frames = {way: bytearray() for way in ways}  # that have begun
 
     def holds(self, time_s: float) -> bool:
-        """It is on."""
+        """It acts at that time."""
         return self.begin_s <= time_s + _ROUNDING_S < self.end_s
 
     def through(self, way: str, data: bytes) -> bytes:
-        """What comes of bytes that pass."""
+        """The bytes as this fault leaves them."""
         if self.name == "serial.repeated":
             return self._repeated(self._chances[way], self._frames[way], data)
         if self.name in _DAMAGE:
@@ -124,8 +120,13 @@ class BadLine:
         self.name, self.realtime = transport.name, transport.realtime
         self.is_killed = False
         self._faults: list[_Fault] = []
-        self._read = transport.read_stamped if isinstance(transport, Stamping) else partial(stamp_now, transport)
+        self._read = stamped_read(transport)
         self._late: dict[str, deque[tuple[float, bytes]]] = {way: deque() for way in BOTH}  # bytes and when due
+
+    @classmethod
+    def around(cls, transport: Transport, seed: int) -> Self:
+        """The transport itself where it fails already."""
+        return transport if isinstance(transport, cls) else cls(transport, seed)
 
     def add(
         self, name: str, value: float, begin_s: float, end_s: float = math.inf, ways: Sequence[str] = BOTH

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 
 from boebot.link import messages
 from boebot.link.bad_line import BadLine
 from boebot.link.frame import NO_SESSION, Decoder, encode
-from boebot.link.transport import BaudSelectable, Stamping, Transport, stamp_now
+from boebot.link.transport import BaudSelectable, Transport, stamped_read
 
 NEVER = math.inf
 AT_ONCE = -math.inf
@@ -45,15 +44,14 @@ class Line:
         self._record = record
         self._sequence = 0
         self._session = 0  # seed of the frames that are sent
-        self._read = transport.read_stamped if isinstance(transport, Stamping) else partial(stamp_now, transport)
+        self._read = stamped_read(transport)
         self._write = transport.write
         self._learn_baud()
 
     def make_bad(self, seed: int) -> BadLine:
         """What damages it from now on, once it has faults. What `record` gets is what the host sends and hears."""
-        if self.bad is None:
-            self.bad = BadLine(self.transport, seed)
-            self._read, self._write = self.bad.read_stamped, self.bad.write
+        self.bad = BadLine.around(self.bad or self.transport, seed)
+        self._read, self._write = self.bad.read_stamped, self.bad.write
         return self.bad
 
     def use_session(self, session: int) -> None:

@@ -5,7 +5,7 @@ The ports of this computer are in boebot.link.ports; an in-process board brings 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol, runtime_checkable
 
 
@@ -99,7 +99,11 @@ class Measures(Protocol):
         """By name, a unit in it; None: not yet known."""
 
 
-def stamp_now(transport: Transport, wait_s: float, quiet_s: float) -> list[tuple[float, bytes]]:
-    """Reads from a transport that does not stamp what comes."""
-    data = transport.read(wait_s, quiet_s)
-    return [(transport.now(), data)] if data else []
+def stamped_read(transport: Transport) -> Callable[[float, float], list[tuple[float, bytes]]]:
+    """Its `read_stamped`; of one that does not stamp what comes, a `read` that does."""
+
+    def read(wait_s: float, quiet_s: float) -> list[tuple[float, bytes]]:
+        data = transport.read(wait_s, quiet_s)
+        return [(transport.now(), data)] if data else []
+
+    return transport.read_stamped if isinstance(transport, Stamping) else read

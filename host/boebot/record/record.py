@@ -67,7 +67,7 @@ _READINGS = Struct("<IHdd")
 
 
 def net_level(board: int, outside: int, line_out: int = HIGH) -> int:
-    """Of a pin to which they do that, LOW or HIGH, or RELEASED where it hangs in the air: what the board does; where it
+    """Of a pin to which they do that, LOW or HIGH, or RELEASED where it floats: what the board does; where it
     has let go of the pin, what the outside does, and else HIGH by its pull-up. `line_out`: what the transmitter does to
     its pin."""
     if board in (LOW, HIGH):

@@ -50,6 +50,7 @@ class RunFolder:
         self._lock = -1
         try:
             self.path = path.absolute()  # a brain may change to another folder
+            self._is_new = not path.exists()
             make_folder(path)
             self._lock = system.lock_folder(path)
             there = {entry.name for entry in path.iterdir()} - {system.LOCK}
@@ -76,6 +77,9 @@ class RunFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if error is not None and self._is_new:
+            with suppress(OSError):  # it holds what was written before the error
+                self.path.rmdir()
         self.close()
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 
 from boebot.boards import RESET_CAUSES, BoardSession, VehicleSession
 from boebot.description.robots import RobotDescription
@@ -24,11 +24,9 @@ from boebot.record.interventions import Fault
 
 EXPECTED = "expected NAME[=VALUE]@START[..END], as in ping.missing@3s..5s"
 HOST = ("serial", "cable", "host")
-"""Owners on the host's side of the line: of any board, also a real one."""
+"""Owners on the host's side of the line."""
 
 _SIDE = re.compile(r"_(left|middle|right|\d+)$")
-NEED_END = ("serial.stalled", "host.stopped")
-"""What holds something back until then."""
 
 Fired = Callable[[], int]
 """How often a fault has changed something so far."""
@@ -39,22 +37,25 @@ OWNERS: Mapping[str, Mapping[str, FaultKind]] = {
         "doubled": FaultKind("bytes come twice, this share of them", default=0.01),
         "repeated": FaultKind("whole frames come twice, this share of them", default=0.1),
         "flipped": FaultKind("bits are wrong, this share of them", default=1e-4),
-        "delayed": FaultKind("bytes come later by this", "s", default=0.1, most=10.0),
-        "stalled": FaultKind("bytes are held back until END, and come all at once"),
-        "rate": FaultKind("the host's bit rate is off by this share", default=0.03, least=-0.1, most=0.1),
+        "delayed": FaultKind("bytes come later by this", "s", default=0.1, most=10.0, harmless=0.0),
+        "stalled": FaultKind("bytes are held back until END, and come all at once", when="until END"),
+        "rate": FaultKind("the host's bit rate is off by this share", default=0.03, least=-0.1, most=0.1, harmless=0.0),
     },
     "cable": {"out": FaultKind("the serial cable is out: nothing passes")},
     "host": {
-        "stopped": FaultKind("the host's program stands still until END"),
-        "killed": FaultKind("the host's program ends, and leaves the board to itself", lasts=False),
-        "slow": FaultKind("each step of the brain takes longer by this", "s", default=0.1, most=10.0),
+        "stopped": FaultKind("the host's program stands still until END", when="until END"),
+        "killed": FaultKind("the host's program ends, and leaves the board to itself", when="once"),
+        "slow": FaultKind("each step of the brain takes longer by this", "s", default=0.1, most=10.0, harmless=0.0),
     },
     "board": {
-        "reset": FaultKind("the microcontroller is reset", words=RESET_CAUSES, lasts=False),
+        "reset": FaultKind("the microcontroller is reset", words=RESET_CAUSES, when="once"),
         "brown_out": FaultKind("the 5 V rail falls to this", "V", default=2.5, most=5.0),
     },
-    "eeprom": {"corrupted": FaultKind("bytes get other values", default=1.0, least=1.0, most=1024.0, lasts=False)},
+    "eeprom": {"corrupted": FaultKind("bytes get other values", default=1.0, least=1.0, most=1024.0, when="once")},
 }
+
+AT_A_PORT = {f"{owner}.{kind}" for owner in HOST for kind in OWNERS[owner]} - {"serial.rate"}
+"""Of a real board, too."""
 
 
 def known(robot: RobotDescription) -> dict[str, tuple[FaultKind, tuple[str, ...]]]:
@@ -72,91 +73,64 @@ def known(robot: RobotDescription) -> dict[str, tuple[FaultKind, tuple[str, ...]
     return found
 
 
-def read(text: str, robot: RobotDescription) -> Fault:
-    """A fault as people write it, checked for a robot.
+def read(what: str | Fault, robot: RobotDescription) -> Fault:
+    """A fault, as people write it or as a `Fault`, checked for a robot, with its default value where it has none.
 
     Raises:
         CallError: it is none, or the robot cannot have it.
     """
-    what, sign, span = text.rpartition("@")
-    name, equals, value = what.partition("=")
+    if isinstance(what, Fault):
+        return _checked(what, _kind(what.name, robot, str(what))[0])
+    head, sign, span = what.rpartition("@")
+    name, equals, value = head.partition("=")
     start, dots, end = span.partition("..")
-    kind = _kind(name if sign else text, robot, text)
+    kind, _ = _kind(name if sign else what, robot, what)
     try:
         if not sign:
             raise BoebotError("it says no time")
         given = None if not equals else value if kind.words else parse(value, kind.unit)
         fault = Fault(name, given, parse(start, "s"), parse(end, "s") if dots else None)
     except BoebotError as error:
-        raise CallError(f"fault {text!r}: {error}; {EXPECTED}") from None
-    return checked(fault, robot)
+        raise CallError(f"fault {what!r}: {error}; {EXPECTED}") from None
+    return _checked(fault, kind)
 
 
-def checked(fault: Fault, robot: RobotDescription) -> Fault:
-    """The fault with its default value where it has none.
-
-    Raises:
-        CallError: the robot cannot have it.
-    """
-    kind, value = _kind(fault.name, robot, str(fault)), fault.value
+def _checked(fault: Fault, kind: FaultKind) -> Fault:
+    """As `read` returns it. Raises CallError."""
+    value, name = fault.value, fault.name
     if value is None:
         value = kind.words[0] if kind.words else kind.default
     elif kind.words:
         if value not in kind.words:
             raise CallError(f"fault {fault}: {value!r} is none of {', '.join(kind.words)}")
     elif kind.default is None:
-        raise CallError(f"fault {fault}: {fault.name} takes no value")
+        raise CallError(f"fault {fault}: {name} takes no value")
     elif not isinstance(value, float | int) or not kind.least <= value <= kind.most:
         expected = f"expected {kind.least:g} to {kind.most:g} {kind.unit}".rstrip()
         raise CallError(f"fault {fault}: its value is {value}; {expected}")
+    elif value == kind.harmless:
+        raise CallError(f"fault {fault} changes nothing; expected another value than {value:g}")
     if not (fault.begin_s >= 0.0 and math.isfinite(fault.begin_s)):
         raise CallError(f"fault {fault} begins at {fault.begin_s:g} s; expected a time of the run, from 0 s on")
-    if fault.end_s is None and fault.name in NEED_END:
-        raise CallError(f"fault {fault} never ends; expected an END, as in {fault.name}@3s..4s")
-    if fault.end_s is not None and not kind.lasts:
-        raise CallError(f"fault {fault}: {fault.name} happens at one time; expected no END")
-    if fault.end_s is not None and not fault.begin_s < fault.end_s:
-        raise CallError(f"fault {fault} ends at {fault.end_s:g} s; expected a time later than its begin")
-    return Fault(fault.name, value, fault.begin_s, fault.end_s)
+    if fault.end_s is None and kind.when == "until END":
+        raise CallError(f"fault {fault} never ends; expected an END, as in {name}@3s..4s")
+    if fault.end_s is not None and kind.when == "once":
+        raise CallError(f"fault {fault}: {name} happens at one time; expected no END")
+    if fault.end_s is not None and not fault.begin_s < fault.end_s < math.inf:
+        raise CallError(f"fault {fault} ends at {fault.end_s:g} s; expected a finite time later than its begin")
+    return Fault(name, value, fault.begin_s, fault.end_s)
 
 
-def _kind(name: str, robot: RobotDescription, fault: str) -> FaultKind:
-    """Raises CallError where the robot cannot have it."""
+def _kind(name: str, robot: RobotDescription, fault: str) -> tuple[FaultKind, tuple[str, ...]]:
+    """As of `known`. Raises CallError where the robot cannot have it."""
     there = known(robot)
     if name in there:
-        return there[name][0]
+        return there[name]
     owner = name.partition(".")[0]
     near = [one for one in there if one.partition(".")[0] == owner]
-    hint = did_you_mean(name, there) or (
-        f"; expected one of {', '.join(near)}" if near else "; boebot faults lists all"
-    )
+    others = f"expected one of {', '.join(near)}" if near else "boebot faults lists all"
+    hint = did_you_mean(name, there) or f"; {others}"
     raise CallError(f"fault {fault!r}: robot {robot.name!r} has no {name!r}{hint}")
-
-
-def faults_of(
-    given: Iterable[str | Fault], robot: RobotDescription, number: int, count: int, seconds: float
-) -> list[Fault]:
-    """Those of a run that are of its robot of that number, from 1 to `count`: all that name no other as in
-    "2:NAME@START".
-
-    Raises:
-        CallError: one of them is none, or never begins.
-    """
-    found = []
-    for one in given:
-        if isinstance(one, Fault):
-            fault = checked(one, robot)
-        else:
-            whose, _, text = one.rpartition(":")
-            if whose and whose not in map(str, range(1, count + 1)):
-                raise CallError(f"fault {one!r}: there is no robot {whose} in the run; expected 1 to {count}")
-            if whose not in ("", str(number)):
-                continue
-            fault = read(text, robot)
-        if fault.begin_s >= seconds:
-            raise CallError(f"fault {fault} is never: the run ends at {seconds:g} s; expected an earlier START")
-        found.append(fault)
-    return found
 
 
 def inject(
@@ -177,16 +151,14 @@ def inject(
     Raises:
         BoebotError: it cannot be here.
     """
-    fault = checked(fault, robot)
+    kind, owners = _kind(fault.name, robot, str(fault))
+    fault = _checked(fault, kind)
     owner, _, name = fault.name.partition(".")
-    kind, owners = known(robot)[fault.name]
     value = float(kind.words.index(str(fault.value)) if kind.words else fault.value or 0.0)
     span = fault.begin_s + offset_s, math.inf if fault.end_s is None else fault.end_s + offset_s
-    if fault.name == "serial.rate":
-        session.fault(owner, name, value, *span)
+    fired = [] if fault.name in AT_A_PORT else [session.fault(one, name, value, *span) for one in owners]
     if owner in HOST:
-        return bad_line().add(fault.name, value, *span)
-    fired = [session.fault(one, name, value, *span) for one in owners]
+        fired.append(bad_line().add(fault.name, value, *span))
     return lambda: sum(one() for one in fired)
 
 

@@ -9,6 +9,7 @@ bit for bit: `boebot replay --again` takes them from the record.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from operator import itemgetter
 
 import msgspec
@@ -96,8 +97,7 @@ def script(request: Request, tasks: Sequence[Task]) -> Repeated:
     deeds: list[tuple[float, Deed]] = [(time_s, Typed(text, scripted=True)) for text, time_s in request.typed]
     deeds += [(time_s, Set(part, float(value), scripted=True)) for part, value, time_s in request.inputs]
     deeds.sort(key=itemgetter(0))
-    faults: list[list[tuple[float, Deed]]] = [[(0.0, one) for one in task.faults] for task in tasks]
-    return Repeated([one + deeds * task.brain.is_program for one, task in zip(faults, tasks, strict=True)])
+    return Repeated([[*((0.0, one) for one in task.faults), *deeds * task.brain.is_program] for task in tasks])
 
 
 class Hands:
@@ -116,17 +116,13 @@ class Hands:
         self.driver, self.task = driver, task
         self.held: Hand | None = None
         self._tally = Tally()
-        self.faults: list[tuple[Fault, Fired]] = []
+        self.faults: dict[str, Fired] = {}
         self.onlooker, self._number = onlooker, number
 
     @property
     def count(self) -> int:
         """See above."""
         return self._tally.count
-
-    def fired(self) -> dict[str, int]:
-        """Of each fault how often it has fired."""
-        return {str(fault): fired() for fault, fired in self.faults}
 
     def before_step(self, time_s: float) -> None:
         """What is due."""
@@ -158,10 +154,9 @@ class Hands:
                 check_setting(self.driver.description, part, value)
                 self.driver.session.set_part(part, value)
             case Fault():
-                driver, seed = self.driver, self.task.seed
+                driver, bad_line = self.driver, partial(self.driver.bad_line, self.task.seed)
                 offset_s = driver.status().clock_offset
-                fired = inject(one, driver.description, driver.session, lambda: driver.bad_line(seed), offset_s)
-                self.faults.append((one, fired))
+                self.faults[str(one)] = inject(one, driver.description, driver.session, bad_line, offset_s)
                 driver.has_faults = True
             case _ if self.driver.is_program:
                 raise BoebotError("a program drives this robot, no brain: it takes what is typed, and buttons")

@@ -235,7 +235,7 @@ class _Robot:
             "steps": task.record.count("command"),
             "counters": dict(driver.session.counters()),
             "odometry_source": brain.odometry,
-            "faults": {} if self.hands is None else self.hands.fired(),
+            "faults": {one: fired() for one, fired in self.hands.faults.items()} if self.hands else {},
             "longest_step": self._times.longest,
             "long_steps": self._times.long,
         }

@@ -1,7 +1,7 @@
 """Who notices what fails, or why it goes unnoticed: each fault in a run by itself on the native board, beside the same
 run without it.
 
-The robot drives to a wall, touches it and backs off, whatever its sensors say, and nothing about it is drawn.
+The robot drives to a wall, touches it and backs off, whatever its sensors say, without noise and other random draws.
 So what differs from the run without the fault comes of the fault, as long as that does not change its way.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from boebot.description.robots import RobotDescription
 from boebot.imperfections import switches
-from boebot.link.messages import EventKind
+from boebot.link.messages import EventKind, Hello
 from boebot.record.columns import events
 from boebot.record.interventions import Fault
 from boebot.record.run import Run
@@ -36,13 +36,13 @@ FIGURES = {
     "dead_man_stops": "board: dead-man",
 }
 BOARD = {"bad": "board: checksum", "late": "board: late set-points", "duplicate": "board: request numbers"}
-DRAWN = [name for name in switches() if name not in ("coast_drag", "slip", "battery_sag")]  # which draw nothing
+DRAWN = [name for name in switches() if name not in ("coast_drag", "slip", "battery_sag")]  # with random draws
 _STILL_M_S, _STILL_S = 0.01, 0.3
-RESET_S = 1.0  # the memory is looked at when the firmware starts
+RESET = Fault("board.reset", "external", 1.0)  # beside eeprom.corrupted: the firmware reads its memory as it starts
 
 NOTICED, HARMLESS = "noticed", "changes nothing"
 NOT_HERE, NEVER, BROKEN = "not by this kit", "cannot be noticed", "does not hold"
-_COMPARED = (NOT_HERE, "command and edges are compared nowhere; without encoders there is nothing to compare")
+_COMPARED = (NOT_HERE, "nothing compares command and edges")
 _DIRTY = (NEVER, "less light is as over a darker floor, or in the shade")
 REASONS = {
     "servos.dead": _COMPARED,
@@ -51,16 +51,16 @@ REASONS = {
     "servos.offset": _COMPARED,
     "wheel.blocked": _COMPARED,
     "encoders.missing": _COMPARED,
-    "encoders.extra": (HARMLESS, "edges that follow so fast are taken for bounces"),
+    "encoders.extra": (HARMLESS, "edges this fast are taken for bounces"),
     "wheel.slipping": (NEVER, "encoders turn as always"),
-    "robot.lifted": (NEVER, "nothing feels the floor; wheels and encoders turn as always"),
-    "whiskers.stuck": (NEVER, "a contact that is stuck is as one that touches something, or nothing"),
-    "whiskers.bouncing": (NEVER, "what outlasts the debouncing is as a touch"),
-    "infrared.blinded": (BROKEN, "the firmware sees light before its burst, and says that nothing is there, as valid"),
-    "ping.doubled": (HARMLESS, "the board ignores what follows the first pulse"),
-    "serial.rate": (HARMLESS, "bytes come whole; further off the checksum notices it"),
+    "robot.lifted": (NEVER, "nothing feels the floor"),
+    "whiskers.stuck": (NEVER, "as a touch, or none"),
+    "whiskers.bouncing": (NEVER, "what outlasts debouncing is as a touch"),
+    "infrared.blinded": (BROKEN, "the firmware sees light before its burst; telemetry has no bit for that"),
+    "ping.doubled": (HARMLESS, "only the first pulse counts"),
+    "serial.rate": (HARMLESS, "bytes come whole; further off: checksum"),
     "battery.sagging": (HARMLESS, "that is enough for the board, and what is measured is true"),
-    "host.killed": (NOTICED, "board: dead-man, and the session's end; no host hears of it"),
+    "host.killed": (NOTICED, "board: dead-man; no host hears of it"),
     **dict.fromkeys(("line.dirty", "lines.dirty", "lights.dirty"), _DIRTY),
 }
 """Of faults of which nothing shows: what that means, and why."""
@@ -87,11 +87,10 @@ class Noticed(NamedTuple):
 class _Run(Onlooker):
     """One run, and what the brain read in each of its steps."""
 
-    def __init__(self, robot: RobotDescription, faults: list[Fault], *, saves: bool = False) -> None:
-        """`saves`: the board's parameters, before the first step; and the board is reset later on, and reads them."""
+    hello: Hello | None = None  # the board's last
+
+    def __init__(self, robot: RobotDescription, faults: list[Fault]) -> None:
         self.readings: dict[float, dict[str, Any]] = {}
-        self.saves, self.has_defaults = saves, False
-        faults = [*faults, Fault("board.reset", None, RESET_S)] if saves else faults
         names = [name for name, device in robot.device.items() if device.on and device.READING is not None]
 
         def step(robot: Robot) -> None:
@@ -105,22 +104,24 @@ class _Run(Onlooker):
         self.result: RunResult = execute(request, onlooker=self)
 
     def begin(self, robots: Sequence[Hands], results: Sequence[Run]) -> None:
-        """See `Onlooker`."""
-        link = robots[0].driver.link
-        assert link is not None
-        self._link = link
-        if self.saves:
-            link.parameters.save()
+        """The board saves its parameters where it is going to read them."""
+        assert robots[0].driver.link is not None
+        self._link = robots[0].driver.link
+        if RESET in robots[0].task.faults:
+            self._link.parameters.save()
 
     def look(self, time_s: float, *, is_over: bool = False) -> None:
         """See `Onlooker`."""
-        if self.saves and (hello := self._link.session.hello) is not None:
-            self.has_defaults = not hello.parameters_saved
+        self.hello = self._link.session.hello or self.hello
 
     def figures(self) -> dict[str, Any]:
         """Those that may show a fault, by who has them."""
         table, board = self.result.table(), self.result.link["board"]
-        return {who: table[name] for name, who in FIGURES.items()} | {who: board[name] for name, who in BOARD.items()}
+        return {
+            **{who: table[name] for name, who in FIGURES.items()},
+            **{who: board[name] for name, who in BOARD.items()},
+            "board: checksum at its next start": self.hello is not None and not self.hello.parameters_saved,
+        }
 
     def signs(self) -> list[float]:
         """Times at which the record shows that something is not as it should be: telemetry that is missing, events of
@@ -151,21 +152,19 @@ def noticed(robot: RobotDescription, names: Iterable[str]) -> Iterator[Noticed]:
     """Of each fault of those names what came of it, with its usual value."""
     plain = _Run(robot, [])
     for name in names:
-        saves = name == "eeprom.corrupted"
-        yield _noticed(robot, name, _Run(robot, [], saves=True) if saves else plain, saves=saves)
+        beside = [RESET] if name == "eeprom.corrupted" else []
+        yield _noticed(robot, name, _Run(robot, beside) if beside else plain, beside)
 
 
-def _noticed(robot: RobotDescription, name: str, plain: _Run, *, saves: bool) -> Noticed:
+def _noticed(robot: RobotDescription, name: str, plain: _Run, beside: list[Fault]) -> Noticed:
     kind, owners = known(robot)[name]
-    run = _Run(robot, [Fault(name, None, BEGIN_S, END_S if kind.lasts else None)], saves=saves)
+    run = _Run(robot, [Fault(name, None, BEGIN_S, None if kind.when == "once" else END_S), *beside])
     figures, signs = plain.figures(), set(plain.signs())
     by = [who for who, value in run.figures().items() if (value or 0) > (figures[who] or 0)]
     within = {at_s: read for at_s, read in run.readings.items() if BEGIN_S <= at_s < END_S and at_s in plain.readings}
     sensors = [one for one in owners if one in next(iter(plain.readings.values())) and one != "battery"]
     if any(not _is_valid(read[one]) for read in within.values() for one in sensors):
         by.append("board: not valid")
-    if run.has_defaults > plain.has_defaults:
-        by.append("board: checksum of its memory, at the next start")
     if run.result.error is not None and not isinstance(run.result.error, UnfiredError):
         by.append("host: run ended")
     wrong = [
@@ -177,7 +176,7 @@ def _noticed(robot: RobotDescription, name: str, plain: _Run, *, saves: bool) ->
     verdict, why = (BROKEN if any(wrong) else NOTICED, "") if by else REASONS.get(name, ("", ""))
     return Noticed(
         name,
-        sum(count for fault, count in run.result.faults.items() if fault.startswith(name)),
+        next(iter(run.result.faults.values())),
         verdict,
         (*by, *([why] if why else [])),
         sign_s - BEGIN_S if by and sign_s is not None else None,

@@ -16,9 +16,20 @@ from boebot.link.bad_line import BadLine
 from boebot.link.messages import Status as StatusBits
 from boebot.link.transport import Following
 from boebot.record.monitor import Monitor
+from boebot.record.record import Record
 from boebot.robot import Robot
 from boebot.running.driver import TICK_S, Driver, Status, step_limit
 from boebot.running.tasks import Task
+from boebot.showing import Showing
+
+
+def append_parts(record: Record, showing: Showing, session: BoardSession, time_s: float, tick: int) -> None:
+    """Puts aside what parts at the board of a program show at that time."""
+    values = session.readings()
+    readings = Readings(tick, int(StatusBits.MOTORS_ENABLED), (0.0,) * len(values), values)
+    record.append_readings(time_s, readings, 0.0, 0.0)
+    for name, text in session.texts().items():
+        showing.show(time_s, name, text)
 
 
 class ProgramDriver(Driver):
@@ -72,11 +83,7 @@ class ProgramDriver(Driver):
         self._monitor.wait(self._line.now())
 
     def _put_aside(self, time_s: float, tick: int) -> None:
-        values = self.session.readings()
-        readings = Readings(tick, int(StatusBits.MOTORS_ENABLED), (0.0,) * len(values), values)
-        self.task.record.append_readings(time_s, readings, 0.0, 0.0)
-        for name, text in self.session.texts().items():
-            self.robot.showing.show(time_s, name, text)
+        append_parts(self.task.record, self.robot.showing, self.session, time_s, tick)
 
     def type(self, text: str) -> None:
         """See `boebot.running.driver.Driver`."""
@@ -85,9 +92,8 @@ class ProgramDriver(Driver):
 
     def bad_line(self, seed: int) -> BadLine:
         """See `boebot.running.driver.Driver`."""
-        if not isinstance(self._line, BadLine):
-            self._line = BadLine(self._line, seed)
-        return self._line
+        self._line = line = BadLine.around(self._line, seed)
+        return line
 
     def end(self) -> None:
         """What is still on the line; the program goes on while others do."""

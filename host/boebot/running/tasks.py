@@ -23,7 +23,7 @@ from boebot.record.brain_record import MadeOf
 from boebot.record.interventions import TEXT_MAXIMUM, Fault
 from boebot.record.record import Record
 from boebot.running.driver import check_time_to_live
-from boebot.running.faults import HOST, faults_of
+from boebot.running.faults import AT_A_PORT, read
 
 DEFAULT_PERIOD = 0.05  # s
 PROGRAM_BOARD = "avr"  # the only emulated one that runs any program
@@ -287,15 +287,32 @@ def _check_options(request: Request, programs: int) -> None:
 
 
 def _faults(request: Request, task: Task) -> list[Fault]:
-    """Raises CallError where there is one that the robot, or the board, cannot have."""
-    found = faults_of(request.faults, task.board.robot, task.number, len(request.members), request.seconds)
-    for fault in found:
-        owner = fault.name.partition(".")[0]
-        if task.brain.is_program and (owner == "host" or fault.name == "serial.rate"):
-            has = "no host" if owner == "host" else "the bit rate that it sets"
+    """Those of the run that are of this robot: all that name no other as in "2:NAME@START".
+
+    Raises:
+        CallError: one is none, never begins or comes twice; or the robot, or the board, cannot have it.
+    """
+    found: list[Fault] = []
+    count = len(request.members)
+    for one in request.faults:
+        whose, _, what = ("", "", one) if isinstance(one, Fault) else one.rpartition(":")
+        if whose and whose not in map(str, range(1, count + 1)):
+            raise CallError(f"fault {one!r}: there is no robot {whose} in the run; expected 1 to {count}")
+        if whose not in ("", str(task.number)):
+            continue
+        fault = read(what, task.board.robot)
+        if fault in found:
+            raise CallError(f"fault {fault} is there twice; expected each once")
+        if fault.begin_s >= request.seconds:
+            raise CallError(f"fault {fault} is never: the run ends at {request.seconds:g} s; expected an earlier START")
+        if fault.name == "host.stopped" and (fault.end_s or 0.0) > request.seconds:
+            raise CallError(f"fault {fault} outlasts the run of {request.seconds:g} s; expected an earlier END")
+        if task.brain.is_program and fault.name.startswith(("host.", "serial.rate")):
+            has = "no host" if fault.name.startswith("host.") else "the bit rate that it sets"
             raise CallError(f"fault {fault} is of a brain's link; {task.brain.name} is a program, which has {has}")
-        if is_live(task.on) and (owner not in HOST or fault.name == "serial.rate"):
+        if is_live(task.on) and fault.name not in AT_A_PORT:
             raise CallError(f"fault {fault} is of a simulated robot; {task.on!r} is a port")
+        found.append(fault)
     return found
 
 

@@ -246,7 +246,7 @@ class _PlatformIO:
         heard_s, size = begin_s, 0
         with (
             log.open("wb") as words,
-            _ended(
+            ended(
                 subprocess.Popen(
                     [sys.executable, "-m", "platformio", *arguments],
                     cwd=self.work,
@@ -291,7 +291,7 @@ class _PlatformIO:
 
 
 @contextlib.contextmanager
-def _ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+def ended(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]:
     """Ends it afterwards, with all that it has begun, if it has not: by Ctrl-C first, for then it tidies up."""
     try:
         yield process

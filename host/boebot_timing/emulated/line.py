@@ -63,7 +63,7 @@ class Line:
     # ---- from the board ----------------------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        data, cycles = self.bench.received()
+        data, cycles = self.bench.robot.received()
         if not data:
             return
         *frames, rest = (self._bytes + data).split(b"\0")

@@ -20,6 +20,7 @@ from sim_bridge.bench.bench import Bench
 from sim_bridge.boards import avr
 from sim_bridge.boards.avr import Watch
 from sim_bridge.boards.emulated import avr_image
+from sim_bridge.tests.boards.access import BoardAccess
 
 IMAGE = avr_image("shieldbot")
 SECONDS = 0.4
@@ -190,4 +191,4 @@ def test_a_fault_has_address_function_and_line(tmp_path: Path, fault: str, what:
     board = avr.create(image)
     board.record(Watch(patience=50_000))
     with pytest.raises(BoardError, match=rf"{what}.* at address 0x[0-9A-F]{{4}} in cycle \d+ {place}"):
-        board.access().run(1_000_000)
+        BoardAccess(board).run(1_000_000)

@@ -91,7 +91,7 @@ def around() -> Iterator[Surroundings]:
     )
     board.analog(BATTERY_CHANNEL, BATTERY_V[0])
     board.analog(SHARP_CHANNEL, SHARP_V[0])
-    bench.ahead(RangeFinder(PING, here.stimuli["ping"], ECHOES_US))
+    bench.sources.append(RangeFinder(PING, here.stimuli["ping"], ECHOES_US))
     Receiver(bench, LEDS[0], RECEIVER, here.stimuli["receiver"])
     here.run(SECONDS)
     yield here

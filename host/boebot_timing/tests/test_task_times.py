@@ -13,6 +13,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.link import Link
+from boebot.link.transport import BaudSelectable
 from boebot_hil.rig import CYCLES_PER_US, HOST_NONCE, TICK_S, Rig
 from boebot_timing.board import measure
 from sim_bridge.bench.bench import bare
@@ -201,7 +202,8 @@ def test_on_a_slow_line_telemetry_is_not_left_out_for_the_times_of_tasks() -> No
     for request in ((messages.SetParameter, baud.id, 96), (messages.SaveParameters,)):
         assert host.request(*request, within_s=1.0).status == messages.AnswerStatus.OK
     host.board.reset("external")
-    host.board.line_rate(9600)
+    assert isinstance(host.transport, BaudSelectable)
+    host.transport.set_baud(9600)
     assert host.open_session().telemetry_period == 10
     before = len(host.heard)
     host.listen(10 * ROUND_S)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
@@ -36,11 +37,13 @@ def test_a_robot_that_cannot_fail_is_one_sentence(capsys: pytest.CaptureFixture[
         ("cable.out@0.2", 1, "the board at native fell silent"),
     ],
 )
-def test_exit_codes(capsys: pytest.CaptureFixture[str], fault: str, code: int, said: str) -> None:
-    """An error of the run comes before a fault that did not fire."""
-    unfired = ["--fault", "serial.flipped=1e-9@0.1..0.11"] if code == 1 else []
-    ended, out, err = boebot(capsys, "run", "wander", "--seconds", "0.5", "--fault", fault, *unfired, "--json")
-    assert ended == code and said in err and err.count("\n") == bool(said)
+def test_exit_codes(capsys: pytest.CaptureFixture[str], tmp_path: Path, fault: str, code: int, said: str) -> None:
+    """An error of the run comes before a fault that did not fire; a run that is refused leaves no folder."""
+    others = ["--fault", "serial.flipped=1e-9@0.1..0.11"] if code == 1 else []
+    others += ["--out", str(tmp_path / "out")] if code == 2 else []
+    ended, out, err = boebot(capsys, "run", "wander", "--seconds", "0.5", "--fault", fault, *others, "--json")
+    assert ended == code and not (tmp_path / "out").exists()
+    assert said in err and err.count("\n") == bool(said)
     if code != 2:
         fired = int(re.findall(r" fired (\d+)", json.loads(out)["faults"])[0])
         assert (fired > 0) is (code != 3)

@@ -64,8 +64,13 @@ def test_read(text: str, fault: Fault) -> None:
         ("cable.out=1@3", "cable.out takes no value"),
         ("board.reset=power@3", "'power' is none of external, watchdog"),
         ("board.reset@3..4", "board.reset happens at one time; expected no END"),
-        ("cable.out@3..2", "ends at 2 s; expected a time later than its begin"),
+        ("cable.out@3..2", "ends at 2 s; expected a finite time later than its begin"),
+        ("host.stopped@3..inf", "ends at inf s; expected a finite time"),
+        ("host.stopped@3..1e9", "fault host.stopped@3s..1000000000s outlasts the run of 5 s; expected an earlier END"),
         ("host.stopped@1", "host.stopped@1s never ends; expected an END"),
+        ("serial.delayed=0@1..2", "fault serial.delayed=0@1s..2s changes nothing; expected another value than 0"),
+        ("servo_left.weak=100%@1", "fault servo_left.weak=1@1s changes nothing"),
+        ("cable.out@1..2 cable.out@1s..2s", "fault cable.out@1s..2s is there twice"),
         ("cable.out@-1", "begins at -1 s; expected a time of the run"),
         ("cable.out@9", "is never: the run ends at 5 s"),
         ("3:cable.out@1", "there is no robot 3 in the run"),
@@ -73,7 +78,7 @@ def test_read(text: str, fault: Fault) -> None:
 )
 def test_mistakes_are_one_sentence(text: str, sentence: str) -> None:
     with pytest.raises(CallError) as caught:
-        boebot.run(straight, on="native", seconds=5.0, faults=[text])
+        boebot.run(straight, on="native", seconds=5.0, faults=text.split())
     assert sentence in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -139,7 +144,7 @@ def test_a_reset_is_at_its_time_and_said_by_the_board(cause: str) -> None:
 
 
 def test_a_brown_out_resets_the_board() -> None:
-    result = boebot.run(straight, on="native", seconds=2.0, faults=["board.brown_out=2.5@0.5..0.6"])
+    result = boebot.run(straight, on="native", seconds=2.0, faults=["board.brown_out=0@0.5..0.6"])
     assert result.resets == 1 and result.sessions_lost == 1
     with pytest.raises(UnfiredError, match=r"fault board.brown_out=4.9@0.5s..0.6s did not fire"):
         boebot.run(straight, on="native", seconds=2.0, faults=["board.brown_out=4.9@0.5..0.6"])

@@ -72,18 +72,20 @@ def schedules(draw: st.DrawFn) -> Schedule:
     faults = []
     for name in draw(st.lists(st.sampled_from(sorted(single)), min_size=1, max_size=4, unique=True)):
         kind = single[name]
-        value = ""
+        value, is_harmless = "", False
         if kind.words:
             value = "=" + draw(st.sampled_from(kind.words))
         elif kind.default is not None:
             most = LATE_S if kind.unit == "s" else kind.most
             choices = [kind.default, kind.least, most, min(10 * kind.default, most)]
-            value = f"={draw(st.sampled_from(choices)):g}"
+            number = draw(st.sampled_from(choices))
+            value, is_harmless = f"={number:g}", number == kind.harmless
         begin_ms = draw(st.integers(0, round(1000 * LATEST_S)))
         end = ""
-        if kind.lasts:
+        if kind.when != "once":
             end = f"..{(begin_ms + draw(st.integers(1, round(1000 * LONGEST_S)))) / 1000:g}s"
-        faults.append(f"{name}{value}@{begin_ms / 1000:g}s{end}")
+        if not is_harmless:
+            faults.append(f"{name}{value}@{begin_ms / 1000:g}s{end}")
     return Schedule(robot, draw(st.integers(1, 1000)), tuple(faults))
 
 

@@ -80,6 +80,7 @@ static void *extension(board *self, const char *name) {
   if (!strcmp(name, BOARD_PIN_LEVELS)) return pins_levels(b);
   if (!strcmp(name, BOARD_CHECKS)) return &b->checks;
   if (!strcmp(name, BOARD_OUTSIDE_LOG)) return &b->outside_log;
+  if (!strcmp(name, BOARD_LINE_OFF)) return &b->usart.line_off;
   if (!strcmp(name, BOARD_PROGRAM_COUNTER)) return &b->core.pc;
   if (!strcmp(name, BOARD_FAULT_ADDRESS)) {
     return b->crashed && b->fault_address != NO_ADDRESS ? &b->fault_address : NULL;

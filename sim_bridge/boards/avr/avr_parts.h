@@ -179,8 +179,9 @@ typedef struct {
   uint8_t buffered;
   /* the outside */
   uint32_t line_bit_time; /* in cycles << 16 */
-  bool line_follows;      /* it is the board's own */
-  uint64_t line_free;     /* when the line's last byte ends, cycles << 16 */
+  bool line_follows;      /* it is the board's own, but for line_off */
+  double line_off;
+  uint64_t line_free; /* when the line's last byte ends, cycles << 16 */
   line_queue to_board;
   line_queue from_board;
   uint64_t outside_from;  /* since when the outside looks for a start bit, cycles << 16 */

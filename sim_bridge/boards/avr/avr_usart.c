@@ -187,11 +187,16 @@ static uint8_t read_data(avr_board *b, uint16_t address, uint64_t cycle) {
 
 /* ---- transmitter ---- */
 
+/* Of an outside that follows the board, where a bit takes the board that long. */
+static uint64_t followed(const usart_state *u, uint64_t bit_time) {
+  return (uint64_t)((double)bit_time / (1.0 + u->line_off));
+}
+
 /* By which the outside reads the byte at `outside_start`. */
 static uint64_t outside_bit_time(const usart_state *u) {
   const line_queue *q = &u->from_board;
   for (size_t i = q->first; u->line_follows && i < q->end; i++) {
-    if (u->outside_start < end_of(&q->frames[i])) return q->frames[i].bit_time;
+    if (u->outside_start < end_of(&q->frames[i])) return followed(u, q->frames[i].bit_time);
   }
   return u->line_bit_time;
 }
@@ -402,8 +407,9 @@ size_t usart_receive(avr_board *b, uint8_t *bytes, uint64_t *cycles, size_t capa
 void usart_line_rate(avr_board *b, uint32_t baud) {
   b->usart.line_follows = baud == FOLLOWS;
   if (baud != FOLLOWS && baud < SLOWEST_BAUD) baud = SLOWEST_BAUD;
-  const uint32_t own = b->usart.bit_time < 1u << FRACTION ? b->usart.bit_time << FRACTION : UINT32_MAX;
-  b->usart.line_bit_time = baud == FOLLOWS ? own : (uint32_t)(((uint64_t)BOARD_CLOCK_HZ << FRACTION) / baud);
+  uint64_t own = (uint64_t)b->usart.bit_time << FRACTION;
+  uint64_t bit = baud == FOLLOWS ? followed(&b->usart, own) : ((uint64_t)BOARD_CLOCK_HZ << FRACTION) / baud;
+  b->usart.line_bit_time = bit < UINT32_MAX ? (uint32_t)bit : UINT32_MAX;
   if (baud == FOLLOWS) time_frames(b);
   if (b->usart.outside_start != NEVER) plan_outside(b);
 }

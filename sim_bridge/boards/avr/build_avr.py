@@ -13,7 +13,7 @@ BOARDS = HERE.parent
 COMPILER_FLAGS = ["-std=gnu11", "-fvisibility=hidden", "-O2"]
 
 # What Python may call (what is between their marks).
-HEADERS = ("board.h", "board_access.h", "avr/avr_board.h", "avr/avr_spans.h", "avr/avr_debug.h", "avr/avr_checks.h")
+HEADERS = ("board.h", "avr/avr_board.h", "avr/avr_spans.h", "avr/avr_debug.h", "avr/avr_checks.h")
 
 
 def make_ffi() -> FFI:
@@ -25,7 +25,7 @@ def make_ffi() -> FFI:
     builder.set_source(
         "sim_bridge.boards.avr._avr",
         "\n".join(f'#include "{name}"' for name in HEADERS),
-        sources=[*map(str, sources), str(BOARDS / "board_access.c")],
+        sources=list(map(str, sources)),
         include_dirs=[str(path) for path in (HERE, BOARDS)],
         extra_compile_args=COMPILER_FLAGS,
     )

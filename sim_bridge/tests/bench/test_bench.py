@@ -45,7 +45,7 @@ def test_a_part_in_python_answers_at_its_cycle_however_the_run_is_cut() -> None:
             bench.on_edge(TRIGGER, echo)
             while bench.now < 1_600_000:
                 bench.run(step)
-            data, _ = bench.received()
+            data, _ = bench.robot.received()
             heard.append(data)
             edges.append([tuple(edge) for edge in bench.driven[ECHO] if edge.cycle < 1_600_000])
     assert heard[1].startswith(heard[2][:50]) and heard[0].startswith(heard[2][:50])
@@ -66,8 +66,8 @@ def test_bytes_go_and_come_at_their_cycles() -> None:
     with Bench(programs.image(programs.ECHO)) as bench:
         bench.send(b"ab", at=50_000)
         bench.run(100_000)
-        data, cycles = bench.received()
-        assert data == b"bc" and bench.received() == (b"", [])
+        data, cycles = bench.robot.received()
+        assert data == b"bc" and bench.robot.received() == (b"", [])
         assert all(50_000 + n * BYTE + 1.9 * BYTE < at < 50_000 + n * BYTE + 2.2 * BYTE for n, at in enumerate(cycles))
         streams = bench.streams()
     frames = streams["line_in"].table(LINE_FRAME)
@@ -94,10 +94,10 @@ def test_a_voltage_is_held_at_a_pin(volts: float, reads: int) -> None:
     with Bench(programs.image(programs.VOLTAGE)) as bench:
         bench.pins.analog(0, volts)
         bench.run(100_000)
-        assert bench.received()[0][-1] == reads
+        assert bench.robot.received()[0][-1] == reads
         bench.pins.analog(0, None)
         bench.run(100_000)
-        assert bench.received()[0][-1] == 0
+        assert bench.robot.received()[0][-1] == 0
         with pytest.raises(BoardError, match="the voltage is nan"):
             bench.pins.analog(0, float("nan"))
 
@@ -107,7 +107,7 @@ def test_the_kits_firmware_alone_and_on_a_robot(on: str) -> None:
     for robot in (None, "shieldbot"):
         with Bench(on=on, robot=robot) as bench:
             bench.run(CLOCK_HZ // 5)
-            data, cycles = bench.received()
+            data, cycles = bench.robot.received()
             assert len(data) == len(cycles) > 10 and cycles == sorted(cycles)
             assert bool(bench.robot.parts) == (robot is not None)
             assert ("inputs" in bench.streams()) == (on == "avr" and robot is not None)
@@ -144,6 +144,6 @@ def test_source_of_edges_is_asked_ahead() -> None:
             def queue(self, bench: Bench, until: int) -> None:
                 asked.append((bench.now, until))
 
-        bench.ahead(Notes())
+        bench.sources.append(Notes())
         bench.run(20_000)
         assert asked[0] == (0, 8_512) and len(asked) == 3 and asked[-1][1] == 20_512

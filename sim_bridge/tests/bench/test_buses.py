@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from boebot.errors import CallError
-from sim_bridge.bench.buses import I2cDevice, SpiDevice
+from sim_bridge.bench.buses import SpiDevice
 from sim_bridge.bench.uno import Uno, Wanted, open_uno
 from sim_bridge.tests.boards.avr.avr_program import compiled
+from sim_bridge.tests.parts.test_parts_own_chips import Eeprom
 
 SERIAL = """
 #include <avr/io.h>
@@ -82,28 +83,6 @@ int main(void) {
 }
 """
 )
-
-
-class Eeprom(I2cDevice):
-    address = 0x50
-
-    def __init__(self) -> None:
-        self.cells, self.at, self.first = bytearray(256), 0, True
-
-    def begin(self, reading: bool) -> None:
-        self.first = not reading
-
-    def write(self, byte: int) -> bool:
-        if self.first:
-            self.at, self.first = byte, False
-        else:
-            self.cells[self.at] = byte
-            self.at = (self.at + 1) % 256
-        return True
-
-    def read(self) -> int:
-        self.at = (self.at + 1) % 256
-        return self.cells[self.at - 1]
 
 
 def opened(source: str, folder: Path) -> Uno:

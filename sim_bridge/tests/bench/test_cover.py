@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,7 @@ from sim_bridge.bench.cover import Coverage, instructions, is_conditional
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level
 from sim_bridge.boards.emulated import avr_image
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
 # Each line that has code is named by what becomes of it: hit, or missed.
@@ -97,7 +99,7 @@ def covered(image: Path, *high: int) -> Coverage:
     """Of one run, with those pins high."""
     board = create(image)
     board.cover()
-    access = board.access()
+    access = BoardAccess(board)
     for pin in high:
         access.drive(pin, Level.HIGH)
     access.run(5000)
@@ -145,9 +147,13 @@ def test_lines_and_both_ways_of_each_conditional_jump(own: Path) -> None:
     }
 
 
-def test_over_all_runs_also_those_of_other_processes(own: Path) -> None:
+def test_over_all_runs_also_those_of_other_processes(own: Path, tmp_path: Path) -> None:
+    """The other process has deleted its image."""
     both = covered(own, 9)
-    both.merge(json.loads(json.dumps(covered(own, 8).as_dict())))
+    other = Path(shutil.copy(own, tmp_path / "other.elf"))
+    found = json.dumps(covered(other, 8).as_dict())
+    other.unlink()
+    both.merge(json.loads(found))
     record = read_lcov(both.lcov(own.parent))["own.c"]
     assert record.lines[16] == 1
     assert {(line, taken) for (line, _, _), taken in record.branches.items()} == {
@@ -164,11 +170,12 @@ def test_over_all_runs_also_those_of_other_processes(own: Path) -> None:
     ]
 
 
-def test_files_from_elsewhere_are_left_out_unless_asked_for(own: Path, tmp_path: Path) -> None:
+def test_files_from_elsewhere_are_left_out_and_counted(own: Path, tmp_path: Path) -> None:
     found = covered(own)
     assert found.lcov(tmp_path) == ""
-    assert found.table(tmp_path).splitlines()[1].split() == ["in", "all", "0", "0", "-", "0", "0", "-"]
-    assert [*read_lcov(found.lcov(tmp_path, everything=True))] == [str(own.with_suffix(".c"))]
+    _, sums, outside = found.table(tmp_path).splitlines()
+    assert sums.split() == ["in", "all", "0", "0", "-", "0", "0", "-"]
+    assert outside == f"not counted: 9 lines outside of {tmp_path}, most of them in {own.with_suffix('.c')}"
     assert [*read_lcov(found.lcov(own.parent.parent))] == [f"{own.parent.name}/own.c"]
 
 

@@ -13,9 +13,10 @@ import pytest
 from boebot.errors import AnalysisError, BoardError, CallError
 from boebot.guests import BOUNDS
 from sim_bridge.bench import cycles
-from sim_bridge.bench.cycles import Baseline, Cycles, table_of
+from sim_bridge.bench.cycles import Baseline, Cycles, FunctionCycles, table_of
 from sim_bridge.boards.avr import FUNCTION_IDS, Watch, create
 from sim_bridge.boards.board import Level, ResetCause
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import assemble, compiled
 from sim_bridge.tests.boards.symbols import entry_of
 
@@ -75,14 +76,15 @@ def test_the_shortest_and_the_longest_call_whatever_interrupts_them(tmp_path: Pa
     image = image_of(tmp_path, PROGRAM)
     board = create(image)
     seen = Cycles(board, image, ("work", "outer", "unused"))
-    board.access().run(100_000)
+    BoardAccess(board).run(100_000)
     work, outer = seen["work"], seen["outer"]
     assert (work.shortest, work.longest) == (SHORT, LONG)
     assert outer.shortest == outer.longest == 1 + CALL + SHORT + 1 + CALL + LONG + RETURN
     assert work.calls in (2 * outer.calls, 2 * outer.calls + 1)
     assert work.longest_at - work.shortest_at == SHORT + 1 + CALL  # no interrupt yet
     assert board.handle.op.now(board.handle) > 256 * 20  # but since
-    assert seen.rows() == {"work": [SHORT, LONG], "outer": [outer.longest] * 2}
+    assert [one.calls > 0 for one in seen.seen()] == [True, True, False]
+    assert re.search(r"^unused +0 +- +- +- ", table_of({"test": seen.seen()}), re.MULTILINE)
     with pytest.raises(BoardError, match=r"no call of unused has ended by 0.00625\d s; expected one"):
         seen["unused"]
     with pytest.raises(CallError, match=r"cycles of main are not recorded; expected cycles=\('main',\) in the mark"):
@@ -96,7 +98,7 @@ def test_extremes_are_those_of_all_spans(tmp_path: Path) -> None:
     listed.record(Watch(entries))
     kept.record(Watch(entries, only_extremes=True))
     for board in (listed, kept):
-        access = board.access()
+        access = BoardAccess(board)
         access.run(40_000)
         access.reset(ResetCause.EXTERNAL)
         access.run(40_000)
@@ -114,7 +116,7 @@ def test_a_bound_stands_beside_what_was_seen_where_there_is_one(tmp_path: Path) 
     image = compiled(C_PROGRAM, tmp_path / "own.elf")
     board = create(image)
     seen = Cycles(board, image, ("scale", "wait_for_pin"))
-    access = board.access()
+    access = BoardAccess(board)
     access.run(2_000)
     access.drive(8, Level.HIGH)
     access.run(2_000)
@@ -137,7 +139,7 @@ def test_where_nothing_is_installed_that_bounds_there_are_none(tmp_path: Path, m
     image = image_of(tmp_path, PROGRAM)
     board = create(image)
     seen = Cycles(board, image, ("work",))
-    board.access().run(1000)
+    BoardAccess(board).run(1000)
     assert seen["work"].bound is None and seen["work"].why == "no package is installed that works bounds out"
 
 
@@ -188,8 +190,12 @@ def test_names_as_compilers_change_them(tmp_path: Path) -> None:
     image = image_of(tmp_path, source)
     board = create(image)
     seen = Cycles(board, image, ("pulse", "Servo::write", "scale"))
-    board.access().run(200)
-    assert seen.rows() == {"pulse": [1 + RETURN] * 2, "Servo::write": [RETURN] * 2, "scale": [2 + RETURN] * 2}
+    BoardAccess(board).run(200)
+    assert {each.name: each.longest for each in seen.seen()} == {
+        "pulse": 1 + RETURN,
+        "Servo::write": RETURN,
+        "scale": 2 + RETURN,
+    }
 
 
 def test_a_hex_file_has_no_functions(tmp_path: Path) -> None:
@@ -199,24 +205,31 @@ def test_a_hex_file_has_no_functions(tmp_path: Path) -> None:
         Cycles(create(image), tmp_path / "own.hex", ("work",))
 
 
+def took(**functions: tuple[int, int]) -> list[FunctionCycles]:
+    """Shortest and longest call of some functions, as they were seen, and one that was not called."""
+    found = [FunctionCycles(name, 2, *spans, 0, 0, None, "") for name, spans in functions.items()]
+    return [*found, FunctionCycles("unused", 0, 0, 0, 0, 0, None, "")]
+
+
 def test_a_baseline_names_each_change(tmp_path: Path) -> None:
     path, test = tmp_path / "cycles.json", "test_own.py::test_servo[1700]"
-    written = Baseline(path, new=True)
-    written.put(test, {"work": [7, 11], "outer": [32, 32]})
-    written.put("test_own.py::test_other", {"work": [7, 7]})
+    written = Baseline(path, updates=True)
+    written.put(test, took(work=(7, 11), outer=(32, 32)))
+    written.put("test_own.py::test_other", took(work=(7, 7)))
+    assert written.functions(test) == [] and written.changes(test, took(work=(8, 9))) == []
     written.write()
     assert json.loads(path.read_text(encoding="utf-8"))["cycles"][test] == {"outer": [32, 32], "work": [7, 11]}
     baseline = Baseline(path)
     assert baseline.functions(test) == ["outer", "work"] and baseline.functions("test_new") == []
-    assert baseline.changes(test, {"work": [7, 11], "outer": [32, 32]}) == []
-    assert baseline.changes(test, {"work": [7, 12], "new": [1200, 1200]}) == [
+    assert baseline.changes(test, took(work=(7, 11), outer=(32, 32))) == []
+    assert baseline.changes(test, took(work=(7, 12), new=(1200, 1200))) == [
         f"new took 1,200 cycles, and is not in {path}",
         f"no call of outer has ended; in {path} it took 32 cycles",
         f"work took 7 to 12 cycles; in {path} 7 to 11 cycles",
     ]
-    baseline.put(test, {"work": [7, 12]})
+    baseline.put(test, took(work=(7, 12)))
     baseline.write()
-    assert Baseline(path).changes(test, {"work": [7, 12]}) == []
+    assert Baseline(path).changes(test, took(work=(7, 12))) == []
     assert Baseline(path).functions("test_own.py::test_other") == ["work"]
 
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import google.protobuf.descriptor_pb2  # noqa: F401 (first within a run of pytester it would be there twice)
 import pytest
 
 from boebot.result import RunResult, read_run
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytest_plugins = ["pytester"]
+pytestmark = pytest.mark.unsanitized  # runs of pytest, some of them in processes: their C is that of the other benches
 
 SERVO = """
 /* Pulses of 1500 us every 20 ms on pin 9 (OC1A, fast PWM, data sheet 16.9.3), "ready" at 9600 bit/s; '+' and '-' make
@@ -97,13 +100,39 @@ def test_a_failure_in_a_world_leaves_a_record(users: pytest.Pytester) -> None:
 def test_it(uno):
     uno.run(0.2)
     assert False
+
+@pytest.mark.uno(robot="shieldbot-basic", arena="room")
+def test_firmware(uno):
+    uno.run(0.2)
+    assert False
+""",
+        *("--uno-on=avr", "--uno-on=native"),
+    )
+    result.assert_outcomes(failed=3, skipped=1)
+    kept = [*(users.path / ".uno").iterdir()]
+    assert len(kept) == 3 and "without " not in result.stdout.str()
+    for folder in kept:
+        assert f"again: {(folder / 'again.txt').read_text()}" in result.stdout.str()
+        read = read_run(folder / "run")
+        assert isinstance(read, RunResult) and read.record.count("readings") == 20
+        assert len(read.record.block("truth")) > 15
+        assert read.run_time == pytest.approx(0.2) and read.record.count("pins") > 0
+
+
+def test_what_cannot_be_kept_leaves_the_rest(users: pytest.Pytester) -> None:
+    result = run(
+        users,
+        """
+@pytest.mark.uno(image="own.elf")
+def test_it(uno, monkeypatch):
+    def full(path):
+        raise OSError("no space left on device")
+    uno.save_pins = full
+    assert False
 """,
     )
-    result.assert_outcomes(failed=1)
-    (kept,) = (users.path / ".uno").iterdir()
-    read = read_run(kept / "run")
-    assert isinstance(read, RunResult) and read.record.count("readings") == 20 and len(read.record.block("truth")) > 15
-    assert read.run_time == pytest.approx(0.2) and read.record.count("pins") > 0
+    result.stdout.fnmatch_lines(["kept in .uno/*", "again: pytest *::test_it", "without pins.vcd: no space left *"])
+    assert {file.name for file in users.path.glob(".uno/*/*")} == {"again.txt", "serial.txt"}
 
 
 def test_what_is_measured_is_in_all_reports(users: pytest.Pytester) -> None:
@@ -114,18 +143,37 @@ def test_what_is_measured_is_in_all_reports(users: pytest.Pytester) -> None:
 @pytest.mark.parametrize(("value", "marginal"), [(1700, 2), (1709, 2), (1711, 0)])
 def test_width(uno, value, marginal):
     uno.measure("width", value, "us", low=1690, high=1710, marginal=marginal)
+
+@pytest.fixture
+def late(uno):
+    yield
+    uno.measure("late", 5, "V", high=1)
+
+@pytest.mark.uno(image="own.elf")
+def test_late(late):
+    pass
+
+@pytest.mark.uno(image="own.elf")
+@pytest.mark.parametrize("name", ["", "a\\nb", "a\\0b", 3])
+def test_names(uno, name):
+    with pytest.raises(Exception, match="measure: the name is .*; expected a text of one line"):
+        uno.measure(name, 1)
 """,
         "--junitxml=found.xml",
     )
-    result.assert_outcomes(passed=2, failed=1)
-    result.stdout.fnmatch_lines(["width is 1711 us; expected 1690 to 1710 us", "  marginal  width is 1709 us; *"])
+    result.assert_outcomes(passed=7, failed=1, errors=1)
+    lines = ["uno: late is 5 V; expected <= 1 V", "kept in .uno/*", "again: pytest *::test_late"]
+    lines += ["width is 1711 us; expected 1690 to 1710 us", "  marginal  width is 1709 us; *"]
+    result.stdout.fnmatch_lines(lines)
     measured = json.loads((users.path / ".uno" / "measured.json").read_text())
     verdicts = [row["verdict"] for rows in measured.values() for row in rows]
-    assert verdicts == ["pass", "marginal", "fail"]
+    assert verdicts == ["pass", "marginal", "fail", "fail"]
     properties = ElementTree.parse(users.path / "found.xml").findall(".//property")
     assert [json.loads(one.attrib["value"]) for one in properties] == [
         row for rows in measured.values() for row in rows
     ]
+    users.runpytest_inprocess("-p", "no:randomly", "-k", "test_names").assert_outcomes(passed=4, deselected=4)
+    assert not (users.path / ".uno" / "measured.json").exists()
 
 
 def test_what_a_board_cannot_do_is_skipped_with_its_reason(users: pytest.Pytester) -> None:
@@ -149,12 +197,15 @@ def test_robot(uno):
 
 
 BAD_MARKS = {
-    "": "test_it says nothing of what is tested; expected @pytest.mark.uno(image='own.elf'), or robot=",
+    "": "there is nothing to test; expected image= or robot=, or both",
     "image='no.elf'": "there is no no.elf, neither in * nor in *",
     "image='text.elf'": "*text.elf*",
     "imgae='own.elf'": "*uno(imgae=...): expected one of image, robot, *; did you mean 'image'?",
     "'own.elf'": "*uno('own.elf'): expected a keyword, such as image='own.elf'",
+    "robot=['shieldbot']": "robot=['shieldbot']; expected its name or its .toml file",
     "robot='shieldbotx'": "*shieldbotx*did you mean*",
+    "image='own.elf', faults=3": "*uno(faults=3): expected a text, or several",
+    "image='own.elf', cycles=['']": "*uno(cycles=['']): expected a text, or several",
     "robot='shieldbot', baud=0": "line_rate: the rate is 0; expected *",
 }
 
@@ -163,9 +214,11 @@ def test_a_bad_mark_is_one_sentence(users: pytest.Pytester) -> None:
     users.path.joinpath("text.elf").write_text("no program")
     tests = [f"class Test{i}:\n    @pytest.mark.uno({mark})\n    def test_it(self, uno):\n        pass\n"
              for i, mark in enumerate(BAD_MARKS)]  # fmt: skip
+    tests.append("@pytest.mark.uno(image='own.elf')\ndef test_without():\n    pass\n")
     result = run(users, "\n".join(tests))
-    result.assert_outcomes(errors=len(BAD_MARKS))
-    result.stdout.fnmatch_lines([f"uno: {sentence}" for sentence in BAD_MARKS.values()])
+    result.assert_outcomes(errors=len(BAD_MARKS), failed=1)
+    result.stdout.fnmatch_lines([f"uno: {sentence.replace('[', '[[]')}" for sentence in BAD_MARKS.values()])
+    result.stdout.fnmatch_lines(["uno: test_without has the mark, and no board; expected the fixture: *"])
     assert "Traceback" not in result.stdout.str() and "sim_bridge" not in result.stdout.str()
 
 
@@ -270,14 +323,35 @@ def test_work(uno):
     uno.serial.expect(b".")
     assert uno.symbol("count").value == 42
     assert uno.cycles("work").longest {comparison}
+
+@pytest.mark.uno(image="work.elf", cycles="work")
+def test_fails(uno):
+    uno.serial.expect(b">")
+    uno.serial.send(b"a")
+    uno.serial.expect(b"?")
 """
-    run(users, tests.format(comparison=f"== {WORK_CYCLES}"), "--uno-baseline=update").assert_outcomes(passed=1)
-    saved = json.loads((users.path / "uno-baseline.json").read_text())["cycles"]
+    update = "--uno-baseline=update"
+    result = run(users, tests.format(comparison=f"== {WORK_CYCLES}"), update)
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(["not written: *::test_fails, which failed"])
+    (users.path / "sub").mkdir()
+    file = (users.path / "uno-baseline.json").rename(users.path / "sub" / "old.json")
+    saved = json.loads(file.read_text())["cycles"]
     assert list(saved.values()) == [{"work": [WORK_CYCLES, WORK_CYCLES]}]
     worker(users.path, TURNS + 1)
-    result = run(users, tests.format(comparison="> 0"))
-    result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines([f"work took {WORK_CYCLES + 4} cycles; in *uno-baseline.json {WORK_CYCLES} cycles"])
+    os.chdir(users.path / "sub")
+    (users.path / "pytest.ini").write_text("[pytest]")
+    users.makepyfile("import pytest\n\n" + tests.format(comparison="> 0"))
+    result = users.runpytest_inprocess("-k", "work", "--uno-baseline=old.json", "..")
+    result.assert_outcomes(failed=1, deselected=1)
+    result.stdout.fnmatch_lines([
+        f"work took {WORK_CYCLES + 4} cycles; in *old.json {WORK_CYCLES} cycles",
+        f"again: cd {users.path} && pytest --uno-baseline=sub/old.json *::test_work",
+    ])  # fmt: skip
+    file.rename(users.path / "uno-baseline.json").write_text("{")
+    result = users.runpytest_inprocess(update, "..")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["ERROR: *uno-baseline.json is no baseline of cycles: *; expected a file as an *"])
 
 
 def test_coverage_from_a_process_of_xdist(users: pytest.Pytester) -> None:
@@ -318,9 +392,10 @@ def test_no_ping(uno):
 """,
     )
     result.assert_outcomes(passed=2, errors=2)
+    assert [path.parent.name[:30] for path in users.path.glob(".uno/*/run")] == ["test_a_fault_that_did_not_fire"]
     result.stdout.fnmatch_lines_random([
         "uno: fault whisker_left.stuck=open@0s did not fire*",
-        "uno: fault 'ping.missing@0s': robot 'bare' has no 'ping.missing'*",
+        "uno: fault 'ping.missing@0s': the board is on no robot; expected one in the mark: robot='shieldbot'",
     ])  # fmt: skip
 
 

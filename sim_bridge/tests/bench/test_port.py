@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from boebot.errors import CallError
-from sim_bridge.bench import suite
+from sim_bridge.bench import command
 from sim_bridge.bench import uno as of_uno
 from sim_bridge.tests.bench.test_plugin import SERVO, run
 from sim_bridge.tests.boards.avr.avr_program import compiled
@@ -24,6 +24,9 @@ def test_answers(uno):
     uno.serial.expect(b"ready", within=0.1)  # from when the boot loader has begun the program
     uno.serial.send(b"+")
     uno.serial.expect(b"+", within=0.01)
+    uno.fault(f"serial.doubled=1@{uno.now}..{uno.now + 1}")
+    uno.serial.send(b"-")
+    uno.serial.expect(b"--", within=0.01)
 
 @pytest.mark.uno(image="own.elf", baud=9600, motors=False)
 def test_world(uno):
@@ -68,6 +71,6 @@ def test_several_processes_do_not_open_one_port(pytester: pytest.Pytester) -> No
 
 def test_a_board_without_the_kits_firmware_is_one_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with served(image=compiled(SERVO, tmp_path / "own.elf")) as (port, _), pytest.raises(CallError):
-        suite.run_suite([port], ["-q"])
+        command.run_suite([port], ["-q"])
     sentence = f"the board at {port} does not speak the kit's protocol; expected its firmware: boebot flash --on {port}"
     assert sentence in capfd.readouterr().err

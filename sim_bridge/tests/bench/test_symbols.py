@@ -11,8 +11,8 @@ from boebot.errors import BoardError, CallError
 from boebot.image.data import read_variables
 from sim_bridge.bench.symbols import Symbol
 from sim_bridge.boards.avr import create
-from sim_bridge.boards.board import BoardAccess
 from sim_bridge.boards.emulated import native_board, native_library
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
 SOURCE = """
@@ -36,7 +36,7 @@ class Running:
 
     def __init__(self, folder: Path) -> None:
         self.image = compiled(SOURCE, folder / "own.elf")
-        self.board: BoardAccess = create(self.image).access()
+        self.board = BoardAccess(create(self.image))
         self.board.run(400)
 
     def __getitem__(self, name: str) -> Symbol:
@@ -80,10 +80,12 @@ def test_elements_that_are_not_there(running: Running) -> None:
             running[name][key]
         with pytest.raises(CallError):
             running[name][key] = 1
+    with pytest.raises(CallError, match=r"share: 1e\+300 does not fit; expected a value of type float32"):
+        running["share"].value = 1e300
     with pytest.raises(CallError, match=r"table: 5 does not fit; expected an array \(3,\) of 0 to 255"):
         running["table"].value = 5
 
 
 def test_a_board_without_a_data_space(running: Running) -> None:
     with pytest.raises(BoardError, match="only the emulated ATmega328P"):
-        _ = Symbol(native_board(native_library("shieldbot")).access(), running["count"].variable).value
+        _ = Symbol(BoardAccess(native_board(native_library("shieldbot"))), running["count"].variable).value

@@ -4,8 +4,9 @@ capacitor of a light sensor, an infra-red receiver."""
 from __future__ import annotations
 
 from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US
-from sim_bridge.boards.board import BoardAccess, Level
+from sim_bridge.boards.board import Level
 from sim_bridge.pins import BoardPins
+from sim_bridge.tests.boards.access import BoardAccess
 
 SDA, SCL = 18, 19
 LATER = 16  # cycles from an edge to the answer

@@ -55,7 +55,7 @@ class CircleRig(Rig):
 
     def place(self, x: float, y: float, heading: float = 0.0) -> None:
         """Puts the robot elsewhere."""
-        self.board.place(x, y, heading)
+        self.robot.place(x, y, heading)
 
 
 def robot_of(name: str = "boebot", **changes: dict[str, Any]) -> RobotDescription:

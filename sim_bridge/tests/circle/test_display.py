@@ -16,6 +16,7 @@ from boebot.running.loop import execute
 from boebot.running.tasks import Request
 from boebot.view import tables
 from boebot.view.replay import content
+from sim_bridge.bench.uno import Wanted, open_uno
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
 pytestmark = pytest.mark.unsanitized
@@ -101,6 +102,11 @@ def test_text_of_a_display_is_in_all_that_a_run_leaves(tmp_path: Path) -> None:
     tables.write_run(result, tmp_path / "run.csv")
     *_, last = csv.DictReader((tmp_path / "run.csv").open(encoding="utf-8"))
     assert (last["shown_lcd_1"], last["shown_lcd_2"]) == ("Distance:", "   3 cm °")
+    with open_uno("avr", Wanted(image=tmp_path / "lcd.elf", robot=str(tmp_path / "mine.toml"))) as uno:
+        uno.run(0.2)
+        uno.save_record(tmp_path / "kept")
+    (kept_of_a_test,) = read_run(tmp_path / "kept").robots
+    assert kept_of_a_test.shown.texts["lcd_2"][-1] == "   3 cm °"
 
 
 def test_a_robot_of_the_kits_firmware_has_no_display(tmp_path: Path) -> None:

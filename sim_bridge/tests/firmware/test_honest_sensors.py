@@ -3,7 +3,9 @@ receiver that is stuck."""
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+from collections.abc import Iterator
 
 import msgspec
 import pytest
@@ -161,6 +163,17 @@ def test_a_wheel_that_stands_for_long_counts_its_next_edge(rig: Rig) -> None:
     assert rig.latest().encoder_left - before == 8
 
 
+@contextlib.contextmanager
+def with_two_lines(board_url: str) -> Iterator[Rig]:
+    """A robot whose left encoder has two lines, both low."""
+    with Rig.open(board_url, robot="shieldbot-quad") as rig:
+        rig.start()
+        for pin in (14, 15):
+            rig.board.drive(pin, 0)
+        rig.listen(0.05)
+        yield rig
+
+
 def quadrature(steps: list[int], period: int) -> list[tuple[int, int, int]]:
     """Edges of the left wheel's two lines, A leading B forward; steps of +1 or -1."""
     levels, place, found = [(0, 0), (1, 0), (1, 1), (0, 1)], 0, []
@@ -176,11 +189,7 @@ def quadrature(steps: list[int], period: int) -> list[tuple[int, int, int]]:
 )
 def test_two_lines_that_bounce_count_each_edge_once(board_url: str, steps: list[int]) -> None:
     """Also where the wheel turns back; a wheel that rocks about an edge gives edges of one line faster than the gap."""
-    with Rig.open(board_url, robot="shieldbot-quad") as rig:
-        rig.start()
-        for pin in (14, 15):
-            rig.board.drive(pin, 0)
-        rig.listen(0.05)
+    with with_two_lines(board_url) as rig:
         before = rig.latest().encoder_left
         bouncing(rig, quadrature(steps, 9_500 * CYCLES_PER_US))
         frames = rig.listen(0.1)
@@ -192,11 +201,7 @@ def test_two_lines_that_bounce_count_each_edge_once(board_url: str, steps: list[
 
 def test_a_wheel_that_rocks_within_the_gap_comes_back(board_url: str) -> None:
     """Back over an edge of A within the gap, then on backward: what A did is known when B changes."""
-    with Rig.open(board_url, robot="shieldbot-quad") as rig:
-        rig.start()
-        for pin in (14, 15):
-            rig.board.drive(pin, 0)
-        rig.listen(0.05)
+    with with_two_lines(board_url) as rig:
         before = rig.latest().encoder_left
         start = rig.board.cycle + MS
         for at_ms, pin, level in [(0, 14, 1), (2, 14, 0), (12, 15, 1), (22, 14, 1), (32, 15, 0), (42, 14, 0)]:

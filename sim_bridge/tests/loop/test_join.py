@@ -166,8 +166,8 @@ def test_places_and_numbers_are_for_one() -> None:
     second = add_scripted(sim, pose=(1, 0, 0))
     assert second.robot.number == 3
     with pytest.raises(ArenaError, match="cannot stand at"):
-        second.pins.place(0.1, 0, 0)
-    second.pins.place(1.05, 0, 0)
+        second.robot.place(0.1, 0, 0)
+    second.robot.place(1.05, 0, 0)
     assert first.robot.body().x == 0
 
 

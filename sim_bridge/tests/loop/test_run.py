@@ -314,11 +314,11 @@ def test_square_wave_has_its_edges() -> None:
 
 def test_robot_is_put_only_where_it_fits() -> None:
     robot = scripted(arena_of(square(1, 0, 1)))
-    robot.pins.place(0.3, 0.2, 1.0)
+    robot.robot.place(0.3, 0.2, 1.0)
     assert (robot.robot.body().x, robot.robot.body().y, robot.robot.body().heading) == (0.3, 0.2, 1.0)
     for x in (0.45, 1.0):
         with pytest.raises(ArenaError, match="a robot cannot stand at"):
-            robot.pins.place(x, 0, 0)
+            robot.robot.place(x, 0, 0)
     with pytest.raises(ArenaError, match="cannot start"):
         scripted(arena_of(square(1, 0, 1)), pose=(1.0, 0, 0))
 

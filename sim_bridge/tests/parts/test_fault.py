@@ -113,7 +113,7 @@ def test_what_a_stuck_whisker_meets_shows_when_it_is_free_again() -> None:
         fired = robot.robot.fault("whisker_left", "stuck", 0, BEGIN, END) if faulty else int
         for seconds, x in ((0.15, 0.41), (0.15, 0.3), (0.1, 0.3)):
             robot.run(seconds)
-            robot.pins.place(x, 0, 0)
+            robot.robot.place(x, 0, 0)
         return robot.inputs(WHISKER), fired()
 
     edges, fired = run(faulty=True)
@@ -142,7 +142,7 @@ def test_a_bouncing_whisker_bounces_without_noise_too() -> None:
     robot = scripted(arena_of(square(1, 0, 1)), pose=(0.39, 0, 0))
     fired = robot.robot.fault("whisker_left", "bouncing", 0.05, 0, NEVER)
     for x in 5 * (0.41, 0.3):
-        robot.pins.place(x, 0, 0)
+        robot.robot.place(x, 0, 0)
         robot.run(0.3)
     edges = np.array(robot.inputs(WHISKER)[1:])
     touches = 1 + np.flatnonzero(np.diff(edges[:, 0]) > 250 * MS)

@@ -246,11 +246,11 @@ def test_whisker_grounds_its_pin_while_it_touches() -> None:
     robot = scripted(arena, pose=(0.39, 0, 0))
     robot.run(0.1)
     assert [level for _, level in robot.inputs(5)] == [1]
-    robot.pins.place(0.41, 0, 0)
+    robot.robot.place(0.41, 0, 0)
     robot.run(0.1)
     assert [level for _, level in robot.inputs(5)] == [1, 0]
     assert [level for _, level in robot.inputs(7)] == [1, 0]
-    robot.pins.place(0, 0, 0)
+    robot.robot.place(0, 0, 0)
     robot.run(0.1)
     assert [level for _, level in robot.inputs(5)] == [1, 0, 1]
 
@@ -460,11 +460,6 @@ def test_answers_can_be_given_in_the_worlds_place() -> None:
     robot.edge(1 * MS + 5 * US, PING, 2)
     robot.run(0.03)
     assert echo_us(robot.inputs(PING)) == 1234.5
-    robot.pins.answer_ping(None)
-    robot.edge(31 * MS, PING, 1)
-    robot.edge(31 * MS + 5 * US, PING, 2)
-    robot.run(0.03)
-    assert len(robot.inputs(PING)) == 3
 
 
 # ---- battery ---------------------------------------------------------------------------------------------

@@ -149,7 +149,7 @@ def test_a_single_measurement_takes_6_ms_and_then_it_rests() -> None:
     assert 6 * MS <= master.at - asked < 6.3 * MS
     assert master.read(2, 1) == [0x03]
     x = master.field()
-    master.robot.pins.place(0, 0, 2.0)
+    master.robot.robot.place(0, 0, 2.0)
     master.wait(0.3)
     assert master.field() == x
 
@@ -174,7 +174,7 @@ def test_continuous_mode_has_the_rate_that_was_set(setting: int, hertz: float) -
     heading = 0.0
     while len(times) < (12 if hertz > 50 else 4):
         heading += 0.1
-        master.robot.pins.place(0, 0, heading % 6.0)
+        master.robot.robot.place(0, 0, heading % 6.0)
         master.wait(max(period / 20, 0.001))
         field = master.field()
         if field != last and last is not None:
@@ -213,7 +213,7 @@ def test_half_read_data_are_locked() -> None:
     assert master.read(9, 1)[0] & 2 == 0
     first = master.read(3, 2)
     assert master.read(9, 1)[0] & 2
-    master.robot.pins.place(0, 0, 1.5)
+    master.robot.robot.place(0, 0, 1.5)
     master.wait(0.1)
     assert master.read(3, 6)[:2] == first
     assert master.read(9, 1)[0] & 2 == 0

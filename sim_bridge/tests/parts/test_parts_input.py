@@ -12,7 +12,7 @@ import pytest
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.devices.device import Device
 from boebot.devices.input import Button, Potentiometer, SlideSwitch
-from boebot.errors import BoardError
+from boebot.errors import BoebotError
 from sim_bridge.tests.simulated import MS, US, scripted, scripts
 
 LOW, HIGH, RELEASED = range(3)
@@ -41,9 +41,13 @@ def test_a_contact_joins_its_pin_to_one_end_and_else_leaves_it_or_pulls_it_the_o
     for pin in (2, 3):
         times = [cycle for cycle, _ in robot.inputs(pin)]
         assert times[0] == 0 and times[1:] == pytest.approx([100 * MS, 300 * MS], abs=5 * US)
-    for wrong in (0.5, 2, -1, float("nan")):
-        with pytest.raises(BoardError, match=r"device 'start' of robot 'shieldbot' cannot be set to"):
-            robot.robot.set_part("start", wrong)
+    for name, wrong, words in (
+        *(("start", wrong, "start cannot be set to .*; expected 0 or 1") for wrong in (0.5, 2, -1)),
+        ("mode", float("nan"), "mode is set: the value is nan"),
+        ("stat", 1, "stat of robot 'shieldbot' is no button, switch or knob; .*did you mean 'start'"),
+    ):
+        with pytest.raises(BoebotError, match=words):
+            robot.robot.set_part(name, wrong)
 
 
 def test_contacts_bounce_for_milliseconds_and_each_in_its_own_way() -> None:

@@ -13,6 +13,7 @@ from boebot.image.data import read_variables
 from sim_bridge.bench.bench import Bench
 from sim_bridge.bench.buses import I2c, I2cDevice, Spi, SpiDevice
 from sim_bridge.bench.symbols import Symbol
+from sim_bridge.bench.uno import Wanted, open_uno
 from sim_bridge.bench.waiting import Cannot
 from sim_bridge.tests.boards.avr.avr_program import compiled
 
@@ -148,7 +149,7 @@ def value(bench: Bench, folder: Path, name: str) -> object:
 @pytest.mark.parametrize("rate", [72, 12])  # 100 and 400 kHz
 def test_a_chip_on_the_two_wire_bus(tmp_path: Path, rate: int) -> None:
     with bench_of(tmp_path, TWO_WIRE, f"-DRATE={rate}") as bench:
-        bus, eeprom = I2c(bench), Eeprom()
+        bus, eeprom = I2c(bench.robot), Eeprom()
         bus.add(eeprom)
         bus.add(Deaf())
         bench.run_until(100_000)
@@ -163,7 +164,7 @@ def test_a_chip_on_spi(tmp_path: Path, mode: int, rate: int) -> None:
     with bench_of(tmp_path, SPI, f"-DMODE={mode}", f"-DRATE={rate}") as bench:
         chip, other = Converter(mode), Converter(mode)
         other.select = 9  # stays high
-        bus = Spi(bench)
+        bus = Spi(bench.robot)
         bus.add(other)
         bus.add(chip)
         bench.run_until(20_000)
@@ -175,7 +176,7 @@ def test_a_chip_on_spi(tmp_path: Path, mode: int, rate: int) -> None:
 def test_a_program_that_moves_the_pins_of_spi_itself(tmp_path: Path) -> None:
     with bench_of(tmp_path, BY_HAND) as bench:
         chip = Converter()
-        Spi(bench).add(chip)
+        Spi(bench.robot).add(chip)
         bench.run_until(20_000)
         assert chip.got == [0xA1, 0xA2, 0xA3]
         assert value(bench, tmp_path, "got") == [0x5A, 0xA1 ^ 0xFF, 0xA2 ^ 0xFF]
@@ -191,19 +192,19 @@ def test_what_a_chip_raises_comes_out_of_the_run(tmp_path: Path) -> None:
             return 256
 
     with bench_of(tmp_path, TWO_WIRE, "-DRATE=72") as bench:
-        I2c(bench).add(Broken())
+        I2c(bench.robot).add(Broken())
         with pytest.raises(ZeroDivisionError):
             bench.run_until(100_000)
         assert bench.now < 20_000
     with bench_of(tmp_path, SPI, "-DMODE=0", "-DRATE=0") as bench:
-        Spi(bench).add(Large())
+        Spi(bench.robot).add(Large())
         with pytest.raises(CallError, match="what Large sends is 256; expected a whole number from 0 to 255"):
             bench.run_until(20_000)
 
 
 def test_chips_that_cannot_be_there(tmp_path: Path) -> None:
     with bench_of(tmp_path, TWO_WIRE, "-DRATE=72") as bench:
-        bus = I2c(bench)
+        bus = I2c(bench.robot)
         with pytest.raises(CallError, match="the address of I2cDevice is None; expected a whole number from 8 to 119"):
             bus.add(I2cDevice())
         bus.add(Eeprom())
@@ -212,9 +213,9 @@ def test_chips_that_cannot_be_there(tmp_path: Path) -> None:
         nowhere = Converter()
         nowhere.select = 20
         with pytest.raises(CallError, match="select of Converter: there is no pin 20"):
-            Spi(bench).add(nowhere)
+            Spi(bench.robot).add(nowhere)
         with pytest.raises(CallError, match="the mode of Converter is 4; expected a whole number from 0 to 3"):
-            Spi(bench).add(Converter(4))
+            Spi(bench.robot).add(Converter(4))
 
 
 def test_boards_whose_bus_is_another_ones() -> None:
@@ -222,9 +223,9 @@ def test_boards_whose_bus_is_another_ones() -> None:
         Bench(robot="boebot") as bench,
         pytest.raises(BoardError, match=r"a chip at pins A4, A5 cannot be joined .*: another device"),
     ):
-        I2c(bench).add(Eeprom())
+        I2c(bench.robot).add(Eeprom())
     with (
-        Bench(on="native", robot="shieldbot") as bench,
-        pytest.raises(Cannot, match="emulated native board has no two-wire bus"),
+        open_uno("native", Wanted(robot="shieldbot")) as uno,
+        pytest.raises(Cannot, match="the native board shows no I2C bus"),
     ):
-        I2c(bench)
+        uno.i2c.add(Eeprom())

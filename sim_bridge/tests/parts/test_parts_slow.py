@@ -139,7 +139,7 @@ def test_a_new_value_every_38_ms_at_any_time_of_asking_and_7_6_ms_late() -> None
     robot = sharp_before(0.8)
     robot.run(0.05)
     before = scripts.script_board_volts(robot.script, 2)
-    robot.pins.place(0.4, 0, 0)
+    robot.robot.place(0.4, 0, 0)
     seen = []
     for _ in range(60):
         robot.run(0.001)
@@ -148,7 +148,7 @@ def test_a_new_value_every_38_ms_at_any_time_of_asking_and_7_6_ms_late() -> None
     assert change == pytest.approx(2 * 0.0383 + 0.0076, abs=0.0011)
     silent = sharp_before(0.8)  # nobody asks until the end
     silent.run(0.05)
-    silent.pins.place(0.4, 0, 0)
+    silent.robot.place(0.4, 0, 0)
     silent.run(0.06)
     assert scripts.script_board_volts(silent.script, 2) == seen[-1][1]
 

@@ -147,11 +147,11 @@ def test_a_robot_at_the_charger_takes_charge() -> None:
     """The board's 0.08 A empty a pack of 10 A s by 1.6 A s in 20 s; 0.5 A from the charger fill it again."""
     away, at = charged(0.0), charged(1.1)
     for robot in (away, at):
-        robot.pins.place(0.0, 0.0, 0.0)
+        robot.robot.place(0.0, 0.0, 0.0)
         robot.run(20.0)
     assert away.robot.pack_voltage == pytest.approx(at.robot.pack_voltage)
-    at.pins.place(1.1, 0.0, 0.0)
-    away.pins.place(0.7, 0.0, 0.0)
+    at.robot.place(1.1, 0.0, 0.0)
+    away.robot.place(0.7, 0.0, 0.0)
     for robot in (away, at):
         robot.run(2.0)
     assert at.robot.pack_voltage > away.robot.pack_voltage + 0.1
@@ -167,7 +167,7 @@ def described(text: str, folder: Path, x: float) -> SimRobot:
     lib.arena_set_charger(arena.handle, 1.0, 0.0, 0.2)
     lib.arena_build(arena.handle)
     robot = Sim(arena, noise=False).add(native_board(native_library("shieldbot")), description)
-    BoardPins(robot).place(x, 0.0, 0.0)
+    robot.place(x, 0.0, 0.0)
     return robot
 
 

@@ -118,11 +118,11 @@ def test_a_start_on_a_robot_or_on_an_obstacle_on_its_way_is_refused() -> None:
     sim.run(5 * CLOCK_HZ)
     for x, free in ((0.141, True), (0.0, False), (1.34, False), (1.2, True), (1.7, True)):
         if free:
-            second.pins.place(x, 0.0, 0.0)
+            second.robot.place(x, 0.0, 0.0)
         else:
             with pytest.raises(ArenaError, match="cannot stand at"):
-                second.pins.place(x, 0.0, 0.0)
-    first.pins.place(0.0, 0.0, 1.0)  # a robot is not in its own way
+                second.robot.place(x, 0.0, 0.0)
+    first.robot.place(0.0, 0.0, 1.0)  # a robot is not in its own way
 
 
 def firmware_run(order: tuple[int, ...]) -> tuple[int, list[bytes]]:

@@ -119,7 +119,7 @@ def test_a_robot_with_a_board_is_pinched_and_taken_away(disc: bool) -> None:
     robot = add_scripted(sim)
     add_scripted(sim, pose=(0.0, 3.0, 0.0))
     seen = list(run(sim, PINCHED_S))
-    robot.pins.place(0.0, 1.0, 0.0)
+    robot.robot.place(0.0, 1.0, 0.0)
     seen += run(sim, FREE_S)
     check(happened(robot.robot), arena, seen)
 

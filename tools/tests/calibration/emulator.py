@@ -9,6 +9,7 @@ from pathlib import Path
 from boebot.errors import BoardError
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.tests.boards.access import BoardAccess
 from tools.tests.calibration.program import image
 from tools.tests.calibration.talk import START, Talk, at_pin
 
@@ -35,7 +36,7 @@ def measure() -> Measured:
         elf = Path(folder, "calibration.elf")
         elf.write_bytes(image())
         avr = create(elf)
-    board = avr.access()
+    board = BoardAccess(avr)
     talk = Talk()
     byte_cycles: list[int] = []
     edge_cycles: list[int] = []

@@ -14,6 +14,7 @@ from typing import Any, Self
 from boebot.link import messages
 from boebot.link.frame import NO_SESSION, SEED, Decoder, encode
 from sim_bridge.boards import avr
+from sim_bridge.tests.boards.access import BoardAccess
 from tools.tests.error_rates.library import ROOT, ffi, library, new
 from tools.tests.error_rates.streams import FAULTS, Tally, seed_of
 
@@ -31,7 +32,7 @@ class Image:
 
     def __init__(self, pin_map: str = "shieldbot") -> None:
         self._board = avr.create(ROOT / "build" / "images" / f"{pin_map}.elf")
-        self._access = self._board.access()
+        self._access = BoardAccess(self._board, logs=False)
         self._receiver, self._twin = Decoder(), Decoder(NO_SESSION, to_board=True)
         for decoder in (self._receiver, self._twin):
             decoder.feed(b"\0")

@@ -10,7 +10,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from sim_bridge.boards.avr import AvrBoard, create
-from sim_bridge.boards.board import BoardAccess, Edge
+from sim_bridge.boards.board import Edge
+from sim_bridge.tests.boards.access import BoardAccess
 
 PREAMBLE = """
 #define __SFR_OFFSET 0
@@ -42,8 +43,7 @@ def compiled(source: str, image: Path, *options: str) -> Path:
 
 
 class Machine:
-    """A board that runs a program: `avr` owns it, `board` has its operations. No bench (sim_bridge/bench), whose world
-    lets time pass in steps: tests cut its runs anywhere, to prove that this changes nothing."""
+    """A board that runs a program: `avr` owns it, `board` has its operations."""
 
     def __init__(self, source: str) -> None:
         """Powers on a board with the program in flash."""
@@ -51,7 +51,7 @@ class Machine:
             image = Path(folder, "program.elf")
             image.write_bytes(assemble(source))
             self.avr: AvrBoard = create(image)
-        self.board: BoardAccess = self.avr.access()
+        self.board = BoardAccess(self.avr)
 
 
 def edges_of(log: Iterable[Edge], pin: int) -> list[int]:

@@ -11,7 +11,8 @@ import pytest
 
 from boebot.errors import BoardError
 from sim_bridge.boards.avr import Watch, create
-from sim_bridge.boards.board import Edge, Level, ResetCause, SentByte
+from sim_bridge.boards.board import Edge, Level, ResetCause
+from sim_bridge.tests.boards.access import BoardAccess, SentByte
 from sim_bridge.tests.boards.avr.avr_program import Machine, assemble, edges_of, gaps
 from sim_bridge.tests.boards.symbols import entry_of
 
@@ -99,7 +100,7 @@ def test_random_programs_stay_in_their_box(tmp_path: Path) -> None:
         program = random.Random(seed).randbytes(size)
         image.write_bytes(frame[:start] + program + frame[start + size :])
         machine = create(image)
-        board = machine.access()
+        board = BoardAccess(machine)
         board.send(range(100), at=100)
         for pin in range(20):
             board.drive(pin, Level.HIGH, at=100 * pin)

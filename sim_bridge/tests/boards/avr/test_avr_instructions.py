@@ -9,6 +9,7 @@ import pytest
 from boebot.errors import BoardError
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import Level, ResetCause
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import Machine, assemble, edges_of, gaps
 from sim_bridge.tests.boards.symbols import entry_of
 
@@ -170,7 +171,7 @@ def test_running_straight_off_the_image_is_a_crash_of_its_last_instruction(tmp_p
     image.write_bytes(whole.replace(ending, b"\xf8\x94\x00\x00"))
     last = entry_of(whole, "__stop_program")
     with pytest.raises(BoardError, match=f"ends at 0x{last + 2:04X} at address 0x{last:04X} "):
-        create(image).access().run(1000)
+        BoardAccess(create(image)).run(1000)
 
 
 def test_memory_at_power_on_is_not_zero_and_always_the_same() -> None:

@@ -17,8 +17,8 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoardError
 from boebot.image.program import elf_program
 from sim_bridge.boards.avr import AvrBoard, create
-from sim_bridge.boards.board import BoardAccess
 from sim_bridge.sessions.world import AVR, open_on
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import PREAMBLE, Machine, assemble, gaps
 from sim_bridge.tests.boards.symbols import entry_of
 
@@ -105,7 +105,7 @@ def written(writes: list[tuple[int, int]], *, reads: bool = True) -> BoardAccess
     program = b"".join(word.to_bytes(2, "little") for word in code)
     assert len(program) <= ROOM
     before, behind = frame()
-    board = AvrBoard(elf_program(Path("program.elf"), before + program.ljust(ROOM, b"\0") + behind)).access()
+    board = BoardAccess(AvrBoard(elf_program(Path("program.elf"), before + program.ljust(ROOM, b"\0") + behind)))
     board.run(4 * ROOM)
     return board
 
@@ -300,7 +300,7 @@ def test_erased_flash_leads_into_the_boot_section(tmp_path: Path) -> None:
     options = ["-nostartfiles", "-Wl,-e,main", "-Wl,--section-start=.text=0x7C00"]
     subprocess.run(["avr-gcc", "-mmcu=atmega328p", *options, "-o", str(image), str(source)], check=True)
     machine = create(image)
-    board = machine.access()
+    board = BoardAccess(machine)
     before = board.read_memory(2, 1)[0]
     rounds, words = 5, 0x7C00 // 2
     board.run(rounds * (words + 1 + 3) + 1)  # a cycle for each word, INC, JMP

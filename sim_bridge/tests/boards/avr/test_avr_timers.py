@@ -598,7 +598,8 @@ def test_edges_of_the_clock_pin_are_counted(timer: int, pin: int, clock: int) ->
         while not (log := board.log()):
             board.run(1)
         access = log[0].cycle + 100 + 1
-        board.wave(pin, half=5, first=log[0].cycle + 10, count=10, level=active)
+        for edge in range(10):
+            board.drive(pin, rests if edge % 2 else active, at=log[0].cycle + 10 + 5 * edge)
         board.drive(pin, active, at=access - INPUT_LATENCY + late)
         board.run(300)
         assert board.read_memory(0x200, 1)[0] == expected
@@ -634,7 +635,8 @@ def test_a_timer_that_is_clocked_by_edges_overflows_and_matches() -> None:
         """
     )
     machine.board.drive(4, Level.LOW)
-    machine.board.wave(4, half=50, first=1000, count=60, level=Level.HIGH)  # 30 rising edges
+    for edge in range(60):  # 30 rising ones
+        machine.board.drive(4, Level.LOW if edge % 2 else Level.HIGH, at=1000 + 50 * edge)
     machine.board.run(6000)
     toggles = [cycle for cycle in edges_of(machine.board.log(), 6) if cycle >= 1000]
     assert toggles == [1000 + 100 * (5 * lap + 4) + INPUT_LATENCY for lap in range(6)]

@@ -11,7 +11,8 @@ from boebot.errors import BoardError
 from boebot.image.program import read_program
 from boebot_hil.rig import CYCLES_PER_S
 from sim_bridge.boards import avr
-from sim_bridge.boards.board import BoardAccess, Level, ResetCause
+from sim_bridge.boards.board import Level, ResetCause
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import assemble
 from sim_bridge.tests.boards.avr.bootloader import BEGIN, KITS, optiboot
 
@@ -28,7 +29,7 @@ LOADERS: dict[str, Callable[[Path], Path]] = {"the kit's": lambda _: KITS, "Opti
 
 def board_with(loader: Path) -> BoardAccess:
     """A board that was reset from outside, with nothing in flash but the boot loader; the outside at its rate."""
-    board = avr.create(None, loader).access()
+    board = BoardAccess(avr.create(None, loader))
     board.run(1000)
     board.reset(ResetCause.EXTERNAL)
     board.line_rate(115_200)
@@ -101,7 +102,7 @@ def test_only_an_external_reset_waits_for_a_program(
 ) -> None:
     image = tmp_path / "program.elf"
     image.write_bytes(assemble("main: sbi DDRD, 2\n sbi PORTD, 2\n1: rjmp 1b"))
-    board = avr.create(image, LOADERS[name](tmp_path)).access()
+    board = BoardAccess(avr.create(image, LOADERS[name](tmp_path)))
     board.run(CYCLES_PER_S // 100)
     board.reset(cause)
     board.run(100)

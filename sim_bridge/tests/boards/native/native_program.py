@@ -7,8 +7,8 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from sim_bridge.boards.board import BoardAccess
 from sim_bridge.boards.emulated import native_board
+from sim_bridge.tests.boards.access import BoardAccess
 
 # The tests may lie in a copy of the package below the checkout.
 FIRMWARE = next(
@@ -56,4 +56,4 @@ def native_program(source: str) -> BoardAccess:
     with tempfile.NamedTemporaryFile(suffix=".so") as library:
         library.write(compiled(source))
         library.flush()
-        return native_board(Path(library.name)).access()
+        return BoardAccess(native_board(Path(library.name)))

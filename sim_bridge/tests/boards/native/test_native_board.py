@@ -13,8 +13,9 @@ from boebot.errors import BoardError
 from boebot.link import frame, messages
 from boebot_hil.rig import CYCLES_PER_S, Rig
 from sim_bridge import _core
-from sim_bridge.boards.board import BoardAccess, Edge, Level, ResetCause, SentByte
+from sim_bridge.boards.board import Edge, Level, ResetCause
 from sim_bridge.boards.emulated import native_board, native_library
+from sim_bridge.tests.boards.access import BoardAccess, SentByte
 
 MS = 16_000  # cycles
 TICK = 10 * MS
@@ -31,7 +32,7 @@ def make() -> Iterator[Maker]:
 
     def one() -> BoardAccess:
         board = native_board(native_library("shieldbot"))
-        access = board.access()
+        access = BoardAccess(board)
         opened.append((access, board))
         return access
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from boebot.errors import BoardError
-from sim_bridge.boards.board import BoardAccess, Damage, ResetCause
+from sim_bridge.boards.board import Damage, ResetCause
+from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.native.native_program import native_program
 
 MS = 16_000  # cycles
