@@ -1,7 +1,7 @@
 # boebot: `make run` shows the whole circle, `make test` proves it, `make help` lists the rest.
 #
-# Everything is set up on the way: system packages (Debian, Ubuntu), a virtual environment under build/venv, simavr's
-# sources, the firmware images, the compiled parts. Files named .done-* below build/ say what is finished; the second
+# Everything is set up on the way: system packages (Debian, Ubuntu), a virtual environment under build/venv, the
+# firmware images, the compiled parts. Files named .done-* below build/ say what is finished; the second
 # time nothing is done again.
 
 JOBS := $(shell nproc 2>/dev/null || echo 2)
