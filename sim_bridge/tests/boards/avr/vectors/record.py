@@ -1,7 +1,7 @@
 """Records what simavr does (README.md): `python record.py [--check] [--sources FOLDER]`.
 
-simavr is Debian's package libsimavr-dev, or with --sources a folder of its sources that holds `sim` and `cores`.
-Without --check the result is written to results.xz.
+simavr is Debian's packages libsimavr-dev and libelf-dev, or with --sources a folder of its sources that holds `sim` and
+`cores`. Without --check the result is written to results.xz.
 """
 
 from __future__ import annotations
