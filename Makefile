@@ -1,7 +1,7 @@
 # boebot: `make run` shows the whole circle, `make test` proves it, `make help` lists the rest.
 #
-# Everything is set up on the way: system packages (Debian, Ubuntu), a virtual environment under build/venv, simavr's
-# sources, the firmware images, the compiled parts. Files named .done-* below build/ say what is finished; the second
+# Everything is set up on the way: system packages (Debian, Ubuntu), a virtual environment under build/venv, the
+# firmware images, the compiled parts. Files named .done-* below build/ say what is finished; the second
 # time nothing is done again.
 
 JOBS := $(shell nproc 2>/dev/null || echo 2)
@@ -55,9 +55,9 @@ help:
 
 run:
 	@$(SIDE_BY_SIDE) ready-run
-	@$(VENV)/bin/boebot run demo --on avr --robot shieldbot-charging --arena station --seconds 60 --out build/run
+	@$(VENV)/bin/boebot run demo --on avr --seconds 60 --out build/run
 	@echo "Look at build/run/run.png, and open build/run/replay.html in a browser to play the run."
-	@echo "Watch one while it drives:  $(VENV)/bin/boebot run demo --robot shieldbot-charging --arena station --view"
+	@echo "Watch one while it drives:  $(VENV)/bin/boebot run demo --view"
 
 test:
 	@$(SIDE_BY_SIDE) ready-test
@@ -108,12 +108,12 @@ DISTANCE := distance/distance.ino --robot shieldbot --arena room --seconds 17
 pictures:
 	@$(SIDE_BY_SIDE) ready-test
 	@mkdir -p build/pictures
-	@$(VENV)/bin/boebot run demo --on native --robot shieldbot-charging --arena station --seconds 60 --out build/pictures/demo
+	@$(VENV)/bin/boebot run demo --on native --seconds 60 --out build/pictures/demo
 	@cp build/pictures/demo/run.png docs/images/demo.png
 	@sed -n '/^# echoes.py/,/^```$$/{/^```$$/!p}' README.md >build/pictures/echoes.py
 	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot run echoes.py --seconds 120 --out echoes
 	@cp build/pictures/echoes/run.png docs/images/echoes.png
-	@$(VENV)/bin/boebot run explore --robot roller --arena office --seconds 1000 --out build/pictures/explored
+	@$(VENV)/bin/boebot run explore --seconds 1000 --out build/pictures/explored
 	@cp build/pictures/explored/run.png docs/images/explored.png
 	@$(PYTHON_VENV) -m tools.arena_pages --pictures
 	@$(VENV)/bin/boebot show robot shieldbot --out docs/images/robot-shieldbot.svg

@@ -99,15 +99,24 @@ WORLDS = tuple(
         ((0, 0, 64, 1), BRAIN),
     )
 )
+# Of core_fuzzer.c: choices, registers, a program of each kind: counts and branches; calls; loads and stores; interrupts
+# and sleep; self-programming.
+REGISTERS = (1, 2, 3, 4, 50, 20, 0, 0, *range(26), 0, 2, 0, 3, 0, 4)
+COUNTS, CALLS = "010F12270395E1F73196019F120303FD9894F6CF", "03D00E940400FCCF0F930FB70F910895"
+MEMORY = "0D911993238131830090230100926400C8954591"
+INTERRUPTS, PROGRAMMING = "78940EB900936E001D9A1D9B11E013BF8895F8941895", "F1E0E8E0E89532960994FFFFFFFF"
+PROGRAMS = tuple((*REGISTERS, *bytes.fromhex(words)) for words in (COUNTS, CALLS, MEMORY, INTERRUPTS, PROGRAMMING))
 
 HERE = ROOT / "firmware" / "fuzz"
 WORLD = ROOT / "sim_bridge" / "fuzz" / "vehicles_fuzzer.c"
+CORE = ROOT / "sim_bridge" / "boards" / "avr" / "core"
 FUZZERS = {
     "frame-board": Fuzzer("board", (HERE / "frame_fuzzer.c", FRAME)),
     "frame-host": Fuzzer("host", (HERE / "frame_fuzzer.c", FRAME), ("-DFRAME_OF_HOST",)),
     "link": Fuzzer(
         "", (HERE / "link_fuzzer.cpp", TEST / "host_frame.c", *firmware_sources()), (f"-I{TEST}",), 400, LINK
     ),
+    "core": Fuzzer("", (WORLD.with_name("core_fuzzer.c"), *sorted(CORE.glob("*.c"))), (f"-I{CORE}",), 400, PROGRAMS),
     "vehicles": Fuzzer("", (WORLD, *world_sources()), ("-fsanitize=float-cast-overflow",), 200, WORLDS),
 }
 

@@ -17,15 +17,6 @@ has() { command -v "$1"; }
 
 has_browser() { has chromium || has chromium-browser || has google-chrome; }
 
-# cargo 1.82 has `cargo info`, which brings simavr's sources.
-has_cargo() {
-  for cargo in ${CARGO:-} cargo; do
-    minor=$("$cargo" --version 2>/dev/null | sed -n 's/^cargo 1\.\([0-9]*\)\..*/\1/p')
-    [ "${minor:-0}" -ge 82 ] && return 0
-  done
-  return 1
-}
-
 # clang with the libraries of its fuzzer and sanitizers, which Debian keeps in a separate package
 can_fuzz() {
   echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | clang -fsanitize=fuzzer,address,undefined -x c -o /dev/null -
@@ -40,7 +31,6 @@ for purpose in "$@"; do
       need binutils-avr has avr-objcopy
       need avr-libc sh -c 'echo "#include <avr/io.h>" | avr-gcc -mmcu=atmega328p -E -'
       need arduino-core-avr test -e /usr/share/arduino/hardware/arduino/avr/platform.txt
-      need cargo-web has_cargo
       need ca-certificates test -e /etc/ssl/certs/ca-certificates.crt
       ;;
     test)

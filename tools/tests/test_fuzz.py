@@ -47,3 +47,14 @@ def test_fuzzer_of_the_link_finds_a_missing_latch(tmp_path: Path) -> None:
     done = fuzz.run(fuzz.build("link", tmp_path, {source: mutant}), tmp_path, ["-seed=1", "-runs=2000"])
     assert done.returncode != 0
     assert "armed || pulses(bench) == 0" in done.stderr, done.stderr[-2000:]
+
+
+def test_fuzzer_of_the_core_finds_an_instruction_that_is_not_decoded_anew(tmp_path: Path) -> None:
+    source, line = fuzz.CORE / "avr_decode.c", "if (address >= 2u) address -= 2u;"
+    text = source.read_text(encoding="utf-8")
+    assert text.count(line) == 1
+    mutant = tmp_path / "avr_decode.c"
+    mutant.write_text(text.replace(line, ""), encoding="utf-8")
+    done = fuzz.run(fuzz.build("core", tmp_path, {source: mutant}), tmp_path, ["-seed=1", "-runs=20000"])
+    assert done.returncode != 0
+    assert "memcmp(again.code, core->code" in done.stderr, done.stderr[-2000:]

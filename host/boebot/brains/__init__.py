@@ -9,7 +9,8 @@ A brain is a Python file with one of
 
 or a TOML file that composes such processes (boebot.brain.composition). A Python file may also say `PERIOD = 0.1`
 (seconds from step to step) and `NEEDS = ["whiskers", "ping"]` (devices without which it cannot work); a brain of
-processes knows both by itself.
+processes knows both by itself. `ROBOT = "shieldbot-line"` and `ARENA = "office"` name the bundled ones of a run that
+names neither.
 
 Files are read anew for each run and each robot. A Brain object that is handed over is run itself, so that its maker
 can read its `steps` and `switches` afterwards: with each new run it begins afresh, and it drives one robot at a
@@ -68,6 +69,9 @@ class LoadedBrain:
     """What runs `main(robot)` behind `step`, if that is the brain."""
     sources: Mapping[str, bytes] = field(default_factory=dict)
     """Of a program that was built of a sketch: its files by name."""
+    robot: str | None = None
+    """The bundled robot, and `arena` the bundled arena, of a run that names neither."""
+    arena: str | None = None
 
     @property
     def is_program(self) -> bool:
@@ -156,10 +160,11 @@ def load_brain(source: object) -> LoadedBrain:
             from boebot.brain import composition
 
             return _from_object(composition.load(path), as_utf8(path.stem), path)
-        return _from_module(_execute(path), path)
+        source = _execute(path)
     if isinstance(source, ModuleType):
         file = getattr(source, "__file__", None)
-        return _from_module(source, Path(file) if file else None)
+        found = _from_module(source, Path(file) if file else None)
+        return replace(found, robot=_bundled(source, "ROBOT"), arena=_bundled(source, "ARENA"))
     if isinstance(source, type):
         return _from_object(_construct(source, None), source.__name__, None)
     from boebot.brain import Brain, Process
@@ -406,6 +411,14 @@ def _period(owner: object, where: str) -> float | None:
     if isinstance(period, bool) or not isinstance(period, int | float) or not period > 0:
         raise BrainError(f"{where}: PERIOD is {period!r}; expected seconds from step to step")
     return float(period)
+
+
+def _bundled(module: ModuleType, what: str) -> str | None:
+    """The name of the bundled robot or arena that a brain is for."""
+    name = getattr(module, what, None)
+    if name is None or (isinstance(name, str) and not name.endswith(TOML)):
+        return name
+    raise BrainError(f"{module.__name__}: {what} is {name!r}; expected the name of a bundled one")
 
 
 def _needs(owner: object, where: str) -> tuple[str, ...]:

@@ -1,7 +1,6 @@
 """Three behaviors chosen by utility: wander about, avoid near things, charge the battery when it runs low.
 
-It is for `shieldbot-charging` in the arena `station`: `boebot run demo --robot shieldbot-charging --arena station`. The
-weights are chosen; E is the battery's level, low = 1 - E:
+The weights are chosen; E is the battery's level, low = 1 - E:
 
     wander   tanh(0.5), always
     avoid    tanh(-1 + 3 near + 4 contact)
@@ -11,6 +10,8 @@ weights are chosen; E is the battery's level, low = 1 - E:
 from boebot.behaviors import Avoid, ChargeBattery, Wander, Withdraw
 from boebot.brain import Brain, Utility
 from boebot.cognition import BatteryLevel, contact, near
+
+ROBOT, ARENA = "shieldbot-charging", "station"
 
 battery = BatteryLevel(empty=5.0, full=7.8, tau=0.5)
 

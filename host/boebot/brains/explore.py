@@ -1,6 +1,6 @@
 """Explore the office: drive until every place has been seen (chapter 6 of the notes).
 
-    boebot run explore --robot roller --arena office --seconds 1000
+    boebot run explore --seconds 1000
     boebot run explore --robot shieldbot-turret --arena office --seconds 5400
 
 What it finds grows as a tree of nodes; `explore_state` is "done" when none is left, after 550 to 920 s. The turret
@@ -14,6 +14,7 @@ from boebot.brain import Brain, Utility
 from boebot.cognition import Odometry
 from boebot.navigation import Explore, LineMap, Localization
 
+ROBOT, ARENA = "roller", "office"
 START = (-2.5, 0.0, 0.0)  # m, m, rad: where the arena says that robots begin
 
 localization = Localization(

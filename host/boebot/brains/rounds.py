@@ -1,7 +1,7 @@
 """Visit three rooms of the office again and again, and charge when the battery is low (chapters 6 and 8 of the notes).
 
+    boebot run rounds --seconds 900
     boebot run rounds --robot roller-charging --arena office --seconds 400
-    boebot run rounds --robot shieldbot-turret --arena office --seconds 900
 
 Utilities decide, with E the battery's level and low = 1 - E:
 
@@ -19,6 +19,7 @@ from boebot.brain import Brain, Utility
 from boebot.cognition import BatteryLevel, Odometry
 from boebot.navigation import GoTo, LineMap, Localization
 
+ROBOT, ARENA = "shieldbot-turret", "office"
 START = (-2.5, 0.0, 0.0)  # m, m, rad: where the arena says that robots begin
 ROOMS = {"upper left": (-0.7, 1.2), "upper right": (1.2, 1.3), "lower left": (-1.5, -1.2)}  # m
 CHARGER = (2.6, 0.0)  # m

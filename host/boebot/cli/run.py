@@ -19,7 +19,6 @@ from boebot.errors import BoebotError, CallError, MissingTextError
 from boebot.record import run_folder
 from boebot.running.tasks import Member, Request
 
-DEFAULT_ROBOT = "shieldbot"
 SECONDS = 60.0
 TURN = 2 * math.pi + 1e-9  # rad
 _HELP = f"""Let a brain drive a robot, and say what happened.
@@ -67,7 +66,7 @@ def run(
             "--robot",
             metavar="R",
             autocompletion=options.complete_robots,
-            help="Bundled robot or .toml file; again for each further robot.",
+            help="Bundled robot or .toml file; again for each further robot. Else the brain's ROBOT, or shieldbot.",
         ),
     ] = None,
     robots: Annotated[
@@ -190,7 +189,8 @@ def run(
         raise CallError("--seconds and --timeout both say how long the run is; expected one of them")
     if "" in (expect_text, fail_text):
         raise CallError("--expect-text or --fail-text is empty; expected a text")
-    kinds, poses = robot or [DEFAULT_ROBOT], [_pose(text) for text in pose or []]
+    kinds: list[Any] = robot or [None]
+    poses = [_pose(text) for text in pose or []]
     count = _count(robots, len(brain), len(kinds), len(poses))
     assigned = _assigned(parameters or [], count)
     drivers = {one: _built(one, quiet) for one in dict.fromkeys(brain)}

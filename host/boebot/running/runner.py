@@ -20,7 +20,7 @@ __all__ = ["Member", "run", "run_together"]
 
 def run(
     brain: object = "wander",
-    robot: str | Path | RobotDescription = "shieldbot",
+    robot: str | Path | RobotDescription | None = None,
     arena: str | Path | None = None,
     on: str | None = None,
     seconds: float = 60.0,
@@ -53,13 +53,15 @@ def run(
         brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)` or
             `main(robot)`, or object or class with `step(robot)`; or the ELF or HEX file of a program for the Uno, which
             drives the emulated robot by itself: what it prints is printed, each line with its time.
-        robot: bundled name, .toml file, or a description; with a board or without.
+        robot: bundled name, .toml file, or a description; with a board or without. None: the brain's ROBOT, or
+            "shieldbot".
         pose: where it starts: x (m), y (m), heading (rad). None: the arena's start.
         period: s from step to step of the brain. None: the brain's PERIOD, or 0.05.
         without: imperfections of the simulated robot that are switched off, such as ("slip", "bounce");
             docs/reference/imperfections.md names them.
         imperfections: magnitudes of others by name, such as {"servo_lag_s": 0.08}; that page has names and units.
-        arena: bundled name or .toml file. None: the simulator's own choice. Of no meaning on a real robot.
+        arena: bundled name or .toml file. None: the brain's ARENA where no robot is named either, or the simulator's
+            own choice. Of no meaning on a real robot.
         on: what robots with boards run on: "native", "avr", or, for a single one, a port: "/dev/ttyACM0",
             "serial:PORT", "socket://HOST:PORT"; "direct" where no robot has a board. None: native or direct.
         seconds: length of the run by the robots' clocks (s); may be infinite.

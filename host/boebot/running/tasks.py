@@ -25,6 +25,7 @@ from boebot.record.record import Record
 from boebot.running.driver import check_time_to_live
 from boebot.running.faults import AT_A_PORT, read
 
+DEFAULT_ROBOT = "shieldbot"
 DEFAULT_PERIOD = 0.05  # s
 PROGRAM_BOARD = "avr"  # the only emulated one that runs any program
 _OF_ONE = {"pose", "period", "without", "parameters", "imperfections"}
@@ -62,7 +63,8 @@ class Member(_NamesFiles):
     Attributes:
         brain: bundled name ("wander"), Python or TOML file, a `boebot.brain.Brain`, function `step(robot)`, or object
             or class with `step(robot)`.
-        robot: bundled name, .toml file, or a description; with a board or without.
+        robot: bundled name, .toml file, or a description; with a board or without. None: the brain's ROBOT, or
+            "shieldbot".
         pose: where it starts: x (m), y (m), heading (rad). None: the arena's start for the first such robot, then free
             places near it.
         seed: of the brain's chance. None: the run's seed for the first robot, one more for each further one.
@@ -75,7 +77,7 @@ class Member(_NamesFiles):
     """
 
     brain: object = "wander"
-    robot: str | Path | RobotDescription = "shieldbot"
+    robot: str | Path | RobotDescription | None = None
     pose: tuple[float, float, float] | None = None
     seed: int | None = None
     period: float | None = None
@@ -120,7 +122,7 @@ class Request(_NamesFiles):
     def single(
         cls,
         brain: object = "wander",
-        robot: str | Path | RobotDescription = "shieldbot",
+        robot: str | Path | RobotDescription | None = None,
         **others: Any,
     ) -> Request:
         """Of one robot: what a `Member` has but its seed, and `others` of the attributes above."""
@@ -173,7 +175,7 @@ class Request(_NamesFiles):
         """What a record says of it, as values of JSON, so that the run can be repeated (boebot.running.again); `tasks`:
         those of its robots."""
         return {
-            "arena": None if self.arena is None else Path(self.arena).as_posix(),
+            "arena": None if tasks[0].board.arena is None else Path(tasks[0].board.arena).as_posix(),
             "on": self.on,
             "seconds": self.seconds if math.isfinite(self.seconds) else None,
             "seed": self.seed,
@@ -341,6 +343,8 @@ def _task(member: Member, request: Request, number: int) -> Task:
     expect("parameters", member.parameters, 'values by name, as in {"avoid.turn": 0.4}', Mapping, type(None))
     given = member.parameters or {}
     loaded, description, period_s = prepare(member.brain, member.robot, member.period)
+    is_named = request.arena is not None or member.robot is not None or (request.on is not None and is_live(request.on))
+    arena = request.arena if is_named else loaded.arena
     for option, value in (("--period", member.period), ("--set", member.parameters)):
         if value and loaded.is_program:
             raise CallError(f"{option} is of a brain; {loaded.name} is a program, which has none")
@@ -358,7 +362,7 @@ def _task(member: Member, request: Request, number: int) -> Task:
             made_of = None if loaded.brain is None else described(loaded.brain)
     board = BoardRequest(
         robot=description,
-        arena=None if request.arena is None else str(request.arena),
+        arena=None if arena is None else str(arena),
         seed=int(request.seed),
         realtime=request.realtime,
         record=request.record,
@@ -398,22 +402,25 @@ def check_timing(robot: RobotDescription, period_s: float) -> Finding | None:
 
 
 def prepare(
-    brain: object, robot: str | Path | RobotDescription, period: float | None
+    brain: object, robot: str | Path | RobotDescription | None, period: float | None
 ) -> tuple[LoadedBrain, RobotDescription, float]:
     """Brain, robot and the brain's period (s), found and checked to fit each other.
 
     Raises:
         BoebotError: in one sentence.
     """
-    expect("robot", robot, "a name, a .toml file or a description", str, Path, RobotDescription)
+    expect("robot", robot, "a name, a .toml file, a description or None", str, Path, RobotDescription, type(None))
     expect("period", period, "seconds or None", Real, type(None))
-    description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
     loaded = brains.load_program(brain)
-    if loaded is None:
-        description.expect_kit()
-        loaded = brains.load_brain(brain)
-    else:
+    if robot is None:
+        loaded = loaded or brains.load_brain(brain)
+        robot = loaded.robot or DEFAULT_ROBOT
+    description = robot if isinstance(robot, RobotDescription) else load_robot(robot)
+    if loaded is not None and loaded.is_program:
         description = with_board_led(description)
+    else:
+        description.expect_kit()
+        loaded = loaded or brains.load_brain(brain)
     period_s = float(period if period is not None else loaded.period or DEFAULT_PERIOD)
     if description.has_board:
         check_time_to_live(period_s)

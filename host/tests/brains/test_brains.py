@@ -11,6 +11,7 @@ import boebot
 from boebot.brains import bundled, load_brain
 from boebot.errors import BrainError
 from boebot.robot import Robot
+from boebot.running.tasks import Request
 
 
 def write(folder: Path, text: str, name: str = "mine.py") -> Path:
@@ -57,6 +58,22 @@ def test_function_class_and_object_themselves() -> None:
     assert load_brain(drive).name == "drive"
     assert load_brain(Mine).period == 0.02
     assert load_brain(Mine()).name == "Mine"
+
+
+def test_a_brain_may_say_for_which_robot_and_arena_it_is(tmp_path: Path) -> None:
+    brain = write(tmp_path, 'ROBOT, ARENA = "shieldbot-line", "office"\ndef step(robot): robot.stop()\n')
+    for given, robot, arena in (
+        ({}, "shieldbot-line", "office"),
+        ({"robot": "shieldbot"}, "shieldbot", None),
+        ({"arena": "room"}, "shieldbot-line", "room"),
+        ({"on": "/dev/ttyACM0"}, "shieldbot-line", None),
+    ):
+        request = Request.single(brain, **given)
+        tasks = request.tasks()
+        assert (tasks[0].board.robot.name, tasks[0].board.arena) == (robot, arena)
+        assert request.said(tasks)["arena"] == arena, "so that the run can be repeated"
+    with pytest.raises(BrainError, match=r"ROBOT is 'mine\.toml'; expected the name of a bundled one"):
+        load_brain(write(tmp_path, 'ROBOT = "mine.toml"\ndef step(robot): robot.stop()\n'))
 
 
 def test_brain_may_import_a_file_beside_it(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from boebot.result import RunResult
 
 @pytest.fixture(scope="module")
 def result() -> RunResult:
-    return boebot.run("demo", robot="shieldbot-charging", arena="station", on="native", seconds=60)
+    return boebot.run("demo", on="native", seconds=60)
 
 
 @pytest.fixture(scope="module")

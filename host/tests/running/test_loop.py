@@ -88,7 +88,7 @@ def test_time_to_live_outlasts_the_period(session: InProcess, period_ms: int, ti
         ({"seed": "x"}, "seed is 'x'; expected a whole number"),
         ({"seed": 1.5}, "seed is 1.5; expected a whole number"),
         ({"period": "50"}, "period is '50'; expected seconds or None"),
-        ({"robot": None}, "robot is None; expected a name, a .toml file or a description"),
+        ({"robot": 5}, "robot is 5; expected a name, a .toml file, a description or None"),
         ({"on": 3}, "on is 3; expected the name of a board or a port"),
         ({"arena": 3}, "arena is 3; expected a name, a .toml file or None"),
         ({"out": 3}, "out is 3; expected a folder or None"),

@@ -1,7 +1,7 @@
 """Records what simavr does (README.md): `python record.py [--check] [--sources FOLDER]`.
 
-simavr is Debian's package libsimavr-dev, or with --sources a folder of its sources that holds `sim` and `cores`.
-Without --check the result is written to results.xz.
+simavr is Debian's packages libsimavr-dev and libelf-dev, or with --sources a folder of its sources that holds `sim` and
+`cores`. Without --check the result is written to results.xz.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results.xz"
 PARTS = ("vectors.c", "cases.c", "programs.c", "instructions.c")
-FLAGS = ("-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror")
+FLAGS = ("-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror")
 # What simavr's makefile would find out.
 CONFIGURATION = {
     "sim_core_config.h": '#define CONFIG_SIMAVR_VERSION "sources"\n#define CONFIG_MEGA328 1\n',
