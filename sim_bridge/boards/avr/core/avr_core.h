@@ -27,12 +27,12 @@ typedef struct {
   uint32_t k;    /* constant, displacement, or address: of data, or of program in bytes */
 } avr_instruction;
 
-/* Flags as the bytes they follow from: most are never looked at, so that bits are made only when they are. */
+/* Flags as the numbers they follow from: most are never looked at, so that bits are made only when they are. */
 typedef struct {
-  uint8_t c, t, i; /* 0 or 1 */
-  uint8_t z;       /* Z is set if this is 0 */
-  uint8_t n, v, s; /* bit 7 of each */
-  uint8_t h;       /* H is bit 4 */
+  uint32_t c, t, i; /* 0 or 1 */
+  uint32_t z;       /* Z is set if this is 0 */
+  uint32_t n, v, s; /* bit 7 of each */
+  uint32_t h;       /* H is bit 4 */
 } avr_flags;
 
 /* What the program reads at an I/O register, at `cycle`. */

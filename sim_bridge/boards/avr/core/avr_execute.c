@@ -111,7 +111,6 @@ static NOT_INLINE void store_bit(avr_core *core, const avr_instruction *i, uint6
 /* ---- what the interpreter keeps to itself ---- */
 
 typedef struct {
-  avr_flags f;
   uint64_t cycle;
   uint32_t at, pc; /* of the instruction at hand, and of the next */
   uint32_t takes;  /* cycles */
@@ -120,13 +119,11 @@ typedef struct {
 
 /* Around whatever may look at the core or change it. */
 static ALWAYS_INLINE void hand_over(avr_core *core, const state *s) {
-  core->flags = s->f;
   core->pc = s->at;
   core->cycle = s->cycle;
 }
 
 static ALWAYS_INLINE void take_back(const avr_core *core, state *s) {
-  s->f = core->flags;
   s->cycle = core->cycle;
   s->moves_stack = true; /* for all that is known */
 }
@@ -272,7 +269,9 @@ static ALWAYS_INLINE uint8_t program_byte(avr_core *core, state *s) {
 }
 
 /* By its number in SREG. */
-static NOT_INLINE bool has_flag(avr_flags f, unsigned number) { return all_flags(&f) >> number & 1u; }
+static NOT_INLINE bool has_flag(const avr_core *core, unsigned number) {
+  return all_flags(&core->flags) >> number & 1u;
+}
 
 static void set_flag(avr_core *core, unsigned number, bool set) {
   const unsigned bit = 1u << number, before = all_flags(&core->flags);
@@ -332,7 +331,8 @@ static NOT_INLINE void do_rare(avr_core *core, const avr_instruction *i, uint32_
 static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_t *written, uint8_t *covered) {
   uint8_t *const data = core->data;
   const avr_instruction *const code = core->code;
-  state s = {.f = core->flags, .cycle = core->cycle, .pc = core->pc};
+  avr_flags *const f = &core->flags;
+  state s = {.cycle = core->cycle, .pc = core->pc};
   do {
     const avr_instruction *const i = &code[s.pc / 2u];
     s.at = s.pc;
@@ -346,36 +346,36 @@ static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_
       case MOVW: put_word(data, i->d, POINTER); break;
       case LDI: D = K; break;
 
-      case ADD: D = add(&s.f, D, R, 0); break;
-      case ADC: D = add(&s.f, D, R, s.f.c); break;
-      case SUB: D = subtract(&s.f, D, R); break;
-      case SUBI: D = subtract(&s.f, D, K); break;
-      case SBC: D = subtract_with_carry(&s.f, D, R); break;
-      case SBCI: D = subtract_with_carry(&s.f, D, K); break;
-      case CP: subtract(&s.f, D, R); break;
-      case CPI: subtract(&s.f, D, K); break;
-      case CPC: subtract_with_carry(&s.f, D, R); break;
-      case NEG: D = subtract(&s.f, 0, D); break;
-      case INC: D = count(&s.f, D, 1); break;
-      case DEC: D = count(&s.f, D, -1); break;
-      case AND: D = logic(&s.f, D & R); break;
-      case ANDI: D = logic(&s.f, D & K); break;
-      case OR: D = logic(&s.f, D | R); break;
-      case ORI: D = logic(&s.f, D | K); break;
-      case EOR: D = logic(&s.f, D ^ R); break;
-      case COM: D = logic(&s.f, D ^ 0xFF); s.f.c = 1; break;
-      case ASR: D = shift_right(&s.f, D, D & 0x80u); break;
-      case LSR: D = shift_right(&s.f, D, 0); break;
-      case ROR: D = shift_right(&s.f, D, (unsigned)s.f.c << 7); break;
+      case ADD: D = add(f, D, R, 0); break;
+      case ADC: D = add(f, D, R, f->c); break;
+      case SUB: D = subtract(f, D, R); break;
+      case SUBI: D = subtract(f, D, K); break;
+      case SBC: D = subtract_with_carry(f, D, R); break;
+      case SBCI: D = subtract_with_carry(f, D, K); break;
+      case CP: subtract(f, D, R); break;
+      case CPI: subtract(f, D, K); break;
+      case CPC: subtract_with_carry(f, D, R); break;
+      case NEG: D = subtract(f, 0, D); break;
+      case INC: D = count(f, D, 1); break;
+      case DEC: D = count(f, D, -1); break;
+      case AND: D = logic(f, D & R); break;
+      case ANDI: D = logic(f, D & K); break;
+      case OR: D = logic(f, D | R); break;
+      case ORI: D = logic(f, D | K); break;
+      case EOR: D = logic(f, D ^ R); break;
+      case COM: D = logic(f, D ^ 0xFF); f->c = 1; break;
+      case ASR: D = shift_right(f, D, D & 0x80u); break;
+      case LSR: D = shift_right(f, D, 0); break;
+      case ROR: D = shift_right(f, D, f->c << 7); break;
       case SWAP: D = (uint8_t)(D << 4 | D >> 4); break;
-      case ADIW: s.takes = 2; add_word(&s.f, &D, i->k, false); break;
-      case SBIW: s.takes = 2; add_word(&s.f, &D, i->k, true); break;
-      case MUL: s.takes = 2; multiply(&s.f, data, D, R, 0); break;
-      case MULS: s.takes = 2; multiply(&s.f, data, (int8_t)D, (int8_t)R, 0); break;
-      case MULSU: s.takes = 2; multiply(&s.f, data, (int8_t)D, R, 0); break;
-      case FMUL: s.takes = 2; multiply(&s.f, data, D, R, 1); break;
-      case FMULS: s.takes = 2; multiply(&s.f, data, (int8_t)D, (int8_t)R, 1); break;
-      case FMULSU: s.takes = 2; multiply(&s.f, data, (int8_t)D, R, 1); break;
+      case ADIW: s.takes = 2; add_word(f, &D, i->k, false); break;
+      case SBIW: s.takes = 2; add_word(f, &D, i->k, true); break;
+      case MUL: s.takes = 2; multiply(f, data, D, R, 0); break;
+      case MULS: s.takes = 2; multiply(f, data, (int8_t)D, (int8_t)R, 0); break;
+      case MULSU: s.takes = 2; multiply(f, data, (int8_t)D, R, 0); break;
+      case FMUL: s.takes = 2; multiply(f, data, D, R, 1); break;
+      case FMULS: s.takes = 2; multiply(f, data, (int8_t)D, (int8_t)R, 1); break;
+      case FMULSU: s.takes = 2; multiply(f, data, (int8_t)D, R, 1); break;
 
       case LDD: s.takes = 2; D = load(core, &s, written, (uint16_t)(POINTER + i->k), 1); break;
       case LD_UP: s.takes = 2; load_moving(core, &s, written, i, POINTER, 1); break;
@@ -391,14 +391,14 @@ static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_
       case LPM_UP: s.takes = 3; D = program_byte(core, &s); put_word(data, Z, word_at(data, Z) + 1u); break;
 
       case IN: D = load(core, &s, NULL, (uint16_t)i->k, 0); break;
-      case IN_SREG: D = data[REG_SREG] = all_flags(&s.f); break;
+      case IN_SREG: D = data[REG_SREG] = all_flags(f); break;
       case OUT: store(core, &s, NULL, (uint16_t)i->k, D, 0); break;
-      case BLD: D = (uint8_t)(s.f.t ? D | i->r : D & ~i->r); break;
-      case BST: s.f.t = (D & i->r) != 0; break;
-      case CLI: s.f.i = 0; break;
+      case BLD: D = (uint8_t)(f->t ? D | i->r : D & ~i->r); break;
+      case BST: f->t = (D & i->r) != 0; break;
+      case CLI: f->i = 0; break;
       case SEI:
-        if (!s.f.i) let_interrupts_in(core, s.cycle + 1u);
-        s.f.i = 1;
+        if (!f->i) let_interrupts_in(core, s.cycle + 1u);
+        f->i = 1;
         break;
 
       case JUMP: s.takes = 2; jump(core, &s, i->k); break;
@@ -410,21 +410,21 @@ static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_
       case RET: s.takes = 4; jump(core, &s, pop(core, &s, written, 2) * 2u); break;
       case RETI:
         s.takes = 4;
-        s.f.i = 1;
+        f->i = 1;
         jump(core, &s, pop(core, &s, written, 2) * 2u);
         let_interrupts_in(core, s.cycle + 4u);
         break;
 
-      case BRCS: branch(&s, i, s.f.c); break;
-      case BRCC: branch(&s, i, !s.f.c); break;
-      case BREQ: branch(&s, i, !s.f.z); break;
-      case BRNE: branch(&s, i, s.f.z); break;
-      case BRMI: branch(&s, i, s.f.n >> 7); break;
-      case BRPL: branch(&s, i, !(s.f.n >> 7)); break;
-      case BRLT: branch(&s, i, s.f.s >> 7); break;
-      case BRGE: branch(&s, i, !(s.f.s >> 7)); break;
-      case BRBS: branch(&s, i, has_flag(s.f, i->r)); break;
-      case BRBC: branch(&s, i, !has_flag(s.f, i->r)); break;
+      case BRCS: branch(&s, i, f->c); break;
+      case BRCC: branch(&s, i, !f->c); break;
+      case BREQ: branch(&s, i, !f->z); break;
+      case BRNE: branch(&s, i, f->z); break;
+      case BRMI: branch(&s, i, f->n & 0x80u); break;
+      case BRPL: branch(&s, i, !(f->n & 0x80u)); break;
+      case BRLT: branch(&s, i, f->s & 0x80u); break;
+      case BRGE: branch(&s, i, !(f->s & 0x80u)); break;
+      case BRBS: branch(&s, i, has_flag(core, i->r)); break;
+      case BRBC: branch(&s, i, !has_flag(core, i->r)); break;
       case CPSE: skip(&s, i, D == R); break;
       case SBRC: skip(&s, i, !(D & i->r)); break;
       case SBRS: skip(&s, i, D & i->r); break;
@@ -455,7 +455,6 @@ static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_
       if (s.pc >= AVR_FLASH_SIZE || stops->marked[s.pc / 2u]) break;
     }
   } while (s.cycle < core->until);
-  core->flags = s.f;
   core->pc = s.pc;
   core->cycle = s.cycle;
   return s.at;
