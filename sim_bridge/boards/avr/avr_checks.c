@@ -61,18 +61,18 @@ void check_watched(avr_board *b, uint8_t port, uint8_t mask) {
  * that one of the next instructions picks out. 0: not known, as of a port that is kept whole. */
 static uint8_t bits_of_interest(const avr_board *b) {
   const avr_instruction *i = &b->core.code[here(b) / 2u];
-  if (i->kind == SBIC || i->kind == SBIS) return i->r;
+  if (i->kind == SBIC || i->kind == SBIS) return i->d;
   const uint8_t port = i->d;
   uint32_t changed = 0;
   for (int n = 0; n < LOOKAHEAD; n++) {
-    i += i->kind == LDS ? 2 : 1;
+    i += avr_has_two_words(i->kind) ? 2 : 1;
     if (i - b->core.code >= AVR_FLASH_SIZE / 2) return 0;
-    if (i->kind == AND && (i->d == port || i->r == port) && i->d != i->r) {
-      const uint8_t mask = i->d == port ? i->r : i->d;
+    if (i->kind == AND && (i->d == port || i->k == port) && i->d != i->k) {
+      const unsigned mask = i->d == port ? i->k : i->d;
       return changed >> mask & 1u ? 0 : b->core.data[mask];
     }
     if (i->kind == ANDI && i->d == port) return (uint8_t)i->k;
-    if ((i->kind == SBRC || i->kind == SBRS || i->kind == BST) && i->d == port) return i->r;
+    if ((i->kind == SBRC || i->kind == SBRS || i->kind == BST) && i->d == port) return (uint8_t)i->k;
     if (i->kind != LDI || i->d == port) return 0;
     changed |= UINT32_C(1) << i->d;
   }

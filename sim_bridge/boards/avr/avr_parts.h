@@ -101,6 +101,8 @@ typedef enum {
   COUNT_PHASE_PWM,
   COUNT_PHASE_FREQUENCY_PWM
 } count_mode;
+#define NO_CLOCK 0xFFu
+
 typedef enum { TOP_FIXED, TOP_OCRA, TOP_ICR } top_source;
 
 typedef struct {
@@ -110,13 +112,13 @@ typedef struct {
   uint8_t address_control_a, address_count, address_compare[2];
   uint8_t vector_overflow, vector_compare[2];
   uint8_t output_port[2], output_bit[2];
-  const uint16_t *dividers;
+  const uint8_t *prescalers;
   uint32_t maximum;
   /* how it is set */
   count_mode mode;
   top_source top_from;
   uint32_t fixed_top;
-  uint32_t divider;            /* CPU cycles per count, 0: stopped, or clocked from outside */
+  uint8_t prescaler;           /* a count takes 1 << this CPU cycles; NO_CLOCK: stopped, or clocked from outside */
   uint8_t action[2];           /* COMnx: 0 none, 1 toggle, 2 clear, 3 set */
   uint32_t compare[2];         /* in force */
   uint32_t compare_written[2]; /* comes into force at once, or in PWM modes at the end of a lap */

@@ -133,8 +133,8 @@ static bool grows_stack(const avr_core *core, uint32_t at) {
   for (uint32_t words = 1; words <= FRAME_WORDS && 2 * words <= at; words++) {
     const avr_instruction *i = &core->code[at / 2u - words];
     const bool reads_stack = i->kind == IN && avr_is_stack_half(i);
-    const bool loads =
-        i->kind == LDI || i->kind == LDD || i->kind == LD_UP || i->kind == LD_DOWN || i->kind == LDS || i->kind == POP;
+    const bool loads = i->kind == LDI || i->kind == LDD || i->kind == LD_UP || i->kind == LD_DOWN || i->kind == LDS ||
+                       i->kind == LDS_RAM || i->kind == POP;
     if ((loads || reads_stack) && i->d == source) return reads_stack;
   }
   return false;

@@ -6,8 +6,8 @@
  * an enabled flag that is not yet set, or an output pin. Everything else is computed when a register is touched.
  *
  * A match with OCRn sets its flag, and moves its pin, one count after the count became equal (16.7.1). The compare
- * registers are double-buffered in the PWM modes. The prescalers run freely (17). With a clock from outside the divider
- * is 0, and each edge is a count.
+ * registers are double-buffered in the PWM modes. The prescalers run freely (17). With a clock from outside each edge is a
+ * count.
  */
 #include "avr_timer_count.h"
 
@@ -198,10 +198,10 @@ void timer_count_once(timer_state *t, uint64_t cycle) {
 
 void timer_bring_up(timer_state *t, uint64_t cycle) {
   if (cycle <= t->known) return;
-  if (t->divider) {
+  if (t->prescaler != NO_CLOCK) {
     uint64_t base = t->owner->timer_base[t->number == 2];
-    uint64_t done = (t->known - base) / t->divider;
-    uint64_t counts = (cycle - base) / t->divider - done;
+    uint64_t done = (t->known - base) >> t->prescaler;
+    uint64_t counts = ((cycle - base) >> t->prescaler) - done;
     while (counts) {
       uint64_t next = distance_to_next(t, UINT32_MAX);
       if (next > counts) {
@@ -211,18 +211,18 @@ void timer_bring_up(timer_state *t, uint64_t cycle) {
       move(t, next - 1);
       done += next;
       counts -= next;
-      timer_count_once(t, base + done * t->divider);
+      timer_count_once(t, base + (done << t->prescaler));
     }
   }
   t->known = cycle;
 }
 
 void timer_plan(timer_state *t) {
-  uint64_t next = t->divider ? distance_to_next(t, t->owner->core.enabled) : NEVER;
+  uint64_t next = t->prescaler != NO_CLOCK ? distance_to_next(t, t->owner->core.enabled) : NEVER;
   uint64_t due = NEVER;
   if (next != NEVER) {
     uint64_t base = t->owner->timer_base[t->number == 2];
-    due = base + ((t->known - base) / t->divider + next) * t->divider;
+    due = base + ((((t->known - base) >> t->prescaler) + next) << t->prescaler);
   }
   set_due(t->owner, DUE_TIMER0 + t->number, due);
 }

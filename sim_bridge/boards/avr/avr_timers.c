@@ -37,8 +37,9 @@ static const waveform WIDE[16] = {
     {COUNT_FAST_PWM, TOP_OCRA, 0},
 };
 
-static const uint16_t DIVIDERS[8] = {0, 1, 8, 64, 256, 1024, 0, 0};
-static const uint16_t DIVIDERS_OF_2[8] = {0, 1, 8, 32, 64, 128, 256, 1024};
+/* By CSn2:0: a count takes 1 << this CPU cycles (tables 15-9, 16-5, 18-9). */
+static const uint8_t PRESCALERS[8] = {NO_CLOCK, 0, 3, 6, 8, 10, NO_CLOCK, NO_CLOCK};
+static const uint8_t PRESCALERS_OF_2[8] = {NO_CLOCK, 0, 3, 5, 6, 7, 8, 10};
 
 static const timer_state BUILT_IN[3] = {
     {.number = 0,
@@ -49,7 +50,7 @@ static const timer_state BUILT_IN[3] = {
      .vector_compare = {VECTOR_TIMER0_COMPA, VECTOR_TIMER0_COMPB},
      .output_port = {PORT_D, PORT_D},
      .output_bit = {6, 5},
-     .dividers = DIVIDERS,
+     .prescalers = PRESCALERS,
      .maximum = 0xFF},
     {.number = 1,
      .address_control_a = 0x80,
@@ -59,7 +60,7 @@ static const timer_state BUILT_IN[3] = {
      .vector_compare = {VECTOR_TIMER1_COMPA, VECTOR_TIMER1_COMPB},
      .output_port = {PORT_B, PORT_B},
      .output_bit = {1, 2},
-     .dividers = DIVIDERS,
+     .prescalers = PRESCALERS,
      .maximum = 0xFFFF},
     {.number = 2,
      .address_control_a = 0xB0,
@@ -69,7 +70,7 @@ static const timer_state BUILT_IN[3] = {
      .vector_compare = {VECTOR_TIMER2_COMPA, VECTOR_TIMER2_COMPB},
      .output_port = {PORT_B, PORT_D},
      .output_bit = {3, 3},
-     .dividers = DIVIDERS_OF_2,
+     .prescalers = PRESCALERS_OF_2,
      .maximum = 0xFF},
 };
 
@@ -110,7 +111,7 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
   t->mode = (count_mode)w->mode;
   t->top_from = (top_source)w->top_from;
   t->fixed_top = w->fixed_top;
-  t->divider = t->dividers[control[CONTROL_B] & 7];
+  t->prescaler = t->prescalers[control[CONTROL_B] & 7];
   if (which == CONTROL_B && t->number < 2) {
     uint8_t pin = (uint8_t)(1u << (TIMER0_CLOCK_BIT + t->number));
     b->clock_pins = (uint8_t)((control[CONTROL_B] & 7) >= CLOCK_FALLING ? b->clock_pins | pin : b->clock_pins & ~pin);
@@ -225,6 +226,7 @@ void timers_reset(avr_board *b, uint64_t cycle) {
     b->timer[i] = BUILT_IN[i];
     b->timer[i].owner = b;
     b->timer[i].known = cycle;
+    b->timer[i].prescaler = NO_CLOCK;
     b->timer[i].fixed_top = b->timer[i].maximum;
     timer_plan(&b->timer[i]);
   }

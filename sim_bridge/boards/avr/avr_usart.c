@@ -50,15 +50,29 @@ static uint64_t falling_edge(const line_queue *q, uint64_t time) {
   for (size_t i = q->first; i < q->end; i++) {
     const line_frame *f = &q->frames[i];
     if (end_of(f) <= time) continue;
-    bool before = true;
-    for (unsigned bit = 0; bit < f->bits; bit++) {
-      uint64_t edge = f->start + (uint64_t)bit * f->bit_time;
+    uint64_t bit = time > f->start ? (time - f->start) / f->bit_time : 0;
+    bool before = bit == 0 || bit_of(f->byte, bit - 1);
+    for (; bit < f->bits; bit++) {
+      uint64_t edge = f->start + bit * f->bit_time;
       bool level = bit_of(f->byte, bit);
       if (before && !level && edge >= time) return edge;
       before = level;
     }
   }
   return NEVER;
+}
+
+/* As a receiver by its own bit time sees the byte whose start bit begins at `start`. */
+static uint8_t byte_on_line(const line_queue *q, uint64_t start, uint64_t bit_time, unsigned bits) {
+  for (size_t i = q->first; i < q->end && q->frames[i].start <= start; i++) { /* mostly it is that of the frame */
+    const line_frame *f = &q->frames[i];
+    if (f->start == start && f->bit_time == bit_time && f->bits > 9 && bits == 8) return f->byte;
+  }
+  uint8_t byte = 0;
+  for (unsigned bit = 0; bit < bits && bit < 8; bit++) {
+    if (line_level(q, start + bit_time * (2 * bit + 3) / 2)) byte |= (uint8_t)(1u << bit);
+  }
+  return byte;
 }
 
 static void log_frame(struct board_frames *log, const line_frame *f) {
@@ -132,10 +146,7 @@ static void start_bit(avr_board *b) {
 static void stop_bit(avr_board *b) {
   usart_state *u = &b->usart;
   uint64_t bit_time = (uint64_t)u->bit_time << FRACTION;
-  received_byte r = {.arrived = b->core.clock};
-  for (unsigned bit = 0; bit < u->data_bits && bit < 8; bit++) {
-    if (line_level(&u->to_board, u->from + bit_time * (2 * bit + 3) / 2)) r.byte |= (uint8_t)(1u << bit);
-  }
+  received_byte r = {.arrived = b->core.clock, .byte = byte_on_line(&u->to_board, u->from, bit_time, u->data_bits)};
   r.framing_error = !line_level(&u->to_board, u->from + bit_time * (2 * bits_before_stop(u) + 1) / 2);
   bool noise = line_level(&u->to_board, u->from + bit_time / 2); /* no start bit after all */
   u->receiver = RECEIVER_SEARCHING;
@@ -212,10 +223,7 @@ static void plan_outside(avr_board *b) {
 void usart_due_outside(avr_board *b, uint64_t cycle) {
   usart_state *u = &b->usart;
   uint64_t bit_time = outside_bit_time(u);
-  uint8_t byte = 0;
-  for (unsigned bit = 0; bit < 8; bit++) {
-    if (line_level(&u->from_board, u->outside_start + bit_time * (2 * bit + 3) / 2)) byte |= (uint8_t)(1u << bit);
-  }
+  uint8_t byte = byte_on_line(&u->from_board, u->outside_start, bit_time, 8);
   u->out = board_room_for(u->out, sizeof *u->out, &u->out_first, &u->out_end, &u->out_capacity, 1);
   u->out[u->out_end++] = (sent_byte){cycle, byte};
   u->outside_from = u->outside_start + bit_time * (2 * LINE_BITS - 1) / 2;

@@ -7,7 +7,8 @@
 #include "avr_core.h"
 
 static inline uint16_t word_at(const uint8_t *bytes, uint32_t address) {
-  return (uint16_t)(bytes[address] | bytes[address + 1] << 8);
+  const volatile uint8_t *pair = bytes + address;
+  return (uint16_t)(pair[0] | pair[1] << 8);
 }
 
 static inline void put_word(uint8_t *bytes, uint32_t address, unsigned value) {

@@ -19,12 +19,11 @@
 
 typedef struct avr_board avr_board; /* the owner; the core hands its address on */
 
-/* A decoded instruction. */
+/* A decoded instruction: four bytes, so that a program's stay in the host's nearest cache. */
 typedef struct {
-  uint8_t kind;  /* of avr_decode.h */
-  uint8_t d, r;  /* registers; of instructions with a bit r is its mask, of those with a flag its number */
-  uint8_t skips; /* bytes of the instruction behind this one, which a skip jumps over */
-  uint32_t k;    /* constant, displacement, or address: of data, or of program in bytes */
+  uint8_t kind; /* of avr_decode.h */
+  uint8_t d;    /* register; of one bit of an I/O register its mask; of SREG the number of its bit */
+  uint16_t k;   /* second register, constant, mask of a bit, or address: of data, or of program in words */
 } avr_instruction;
 
 /* Flags as the numbers they follow from: most are never looked at, so that bits are made only when they are. */
@@ -58,9 +57,9 @@ typedef struct {
 typedef struct {
   uint8_t data[AVR_DATA_SIZE]; /* I/O registers as last read or written; SREG is in `flags` */
   uint8_t *flash;              /* AVR_FLASH_SIZE; after a change of it: avr_core_flash_changed */
-  avr_instruction *code;       /* of each word of flash */
+  avr_instruction *code;       /* of each word that an address may be of; no code is behind flash */
   avr_flags flags;
-  uint32_t pc;    /* byte address of the next instruction */
+  uint32_t pc;    /* byte address of the next instruction, which may be behind flash, and then it stops there */
   uint64_t cycle; /* never goes back */
   uint64_t clock; /* cycle of what is happening now, which may be within an instruction; never goes back */
 

@@ -6,6 +6,10 @@
 
 #include "avr_decode.h"
 
+#define X 26u
+#define Y 28u
+#define Z 30u
+
 /* How the operands lie in an opcode. */
 typedef enum {
   NONE,
@@ -17,6 +21,7 @@ typedef enum {
   D4_K8,   /* ---- KKKK dddd KKKK */
   PAIR_K6, /* ---- ---- KKdd KKKK, of r24, r26, r28, r30 */
   D5_Q6,   /* --q- qq-d dddd -qqq, with Z or Y */
+  D5_XQ,   /* ---- ---d dddd ----, with X and no displacement */
   D5_X,    /* ---- ---d dddd 11-- */
   D5_Y,    /* ---- ---d dddd 10-- */
   D5_Z,    /* ---- ---d dddd 00-- */
@@ -45,10 +50,10 @@ static const struct { uint16_t mask, value; uint8_t kind, operands; } PATTERNS[]
   {0xD200, 0x8000, LDD, D5_Q6},    {0xD200, 0x8200, STD, D5_Q6},
   {0xFE0F, 0x9000, LDS, D5_K16},   {0xFE0F, 0x9200, STS, D5_K16},
   {0xFE0F, 0x9001, LD_UP, D5_Z},   {0xFE0F, 0x9002, LD_DOWN, D5_Z}, {0xFE0F, 0x9009, LD_UP, D5_Y},
-  {0xFE0F, 0x900A, LD_DOWN, D5_Y}, {0xFE0F, 0x900C, LDD, D5_X},     {0xFE0F, 0x900D, LD_UP, D5_X},
+  {0xFE0F, 0x900A, LD_DOWN, D5_Y}, {0xFE0F, 0x900C, LDD, D5_XQ},     {0xFE0F, 0x900D, LD_UP, D5_X},
   {0xFE0F, 0x900E, LD_DOWN, D5_X},
   {0xFE0F, 0x9201, ST_UP, D5_Z},   {0xFE0F, 0x9202, ST_DOWN, D5_Z}, {0xFE0F, 0x9209, ST_UP, D5_Y},
-  {0xFE0F, 0x920A, ST_DOWN, D5_Y}, {0xFE0F, 0x920C, STD, D5_X},     {0xFE0F, 0x920D, ST_UP, D5_X},
+  {0xFE0F, 0x920A, ST_DOWN, D5_Y}, {0xFE0F, 0x920C, STD, D5_XQ},     {0xFE0F, 0x920D, ST_UP, D5_X},
   {0xFE0F, 0x920E, ST_DOWN, D5_X},
   {0xFFFF, 0x95C8, LPM, NONE},     {0xFE0F, 0x9004, LPM, D5},       {0xFE0F, 0x9005, LPM_UP, D5},
   {0xFFFF, 0x95E8, SPM, NONE},
@@ -78,6 +83,8 @@ static const struct { uint16_t mask, value; uint8_t kind, operands; } PATTERNS[]
 };
 /* clang-format on */
 
+#define ADDRESSES (0x10000u + 3u) /* of words, as far as RET, and a two-word instruction or a skip there, may lead */
+
 enum { PATTERN_COUNT = sizeof PATTERNS / sizeof *PATTERNS, NO_PATTERN = PATTERN_COUNT };
 
 static uint8_t pattern_of[0x10000]; /* by opcode: index into PATTERNS */
@@ -98,73 +105,71 @@ static unsigned word_at(const avr_core *core, uint32_t address) {
   return core->flash[address] | (unsigned)core->flash[address + 1] << 8;
 }
 
-static bool has_two_words(unsigned opcode) {
-  const unsigned p = pattern_of[opcode];
-  return p != NO_PATTERN && (PATTERNS[p].operands == D5_K16 || PATTERNS[p].operands == K22);
+/* A program address so many words behind the next instruction; flash is a ring. */
+static uint16_t relative(uint32_t word, int offset) {
+  return (uint16_t)((word + 1u + (uint32_t)offset) % (AVR_FLASH_SIZE / 2u));
 }
 
-/* A program address so many words behind the next instruction; flash is a ring. */
-static uint32_t relative(uint32_t address, int words) { return (address + 2u + 2u * (uint32_t)words) % AVR_FLASH_SIZE; }
-
-static void place_operands(avr_instruction *i, operands where, unsigned opcode, unsigned next, uint32_t address) {
+static avr_instruction with_operands(uint8_t kind, operands where, unsigned opcode, unsigned next, uint32_t word) {
   const unsigned d = opcode >> 4 & 0x1Fu, r = (opcode >> 5 & 0x10u) | (opcode & 0xFu), low = opcode & 0xFu;
-  i->d = (uint8_t)d;
+  avr_instruction i = {kind, (uint8_t)d, 0};
+  const uint8_t mask = (uint8_t)(1u << (opcode & 7u));
   /* clang-format off */
   switch (where) {
-    case NONE: i->d = 0; break; /* LPM is LPM r0, Z */
+    case NONE: i.d = 0; break; /* LPM is LPM r0, Z */
     case D5: break;
-    case D5_R5: i->r = (uint8_t)r; break;
-    case D4_R4: i->d = (uint8_t)(16u + (d & 0xFu)); i->r = (uint8_t)(16u + low); break;
-    case D3_R3: i->d = (uint8_t)(16u + (d & 7u)); i->r = (uint8_t)(16u + (low & 7u)); break;
-    case PAIRS: i->d = (uint8_t)(2u * (d & 0xFu)); i->r = (uint8_t)(2u * low); break;
-    case D4_K8: i->d = (uint8_t)(16u + (d & 0xFu)); i->k = (opcode >> 4 & 0xF0u) | low; break;
-    case PAIR_K6: i->d = (uint8_t)(24u + 2u * (d & 3u)); i->k = (opcode >> 2 & 0x30u) | low; break;
+    case D5_R5: i.k = (uint16_t)r; break;
+    case D4_R4: i.d = (uint8_t)(16u + (d & 0xFu)); i.k = (uint16_t)(16u + low); break;
+    case D3_R3: i.d = (uint8_t)(16u + (d & 7u)); i.k = (uint16_t)(16u + (low & 7u)); break;
+    case PAIRS: i.d = (uint8_t)(2u * (d & 0xFu)); i.k = (uint16_t)(2u * low); break;
+    case D4_K8: i.d = (uint8_t)(16u + (d & 0xFu)); i.k = (uint16_t)((opcode >> 4 & 0xF0u) | low); break;
+    case PAIR_K6: i.d = (uint8_t)(24u + 2u * (d & 3u)); i.k = (uint16_t)((opcode >> 2 & 0x30u) | low); break;
     case D5_Q6:
-      i->r = opcode & 8u ? 28 : 30;
-      i->k = (opcode >> 8 & 0x20u) | (opcode >> 7 & 0x18u) | (opcode & 7u);
+      i.k = (uint16_t)((opcode & 8u ? Y << 8 : Z << 8) | (opcode >> 8 & 0x20u) | (opcode >> 7 & 0x18u) | (opcode & 7u));
       break;
-    case D5_X: i->r = 26; break;
-    case D5_Y: i->r = 28; break;
-    case D5_Z: i->r = 30; break;
-    case D5_K16: i->k = next; break;
-    case D5_A6: i->k = AVR_IO_BEGIN + ((opcode >> 5 & 0x30u) | low); break;
-    case A5_BIT: i->k = AVR_IO_BEGIN + (opcode >> 3 & 0x1Fu); i->r = (uint8_t)(1u << (opcode & 7u)); break;
-    case D5_BIT: i->r = (uint8_t)(1u << (opcode & 7u)); break;
-    case FLAG: i->r = d & 7u; break;
+    case D5_XQ: i.k = X << 8; break;
+    case D5_X: i.k = X; break;
+    case D5_Y: i.k = Y; break;
+    case D5_Z: i.k = Z; break;
+    case D5_K16: i.k = (uint16_t)next; break;
+    case D5_A6: i.k = (uint16_t)(AVR_IO_BEGIN + ((opcode >> 5 & 0x30u) | low)); break;
+    case A5_BIT: i.d = mask; i.k = (uint16_t)(AVR_IO_BEGIN + (opcode >> 3 & 0x1Fu)); break;
+    case D5_BIT: i.k = mask; break;
+    case FLAG: i.d = d & 7u; break;
     case FLAG_K7:
-      i->r = opcode & 7u;
-      i->k = relative(address, (int)(opcode >> 3 & 0x3Fu) - (int)(opcode >> 3 & 0x40u));
+      i.d = opcode & 7u;
+      i.k = relative(word, (int)(opcode >> 3 & 0x3Fu) - (int)(opcode >> 3 & 0x40u));
       break;
-    case K12: i->k = relative(address, (int)(opcode & 0x7FFu) - (int)(opcode & 0x800u)); break;
-    case K22: i->k = ((opcode << 13 & 0x3E0000u) | (opcode << 16 & 0x10000u) | next) * 2u; break;
+    case K12: i.k = relative(word, (int)(opcode & 0x7FFu) - (int)(opcode & 0x800u)); break;
+    case K22: i.k = opcode & 0x01F1u ? 0xFFFF : (uint16_t)next; break; /* no flash is that large */
   }
   /* clang-format on */
+  return i;
 }
 
 static avr_instruction decode(const avr_core *core, uint32_t address) {
-  avr_instruction i = {.kind = OUTSIDE};
-  if (address >= core->code_end) return i;
-  const bool is_last = address + 2u >= AVR_FLASH_SIZE;
-  const unsigned opcode = word_at(core, address), next = is_last ? 0xFFFFu : word_at(core, address + 2u);
-  const unsigned p = pattern_of[opcode];
-  i.kind = p == NO_PATTERN ? (uint8_t)INVALID : PATTERNS[p].kind;
-  i.skips = has_two_words(next) ? 4 : 2;
-  if (p != NO_PATTERN) place_operands(&i, (operands)PATTERNS[p].operands, opcode, next, address);
-  return i;
+  if (address >= core->code_end) return (avr_instruction){OUTSIDE, 0, 0};
+  const unsigned opcode = word_at(core, address), p = pattern_of[opcode];
+  const unsigned next = address + 2u < AVR_FLASH_SIZE ? word_at(core, address + 2u) : 0xFFFFu;
+  if (p == NO_PATTERN) return (avr_instruction){INVALID, 0, 0};
+  uint8_t kind = PATTERNS[p].kind;
+  const bool in_ram = next >= AVR_RAM_BEGIN && next < AVR_DATA_SIZE;
+  if (kind == LDS && in_ram) kind = LDS_RAM;
+  if (kind == STS && in_ram) kind = STS_RAM;
+  return with_operands(kind, (operands)PATTERNS[p].operands, opcode, next, address / 2u);
 }
 
 void avr_core_flash_changed(avr_core *core, uint32_t address, uint32_t bytes) {
   const uint32_t end = address + bytes < AVR_FLASH_SIZE ? address + bytes : AVR_FLASH_SIZE;
   address &= ~1u;
-  if (address >= 2u) address -= 2u; /* that before has its second word here, or skips what is here */
+  if (address >= 2u) address -= 2u; /* that before may have its second word here */
   for (; address < end; address += 2u) core->code[address / 2u] = decode(core, address);
 }
 
 bool avr_core_create(avr_core *core) {
-  const uint32_t words = AVR_FLASH_SIZE / 2u;
   memset(core, 0, sizeof *core);
   core->flash = malloc(AVR_FLASH_SIZE);
-  core->code = malloc((words + 2u) * sizeof *core->code);
+  core->code = calloc(ADDRESSES, sizeof *core->code); /* OUTSIDE */
   if (!core->flash || !core->code) {
     avr_core_free(core);
     return false;
@@ -174,7 +179,6 @@ bool avr_core_create(avr_core *core) {
   core->stack_floor = AVR_RAM_BEGIN;
   core->next_due = UINT64_MAX;
   avr_core_flash_changed(core, 0, AVR_FLASH_SIZE);
-  core->code[words] = core->code[words + 1u] = (avr_instruction){.kind = OUTSIDE}; /* a skip may lead there */
   avr_core_reset(core, 0);
   return true;
 }

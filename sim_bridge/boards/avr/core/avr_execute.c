@@ -100,26 +100,35 @@ static NOT_INLINE void avr_store(avr_core *core, uint16_t address, uint8_t value
 }
 
 /* Instructions of one bit of an I/O register read it and write all of it, but where a written one alone acts. */
-static NOT_INLINE void store_bit(avr_core *core, const avr_instruction *i, uint64_t cycle) {
-  const uint16_t address = (uint16_t)i->k;
+static NOT_INLINE void store_bit(avr_core *core, avr_instruction i, uint64_t cycle) {
+  const uint16_t address = i.k;
   const bool acts_on_ones = core->ones >> (address - AVR_IO_BEGIN) & 1u;
-  if (acts_on_ones && i->kind == CBI) return;
+  if (acts_on_ones && i.kind == CBI) return;
   const uint8_t before = acts_on_ones ? 0 : avr_load(core, address, cycle);
-  avr_store(core, address, (uint8_t)(i->kind == SBI ? before | i->r : before & ~i->r), cycle);
+  avr_store(core, address, (uint8_t)(i.kind == SBI ? before | i.d : before & ~i.d), cycle);
+}
+
+/* By Y + 5 and the like. */
+static inline uint16_t displaced(const uint8_t *data, avr_instruction i) {
+  return (uint16_t)(word_at(data, i.k >> 8) + (i.k & 0xFFu));
 }
 
 /* ---- what the interpreter keeps to itself ---- */
 
 typedef struct {
   uint64_t cycle;
-  uint32_t at, pc; /* of the instruction at hand, and of the next */
-  uint32_t takes;  /* cycles */
+  const avr_instruction *at, *next;
+  uint32_t takes; /* cycles */
   bool moves_stack;
 } state;
 
+static ALWAYS_INLINE uint32_t address_of(const avr_core *core, const avr_instruction *i) {
+  return (uint32_t)(i - core->code) * 2u;
+}
+
 /* Around whatever may look at the core or change it. */
 static ALWAYS_INLINE void hand_over(avr_core *core, const state *s) {
-  core->pc = s->at;
+  core->pc = address_of(core, s->at);
   core->cycle = s->cycle;
 }
 
@@ -148,19 +157,29 @@ static ALWAYS_INLINE void store(avr_core *core, state *s, uint8_t *written, uint
   take_back(core, s);
 }
 
-/* By X, Y or Z, which then is `change` above `address`. What it loads may be half of the pointer; what it stores is what the
- * register had before. */
-static ALWAYS_INLINE void load_moving(avr_core *core, state *s, const uint8_t *written, const avr_instruction *i,
-                                      uint16_t address, unsigned change) {
-  const uint8_t value = load(core, s, written, address, 1);
-  put_word(core->data, i->r, address + change);
-  core->data[i->d] = value;
+/* From an address that is in RAM for sure. */
+static ALWAYS_INLINE uint8_t load_ram(avr_core *core, state *s, const uint8_t *written, uint16_t address) {
+  return written ? load(core, s, written, address, 1) : core->data[address];
 }
 
-static ALWAYS_INLINE void store_moving(avr_core *core, state *s, uint8_t *written, const avr_instruction *i,
-                                       uint16_t address, unsigned change) {
-  store(core, s, written, address, core->data[i->d], 1);
-  put_word(core->data, i->r, address + change);
+static ALWAYS_INLINE void store_ram(avr_core *core, state *s, uint8_t *written, uint16_t address, uint8_t value) {
+  if (written) store(core, s, written, address, value, 1);
+  if (!written) core->data[address] = value;
+}
+
+/* By X, Y or Z, which then is `change` above `address`. What it loads may be half of the pointer; what it stores is what the
+ * register had before. */
+static ALWAYS_INLINE void load_moving(avr_core *core, state *s, const uint8_t *written, avr_instruction i,
+                                      uint16_t address, unsigned change) {
+  const uint8_t value = load(core, s, written, address, 1);
+  put_word(core->data, i.k, address + change);
+  core->data[i.d] = value;
+}
+
+static ALWAYS_INLINE void store_moving(avr_core *core, state *s, uint8_t *written, avr_instruction i, uint16_t address,
+                                       unsigned change) {
+  store(core, s, written, address, core->data[i.d], 1);
+  put_word(core->data, i.k, address + change);
 }
 
 /* ---- the stack ---- */
@@ -232,22 +251,23 @@ void avr_enter_interrupt(avr_core *core, unsigned vector) {
 /* ---- jumps ---- */
 
 /* Where no code is it stops. */
-static ALWAYS_INLINE void jump(avr_core *core, state *s, uint32_t address) {
-  s->pc = address;
-  if (!avr_is_code(core, address)) avr_stop(core);
+static ALWAYS_INLINE void jump(avr_core *core, state *s, uint32_t word) {
+  s->next = core->code + word;
+  if (!avr_is_code(core, word * 2u)) avr_stop(core);
 }
 
-static ALWAYS_INLINE void branch(state *s, const avr_instruction *i, bool taken) {
+static ALWAYS_INLINE void branch(const avr_core *core, state *s, avr_instruction i, bool taken) {
   if (!taken) return;
-  s->pc = i->k;
+  s->next = core->code + i.k;
   s->takes = 2;
 }
 
 /* A word of the next instruction takes a cycle. */
-static ALWAYS_INLINE void skip(state *s, const avr_instruction *i, bool skips) {
+static ALWAYS_INLINE void skip(state *s, bool skips) {
   if (!skips) return;
-  s->pc += i->skips;
-  s->takes = 1u + i->skips / 2u;
+  const uint32_t words = avr_has_two_words(s->next->kind) ? 2 : 1;
+  s->next += words;
+  s->takes = 1 + words;
 }
 
 /* ---- the rest of the state ---- */
@@ -281,23 +301,18 @@ static void set_flag(avr_core *core, unsigned number, bool set) {
 static ALWAYS_INLINE uint32_t cycles_of_rare(unsigned kind) { return kind == SBI || kind == CBI ? 2 : 1; }
 
 /* What is left of the instructions; the core is handed over. Without an owner WDR and SPM do nothing. */
-static NOT_INLINE void do_rare(avr_core *core, const avr_instruction *i, uint32_t takes) {
+static NOT_INLINE void do_rare(avr_core *core, avr_instruction i, uint32_t takes) {
   static const avr_owner_calls NOTHING = {0};
   const avr_owner_calls *calls = core->calls ? core->calls : &NOTHING;
-  const uint8_t value = core->data[i->d];
+  const uint8_t value = core->data[i.d];
   const uint16_t stack = avr_stack(core);
-  switch (i->kind) {
-    case SBI:
-    case CBI:
-      store_bit(core, i, core->cycle + 1u);
-      break;
-    case BSET:
-    case BCLR:
-      set_flag(core, i->r, i->kind == BSET);
-      break;
-    case OUT_SREG:
-      store_flags(core, value, core->cycle + 1u);
-      break;
+  /* clang-format off */
+  switch (i.kind) {
+    case SBI: case CBI: store_bit(core, i, core->cycle + 1u); break;
+    case BSET: case BCLR: set_flag(core, i.d, i.kind == BSET); break;
+    case WDR: if (calls->watchdog_reset) calls->watchdog_reset(core->owner); break;
+    case SPM: if (calls->store_program) calls->store_program(core->owner); break;
+    case ERASED: if (calls->runs_erased) calls->runs_erased(core->owner); break;
     case OUT_SPL:
       core->data[REG_SPL] = value;
       tell_of_stack(core, stack, takes);
@@ -306,44 +321,34 @@ static NOT_INLINE void do_rare(avr_core *core, const avr_instruction *i, uint32_
       core->sleeping = core->data[REG_SMCR] & 1u; /* SE */
       avr_stop(core);
       break;
-    case WDR:
-      if (calls->watchdog_reset) calls->watchdog_reset(core->owner);
-      break;
-    case SPM:
-      if (calls->store_program) calls->store_program(core->owner);
-      break;
-    case ERASED:
-      if (calls->runs_erased) calls->runs_erased(core->owner);
-      break;
     default: /* INVALID */
       if (calls->cannot_go_on) calls->cannot_go_on(core->owner, word_at(core->flash, core->pc));
       avr_stop(core);
   }
+  /* clang-format on */
 }
 
 /* ---- the interpreter ---- */
 
-#define D data[i->d]
-#define R data[i->r]
-#define K ((uint8_t)i->k)
-#define POINTER word_at(data, i->r)
+#define D data[i.d]
+#define R data[i.k]
+#define K ((uint8_t)i.k)
+#define POINTER word_at(data, i.k)
 
 static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_t *written, uint8_t *covered) {
   uint8_t *const data = core->data;
-  const avr_instruction *const code = core->code;
   avr_flags *const f = &core->flags;
-  state s = {.cycle = core->cycle, .pc = core->pc};
+  state s = {.cycle = core->cycle, .next = core->code + core->pc / 2u};
   do {
-    const avr_instruction *const i = &code[s.pc / 2u];
-    s.at = s.pc;
-    s.pc += 2;
+    s.at = s.next++;
+    const avr_instruction i = *s.at;
     s.takes = 1;
     s.moves_stack = false;
     /* clang-format off */
-    switch (i->kind) {
+    switch (i.kind) {
       case NOP: break;
       case MOV: D = R; break;
-      case MOVW: put_word(data, i->d, POINTER); break;
+      case MOVW: put_word(data, i.d, POINTER); break;
       case LDI: D = K; break;
 
       case ADD: D = add(f, D, R, 0); break;
@@ -368,8 +373,8 @@ static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_
       case LSR: D = shift_right(f, D, 0); break;
       case ROR: D = shift_right(f, D, f->c << 7); break;
       case SWAP: D = (uint8_t)(D << 4 | D >> 4); break;
-      case ADIW: s.takes = 2; add_word(f, &D, i->k, false); break;
-      case SBIW: s.takes = 2; add_word(f, &D, i->k, true); break;
+      case ADIW: s.takes = 2; add_word(f, &D, i.k, false); break;
+      case SBIW: s.takes = 2; add_word(f, &D, i.k, true); break;
       case MUL: s.takes = 2; multiply(f, data, D, R, 0); break;
       case MULS: s.takes = 2; multiply(f, data, (int8_t)D, (int8_t)R, 0); break;
       case MULSU: s.takes = 2; multiply(f, data, (int8_t)D, R, 0); break;
@@ -377,87 +382,98 @@ static ALWAYS_INLINE uint32_t run(avr_core *core, const avr_stops *stops, uint8_
       case FMULS: s.takes = 2; multiply(f, data, (int8_t)D, (int8_t)R, 1); break;
       case FMULSU: s.takes = 2; multiply(f, data, (int8_t)D, R, 1); break;
 
-      case LDD: s.takes = 2; D = load(core, &s, written, (uint16_t)(POINTER + i->k), 1); break;
+      case LDD: s.takes = 2; D = load(core, &s, written, displaced(data, i), 1); break;
       case LD_UP: s.takes = 2; load_moving(core, &s, written, i, POINTER, 1); break;
       case LD_DOWN: s.takes = 2; load_moving(core, &s, written, i, (uint16_t)(POINTER - 1u), 0); break;
-      case LDS: s.takes = 2; s.pc += 2; D = load(core, &s, written, (uint16_t)i->k, 1); break;
-      case STD: s.takes = 2; store(core, &s, written, (uint16_t)(POINTER + i->k), D, 1); break;
+      case LDS_RAM: s.takes = 2; s.next++; D = load_ram(core, &s, written, i.k); break;
+      case STS_RAM: s.takes = 2; s.next++; store_ram(core, &s, written, i.k, D); break;
+      case LDS: s.takes = 2; s.next++; D = load(core, &s, written, i.k, 1); break;
+      case STD: s.takes = 2; store(core, &s, written, displaced(data, i), D, 1); break;
       case ST_UP: s.takes = 2; store_moving(core, &s, written, i, POINTER, 1); break;
       case ST_DOWN: s.takes = 2; store_moving(core, &s, written, i, (uint16_t)(POINTER - 1u), 0); break;
-      case STS: s.takes = 2; s.pc += 2; store(core, &s, written, (uint16_t)i->k, D, 1); break;
+      case STS: s.takes = 2; s.next++; store(core, &s, written, i.k, D, 1); break;
       case PUSH: s.takes = 2; push(core, &s, written, D, 1); break;
       case POP: s.takes = 2; D = (uint8_t)pop(core, &s, written, 1); break;
       case LPM: s.takes = 3; D = program_byte(core, &s); break;
       case LPM_UP: s.takes = 3; D = program_byte(core, &s); put_word(data, Z, word_at(data, Z) + 1u); break;
 
-      case IN: D = load(core, &s, NULL, (uint16_t)i->k, 0); break;
+      case IN: D = load(core, &s, NULL, i.k, 0); break;
       case IN_SREG: D = data[REG_SREG] = all_flags(f); break;
-      case OUT: store(core, &s, NULL, (uint16_t)i->k, D, 0); break;
-      case BLD: D = (uint8_t)(f->t ? D | i->r : D & ~i->r); break;
-      case BST: f->t = (D & i->r) != 0; break;
+      case OUT: store(core, &s, NULL, i.k, D, 0); break;
+      case BLD: D = (uint8_t)(f->t ? D | i.k : D & ~i.k); break;
+      case BST: f->t = (D & i.k) != 0; break;
       case CLI: f->i = 0; break;
       case SEI:
         if (!f->i) let_interrupts_in(core, s.cycle + 1u);
         f->i = 1;
         break;
 
-      case JUMP: s.takes = 2; jump(core, &s, i->k); break;
-      case LONG_JUMP: s.takes = 3; jump(core, &s, i->k); break;
-      case IJMP: s.takes = 2; jump(core, &s, word_at(data, Z) * 2u); break;
-      case RCALL: s.takes = 3; push(core, &s, written, s.pc / 2u, 2); jump(core, &s, i->k); break;
-      case CALL: s.takes = 4; push(core, &s, written, s.pc / 2u + 1u, 2); jump(core, &s, i->k); break;
-      case ICALL: s.takes = 3; push(core, &s, written, s.pc / 2u, 2); jump(core, &s, word_at(data, Z) * 2u); break;
-      case RET: s.takes = 4; jump(core, &s, pop(core, &s, written, 2) * 2u); break;
+      case JUMP: s.takes = 2; jump(core, &s, i.k); break;
+      case LONG_JUMP: s.takes = 3; jump(core, &s, i.k); break;
+      case IJMP: s.takes = 2; jump(core, &s, word_at(data, Z)); break;
+      case RCALL: s.takes = 3; push(core, &s, written, address_of(core, s.next) / 2u, 2); jump(core, &s, i.k); break;
+      case CALL: s.takes = 4; push(core, &s, written, address_of(core, s.next) / 2u + 1u, 2); jump(core, &s, i.k); break;
+      case ICALL: s.takes = 3; push(core, &s, written, address_of(core, s.next) / 2u, 2); jump(core, &s, word_at(data, Z)); break;
+      case RET: s.takes = 4; jump(core, &s, pop(core, &s, written, 2)); break;
       case RETI:
         s.takes = 4;
         f->i = 1;
-        jump(core, &s, pop(core, &s, written, 2) * 2u);
+        jump(core, &s, pop(core, &s, written, 2));
         let_interrupts_in(core, s.cycle + 4u);
         break;
 
-      case BRCS: branch(&s, i, f->c); break;
-      case BRCC: branch(&s, i, !f->c); break;
-      case BREQ: branch(&s, i, !f->z); break;
-      case BRNE: branch(&s, i, f->z); break;
-      case BRMI: branch(&s, i, f->n & 0x80u); break;
-      case BRPL: branch(&s, i, !(f->n & 0x80u)); break;
-      case BRLT: branch(&s, i, f->s & 0x80u); break;
-      case BRGE: branch(&s, i, !(f->s & 0x80u)); break;
-      case BRBS: branch(&s, i, has_flag(core, i->r)); break;
-      case BRBC: branch(&s, i, !has_flag(core, i->r)); break;
-      case CPSE: skip(&s, i, D == R); break;
-      case SBRC: skip(&s, i, !(D & i->r)); break;
-      case SBRS: skip(&s, i, D & i->r); break;
-      case SBIC: skip(&s, i, !(load(core, &s, NULL, (uint16_t)i->k, 0) & i->r)); break;
-      case SBIS: skip(&s, i, load(core, &s, NULL, (uint16_t)i->k, 0) & i->r); break;
+      case BRCS: branch(core, &s, i, f->c); break;
+      case BRCC: branch(core, &s, i, !f->c); break;
+      case BREQ: branch(core, &s, i, !f->z); break;
+      case BRNE: branch(core, &s, i, f->z); break;
+      case BRMI: branch(core, &s, i, f->n & 0x80u); break;
+      case BRPL: branch(core, &s, i, !(f->n & 0x80u)); break;
+      case BRLT: branch(core, &s, i, f->s & 0x80u); break;
+      case BRGE: branch(core, &s, i, !(f->s & 0x80u)); break;
+      case BRBS: branch(core, &s, i, has_flag(core, i.d)); break;
+      case BRBC: branch(core, &s, i, !has_flag(core, i.d)); break;
+      case CPSE: skip(&s, D == R); break;
+      case SBRC: skip(&s, !(D & i.k)); break;
+      case SBRS: skip(&s, D & i.k); break;
+      case SBIC: skip(&s, !(load(core, &s, NULL, i.k, 0) & i.d)); break;
+      case SBIS: skip(&s, load(core, &s, NULL, i.k, 0) & i.d); break;
 
       case OUTSIDE:
-        s.pc = s.at;
+        s.next = s.at;
         s.takes = 0;
         avr_stop(core);
         break;
-      default: /* what is rare, or changes what the interpreter keeps */
-        s.takes = cycles_of_rare(i->kind);
+      case OUT_SREG:
+        hand_over(core, &s);
+        store_flags(core, D, s.cycle + 1u);
+        take_back(core, &s);
+        break;
+      case SBI: case CBI: case OUT_SPL: case BSET: case BCLR:
+      case SPM: case SLEEP: case WDR: case ERASED: case INVALID:
+        s.takes = cycles_of_rare(i.kind);
         hand_over(core, &s);
         do_rare(core, i, s.takes);
         take_back(core, &s);
-        if (i->kind == INVALID) s.pc = s.at;
-        if (i->kind == ERASED) skip(&s, i, D & i->r);
+        if (i.kind == INVALID) s.next = s.at;
+        if (i.kind == ERASED) skip(&s, D & i.k);
+        break;
+      default: __builtin_unreachable();
     }
     /* clang-format on */
     s.cycle += s.takes;
-    if (covered && s.at < AVR_FLASH_SIZE) covered[s.at / 2u] |= (uint8_t)(s.pc == s.at + 2u ? 1u : 2u);
+    const uint32_t at = address_of(core, s.at) / 2u, next = address_of(core, s.next) / 2u;
+    if (covered && at < AVR_FLASH_SIZE / 2u) covered[at] |= (uint8_t)(next == at + 1u ? 1u : 2u);
     if (stops) {
       if (s.moves_stack) {
         const uint16_t above = (uint16_t)(avr_stack(core) - stops->lowest);
         if (above > (uint16_t)(stops->highest - stops->lowest)) break;
       }
-      if (s.pc >= AVR_FLASH_SIZE || stops->marked[s.pc / 2u]) break;
+      if (next >= AVR_FLASH_SIZE / 2u || stops->marked[next]) break;
     }
   } while (s.cycle < core->until);
-  core->pc = s.pc;
+  core->pc = address_of(core, s.next);
   core->cycle = s.cycle;
-  return s.at;
+  return address_of(core, s.at);
 }
 
 /* By themselves: what nobody asked for costs nothing. */
@@ -474,7 +490,6 @@ static NOT_INLINE uint32_t run_covered(avr_core *core, const avr_stops *stops) {
 
 uint32_t avr_run(avr_core *core, uint64_t until, const avr_stops *stops) {
   core->until = until;
-  if (core->pc >= AVR_FLASH_SIZE) return core->pc;
   if (core->covered) return run_covered(core, stops);
   if (core->written) return run_checked(core, stops);
   return stops ? run_stopping(core, stops) : run(core, NULL, NULL, NULL);
@@ -483,45 +498,20 @@ uint32_t avr_run(avr_core *core, uint64_t until, const avr_stops *stops) {
 /* ---- looked at before it is executed ---- */
 
 avr_access avr_next_access(const avr_core *core) {
-  if (core->pc >= AVR_FLASH_SIZE) return (avr_access){0, 0, false};
-  const avr_instruction *i = &core->code[core->pc / 2u];
-  const uint16_t stack = avr_stack(core), pointer = i->r < AVR_IO_BEGIN ? word_at(core->data, i->r) : 0;
-  switch (i->kind) {
-    case LDD:
-    case STD:
-      return (avr_access){(uint16_t)(pointer + i->k), 1, i->kind == STD};
-    case LD_UP:
-    case ST_UP:
-      return (avr_access){pointer, 1, i->kind == ST_UP};
-    case LD_DOWN:
-    case ST_DOWN:
-      return (avr_access){(uint16_t)(pointer - 1u), 1, i->kind == ST_DOWN};
-    case LDS:
-    case IN:
-    case SBIC:
-    case SBIS:
-      return (avr_access){(uint16_t)i->k, 1, false};
-    case STS:
-    case OUT:
-    case OUT_SREG:
-    case OUT_SPL:
-    case SBI:
-    case CBI:
-      return (avr_access){(uint16_t)i->k, 1, true};
-    case IN_SREG:
-      return (avr_access){REG_SREG, 1, false};
-    case PUSH:
-      return (avr_access){stack, 1, true};
-    case POP:
-      return (avr_access){(uint16_t)(stack + 1u), 1, false};
-    case RCALL:
-    case CALL:
-    case ICALL:
-      return (avr_access){(uint16_t)(stack - 1u), 2, true};
-    case RET:
-    case RETI:
-      return (avr_access){(uint16_t)(stack + 1u), 2, false};
-    default:
-      return (avr_access){0, 0, false};
+  const avr_instruction i = core->code[core->pc / 2u];
+  const uint16_t stack = avr_stack(core), pointer = i.k < AVR_IO_BEGIN ? word_at(core->data, i.k) : 0;
+  /* clang-format off */
+  switch (i.kind) {
+    case LDD: case STD: return (avr_access){displaced(core->data, i), 1, i.kind == STD};
+    case LD_UP: case ST_UP: return (avr_access){pointer, 1, i.kind == ST_UP};
+    case LD_DOWN: case ST_DOWN: return (avr_access){(uint16_t)(pointer - 1u), 1, i.kind == ST_DOWN};
+    case LDS: case LDS_RAM: case IN: case IN_SREG: case SBIC: case SBIS: return (avr_access){i.k, 1, false};
+    case STS: case STS_RAM: case OUT: case OUT_SREG: case OUT_SPL: case SBI: case CBI: return (avr_access){i.k, 1, true};
+    case PUSH: return (avr_access){stack, 1, true};
+    case POP: return (avr_access){(uint16_t)(stack + 1u), 1, false};
+    case RCALL: case CALL: case ICALL: return (avr_access){(uint16_t)(stack - 1u), 2, true};
+    case RET: case RETI: return (avr_access){(uint16_t)(stack + 1u), 2, false};
+    default: return (avr_access){0, 0, false};
   }
+  /* clang-format on */
 }
