@@ -199,7 +199,7 @@ check-generated:
 .PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware ready-wheels
 ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
 ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done build/.done-sketches
-ready-bench: ready-test build/mcap-core/.done build/simavr/.done
+ready-bench: ready-test build/.done-system-bench build/mcap-core/.done
 ready-soak: ready-bench ready-wheels build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
@@ -251,10 +251,6 @@ $(VENV)/.done-wheels: $(DECLARED) | $(VENV)/.done-boebot
 build/wheelhouse/.done: $(DECLARED) | $(VENV)/.done-test
 	@$(PYTHON_VENV) -m pip download --quiet --only-binary :all: --dest build/wheelhouse --constraint requirements.lock \
 		$$($(PYTHON_VENV) tools/requirements.py run hil)
-	@touch $@
-
-build/simavr/.done: tools/fetch_simavr.py build/.done-system-run
-	@$$(tools/find_python.sh) tools/fetch_simavr.py
 	@touch $@
 
 # Another program's reader of records (host/tests/record/test_blocks.py), with the hashes of its lock file.

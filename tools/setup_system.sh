@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes sure that the tools which are not Python packages are there: tools/setup_system.sh run|test|check|soak ...
+# Makes sure that the tools which are not Python packages are there: tools/setup_system.sh run|test|check|bench|soak ...
 # On Debian and Ubuntu it installs what is missing, by package name, as root or with a sudo that asks nothing; otherwise
 # it prints the one command to type. Does nothing where nothing is missing.
 set -eu
@@ -45,11 +45,14 @@ for purpose in "$@"; do
       need clang has clang
       need cppcheck has cppcheck
       ;;
+    bench)
+      need "libsimavr-dev libelf-dev" test -e /usr/include/simavr/sim_avr.h
+      ;;
     soak)
       need qemu-system-misc has qemu-system-avr
       ;;
     *)
-      echo "setup_system.sh: unknown purpose '$purpose'; known: run test check soak" >&2
+      echo "setup_system.sh: unknown purpose '$purpose'; known: run test check bench soak" >&2
       exit 2
       ;;
   esac

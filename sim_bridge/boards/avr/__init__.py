@@ -1,7 +1,4 @@
-"""The emulated ATmega328P: `create` makes a board from an image.
-
-The extension behind it contains simavr and is GPL-3.0-or-later; this module imports without it.
-"""
+"""The emulated ATmega328P: `create` makes a board from an image."""
 
 from __future__ import annotations
 

@@ -21,18 +21,6 @@ from boebot.arenas import load_arena
 from tools.tests.bench import scene
 
 ROOT = Path(__file__).resolve().parents[3]
-LEFT_OUT = ("run_avr", "sim_dwarf")  # simavr's command line
-# What simavr's makefile would find out.
-SIMAVR_HEADERS = {
-    "sim_core_config.h": '#define CONFIG_SIMAVR_VERSION "crate"\n#define CONFIG_MEGA328 1\n',
-    "sim_core_decl.h": """#include "sim_core_config.h"
-extern avr_kind_t mega328;
-extern avr_kind_t *avr_kind[];
-#ifdef AVR_KIND_DECL
-avr_kind_t *avr_kind[] = {&mega328, NULL};
-#endif
-""",
-}
 TAKES = 0.2  # s that a measurement takes, about
 INFRARED = {"number": 9, "angle_range": 2 * max(scene.ANGLES) + scene.OPENING, "range_max": scene.INFRARED_RANGE}
 LASER = {
@@ -43,20 +31,13 @@ LASER = {
 
 
 def plain_simavr(seconds: float = 10.0) -> float:
-    """The firmware image in simavr as published, board alone (× real time)."""
-    simavr = next((ROOT / "build/simavr").glob("*/vendor/simavr/simavr"))
-    configuration = ROOT / "build/simavr/configuration"
-    configuration.mkdir(exist_ok=True)
-    for name, text in SIMAVR_HEADERS.items():
-        (configuration / name).write_text(text, encoding="ascii")
+    """The firmware image in Debian's simavr, board alone (× real time)."""
     program = ROOT / "build" / "plain_simavr"
     if not program.exists():
-        sources = [path for path in (simavr / "sim").glob("*.c") if path.stem not in LEFT_OUT]
-        sources += [simavr / "cores/sim_mega328.c", simavr / "cores/sim_megax8.c"]
-        includes = [f"-I{folder}" for folder in (simavr / "sim", simavr / "cores", configuration)]
-        command = ["cc", "-O2", "-w", *includes, str(ROOT / "tools/tests/bench/plain_simavr.c")]
-        command += [*map(str, sources), "-o", str(program), "-lutil", "-lpthread"]
-        subprocess.run(command, check=True)
+        source = str(ROOT / "tools/tests/bench/plain_simavr.c")
+        subprocess.run(
+            ["cc", "-O2", "-I/usr/include/simavr", source, "-o", str(program), "-lsimavr", "-lelf"], check=True
+        )
     image = resources.folder("images") / "shieldbot.hex"
     done = subprocess.run([str(program), str(image), str(seconds)], check=True, capture_output=True, text=True)
     return seconds / float(done.stdout.split()[-1])

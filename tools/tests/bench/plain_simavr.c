@@ -1,9 +1,9 @@
-/* plain_simavr.c: the firmware image in simavr as it is published, with its own run loop, nothing on its pins and nobody
+/* plain_simavr.c: the firmware image in Debian's simavr (libsimavr-dev), with its own run loop, nothing on its pins and nobody
  * on its line: what our emulated board is measured against.
  *
  *   plain_simavr IMAGE.hex SECONDS      prints the wall-clock seconds of a run of SECONDS board seconds
  *
- * SPDX-License-Identifier: GPL-3.0-or-later (it links simavr) */
+ * A program made of this and of simavr is under simavr's licence, GPL-3.0-or-later; it is part of nothing that is installed. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>

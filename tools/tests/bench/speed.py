@@ -22,7 +22,7 @@ def times_real_time(on: str, seconds: float, period: float) -> float:
     "AVR image in the closed loop, wander at 50 ms, IR at 20 Hz",
     "× real time",
     times_at_least=0.4,
-    peers=[Peer("simavr as published, board alone", peers.plain_simavr)],
+    peers=[Peer("Debian's simavr, board alone", peers.plain_simavr)],
 )
 def avr_closed_loop() -> float:
     return times_real_time("avr", 30.0, 0.05)
