@@ -208,12 +208,11 @@ static void write_mask(avr_board *b, uint16_t address, uint8_t value, uint64_t e
   timer_plan(t);
 }
 
-/* PSRSYNC and PSRASY start the prescalers anew; TSM, which would hold them, is not built. */
+/* PSRSYNC, of timers 0 and 1, and PSRASY start the prescalers anew; TSM, which would hold them, is not built. */
 static void write_prescaler_reset(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
-  for (int i = 0; i < 3; i++) {
-    if (!(value & (i == 2 ? 2 : 1))) continue;
-    timer_bring_up(&b->timer[i], end);
-    b->timer_base[i == 2] = end;
+  for (int i = 0; i < 3; i++) timer_bring_up(&b->timer[i], end);
+  for (int asynchronous = 0; asynchronous < 2; asynchronous++) {
+    if (value >> asynchronous & 1) b->timer_base[asynchronous] = end;
   }
   for (int i = 0; i < 3; i++) timer_plan(&b->timer[i]);
 }

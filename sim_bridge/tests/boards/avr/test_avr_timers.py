@@ -76,6 +76,47 @@ def test_compare_edges_with_prescaler_keep_its_phase(clock_select: int, divider:
     assert len(edges) >= 9
 
 
+def test_a_reset_of_the_prescaler_starts_a_count_of_each_timer_that_it_serves_anew() -> None:
+    machine = Machine(
+        """
+        main:
+          sbi DDRD, 6           ; timers 0 and 1 toggle pins 6 and 9 every 10 counts of 64 cycles
+          sbi DDRB, 1
+          sbi DDRB, 5
+          ldi r24, 9
+          out OCR0A, r24
+          sts OCR1AH, r1
+          sts OCR1AL, r24
+          ldi r24, 1 << COM0A0 | 1 << WGM01
+          out TCCR0A, r24
+          ldi r24, 1 << COM1A0
+          sts TCCR1A, r24
+          ldi r24, 3
+          out TCCR0B, r24
+          ldi r24, 1 << WGM12 | 3
+          sts TCCR1B, r24
+          ldi r24, 250
+        1: dec r24
+          brne 1b
+          ldi r24, 1 << PSRSYNC
+          out GTCCR, r24
+          sbi PINB, 5
+        2: rjmp 2b
+        """
+    )
+    machine.board.run(5000)
+    log = machine.board.log()
+    started = edges_of(log, 13)[1] - 2  # SBI behind OUT
+    for pin in (6, 9):
+        before, behind = (
+            [edge for edge in edges_of(log, pin)[1:] if (edge < started) == is_so] for is_so in (True, False)
+        )
+        assert before and {edge % 64 for edge in before} == {0}
+        assert {(edge - started) % 64 for edge in behind} == {0}
+        assert 10 * 64 < behind[0] - before[-1] < 11 * 64
+        assert set(gaps(behind)) == {10 * 64}
+
+
 def test_toggle_interrupt_makes_an_even_carrier() -> None:
     # Timer 2 as the firmware uses it for infrared: clear on match, a short interrupt that toggles an output.
     machine = Machine(
