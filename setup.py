@@ -55,7 +55,7 @@ TARGET = os.environ.get("BOEBOT_TARGET", "")
 WINDOWS, MACOS = "windows" in TARGET, "macos" in TARGET
 MODULE_SUFFIX = ".pyd" if WINDOWS else ".abi3.so"
 LIBRARY_SUFFIX = ".dll" if WINDOWS else ".dylib" if MACOS else ".so"
-GCC_ONLY = "-fvect-cost-model="  # wheels are compiled by clang
+GCC_ONLY = ("-fvect-cost-model=", "-fno-gcse", "-fno-tree-")  # wheels are compiled by clang
 
 CFFI_MODULES = [
     f"{script}:ffi"

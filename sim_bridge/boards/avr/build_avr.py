@@ -10,7 +10,8 @@ from cffi import FFI
 ROOT = Path(__file__).resolve().parents[3]
 HERE = Path("sim_bridge/boards/avr")
 BOARDS = HERE.parent
-COMPILER_FLAGS = ["-std=gnu11", "-fvisibility=hidden", "-O3", "-fno-tree-slp-vectorize"]
+# The last two keep gcc from undoing what makes the interpreter fast (core/avr_execute.c).
+COMPILER_FLAGS = ["-std=gnu11", "-fvisibility=hidden", "-O3", "-fno-gcse", "-fno-tree-slp-vectorize"]
 
 # What Python may call (what is between their marks).
 HEADERS = ("board.h", "avr/avr_board.h", "avr/avr_spans.h", "avr/avr_debug.h", "avr/avr_checks.h")

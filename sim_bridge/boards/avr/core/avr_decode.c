@@ -167,6 +167,7 @@ void avr_core_flash_changed(avr_core *core, uint32_t address, uint32_t bytes) {
 }
 
 bool avr_core_create(avr_core *core) {
+  static const avr_owner_calls NO_CALLS = {0};
   memset(core, 0, sizeof *core);
   core->flash = malloc(AVR_FLASH_SIZE);
   core->code = calloc(ADDRESSES, sizeof *core->code); /* OUTSIDE */
@@ -178,6 +179,7 @@ bool avr_core_create(avr_core *core) {
   core->code_end = AVR_FLASH_SIZE;
   core->stack_floor = AVR_RAM_BEGIN;
   core->next_due = UINT64_MAX;
+  core->calls = &NO_CALLS;
   avr_core_flash_changed(core, 0, AVR_FLASH_SIZE);
   avr_core_reset(core, 0);
   return true;
