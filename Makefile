@@ -23,6 +23,9 @@ SERVO := build/cache/libraries/Servo/Servo.h
 # The firmware for each pin map, and the boot loader.
 ENVIRONMENTS := $(shell sed -n 's/^default_envs = //p' platformio.ini | tr -d ,) bootloader
 IMAGES := $(ENVIRONMENTS:%=build/images/%.elf)
+# The one that `make run` runs; the others are built when something needs them all.
+SHOWN := build/images/shieldbot.elf
+BUILD_SHOWN := tools/pio run --silent -e shieldbot
 BUILD_IMAGES := tools/pio run --silent $(addprefix -e ,$(ENVIRONMENTS))
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -73,7 +76,7 @@ bench:
 	@$(PYTHON_VENV) -m tools.tests.bench $(if $(ONLY),--only "$(ONLY)") $(if $(PAGE),--page $(PAGE))
 
 experiments:
-	@$(SIDE_BY_SIDE) ready-run
+	@$(SIDE_BY_SIDE) ready-kit
 	@$(VENV)/bin/boebot experiment --all --out build/experiments
 
 SECONDS ?= 3600
@@ -134,7 +137,7 @@ pictures:
 	@$(MAKE) --no-print-directory timing
 
 timing:
-	@$(SIDE_BY_SIDE) ready-run
+	@$(SIDE_BY_SIDE) ready-kit
 	@$(VENV)/bin/boebot timing --out build/timing >build/timing.log
 	@cp build/timing/timing.svg docs/images/timing.svg
 	@$(PYTHON_VENV) -m tools.shown_output docs/how-to/timing.md docs/reference/timing.md
@@ -142,7 +145,7 @@ timing:
 firmware: ready-firmware
 
 wheel:
-	@$(SIDE_BY_SIDE) ready-run
+	@$(SIDE_BY_SIDE) ready-kit
 	@rm -rf build/bdist.*
 	@find build/lib.* -type f -not -name '*.so' -delete # the wheel links the same objects as the checkout
 	@$(PYTHON_VENV) -m pip wheel --quiet --no-index --no-deps --no-build-isolation --wheel-dir dist .
@@ -196,14 +199,15 @@ check-generated:
 
 # ---- steps ---------------------------------------------------------------------------------------------------------
 
-.PHONY: ready-run ready-test ready-bench ready-soak ready-check ready-firmware ready-wheels
-ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(IMAGES)
-ready-test: ready-run build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done build/.done-sketches
+.PHONY: ready-run ready-kit ready-test ready-bench ready-soak ready-check ready-firmware ready-wheels
+ready-run: $(GENERATED) $(VENV)/.done-boebot build/.done-core $(ARENA_SCHEMA) $(SHOWN)
+ready-kit: ready-run $(IMAGES)
+ready-test: ready-kit build/.done-system-test $(VENV)/.done-test build/wheelhouse/.done build/.done-sketches
 ready-bench: ready-test build/.done-system-bench build/mcap-core/.done
 ready-soak: ready-bench ready-wheels build/.done-system-soak
 ready-check: $(GENERATED) build/.done-system-check $(VENV)/.done-check build/platformio-core/appstate.json
 ready-firmware: $(IMAGES)
-ready-wheels: ready-run $(VENV)/.done-wheels
+ready-wheels: ready-kit $(VENV)/.done-wheels
 
 build/.done-system-%: tools/setup_system.sh tools/find_python.sh
 	@mkdir -p build
@@ -288,9 +292,15 @@ build/.done-generated: $(GENERATED_FROM) build/.done-system-run
 $(sort $(GENERATED) $(filter firmware/src/generated/%,$(FIRMWARE_SOURCES))): build/.done-generated
 	@test -e $@ || $$(tools/find_python.sh) protocol/generate.py
 
-build/.done-images: platformio.ini tools/pio build/platformio-core/appstate.json $(FIRMWARE_SOURCES) $(wildcard firmware/bootloader/*.c)
-	@echo "Building the firmware images"
+build/.done-shown: platformio.ini tools/pio build/platformio-core/appstate.json $(FIRMWARE_SOURCES)
+	@echo "Building a firmware image"
+	@$(BUILD_SHOWN)
+	@touch $@
+build/.done-images: build/.done-shown $(wildcard firmware/bootloader/*.c)
+	@echo "Building all firmware images"
 	@$(BUILD_IMAGES)
 	@touch $@
-$(IMAGES): build/.done-images
+$(SHOWN): build/.done-shown
+	@test -e $@ || $(BUILD_SHOWN)
+$(filter-out $(SHOWN),$(IMAGES)): build/.done-images
 	@test -e $@ || $(BUILD_IMAGES)

@@ -135,9 +135,10 @@ class BuildExt(build_ext):
             changed = max(newest_header, Path(source).stat().st_mtime)
             if all(Path(name).exists() and Path(name).stat().st_mtime > changed for name in objects):
                 return objects
-            if SANITIZE and not source.startswith(self.build_temp):  # what cffi makes lies there
-                options = {**options, "extra_postargs": [*(options.get("extra_postargs") or []), *WARNINGS]}
-            return compile_some([source], output_dir=output_dir, **options)
+            by_cffi = source.startswith(self.build_temp)  # it hands arguments over: long, and quick as it stands
+            more = ["-O1"] if by_cffi else WARNINGS if SANITIZE else []
+            flags = [*(options.get("extra_postargs") or []), *more]
+            return compile_some([source], output_dir=output_dir, **{**options, "extra_postargs": flags})
 
         def compile_all(sources: list[str], output_dir: str, **options: Any) -> list[str]:
             with ThreadPoolExecutor(os.cpu_count()) as pool:
