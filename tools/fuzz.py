@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import random
 import resource
 import subprocess
 import sys
@@ -117,6 +118,12 @@ FUZZERS = {
         "", (HERE / "link_fuzzer.cpp", TEST / "host_frame.c", *firmware_sources()), (f"-I{TEST}",), 400, LINK
     ),
     "core": Fuzzer("", (WORLD.with_name("core_fuzzer.c"), *sorted(CORE.glob("*.c"))), (f"-I{CORE}",), 400, PROGRAMS),
+    "board": Fuzzer(
+        "",
+        (WORLD.with_name("board_fuzzer.c"), *sorted(CORE.parent.rglob("[!_]*.c"))),
+        (f"-I{CORE.parent}", f"-I{CORE.parents[1]}"),
+        seeds=tuple(tuple(random.Random(number).randbytes(160)) for number in range(30)),
+    ),
     "vehicles": Fuzzer("", (WORLD, *world_sources()), ("-fsanitize=float-cast-overflow",), 200, WORLDS),
 }
 
