@@ -7,13 +7,12 @@ are skipped, and so is whatever would move its motors, unless `--motors` (`--uno
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
 from boebot.boards import is_live
 from boebot.errors import BoebotError
 from boebot_hil.rig import Rig
+from sim_bridge.bench.uno import Uno, Wanted, open_uno
 from sim_bridge.bench.waiting import Cannot
 
 EMULATED = "only an emulated board gives its pins, its reset, its EEPROM"
@@ -34,8 +33,9 @@ def boards(config: pytest.Config) -> list[str]:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    if "board_url" in metafunc.fixturenames:
-        metafunc.parametrize("board_url", boards(metafunc.config), scope="session")
+    """On several given boards the plugin runs them."""
+    if "uno" in metafunc.fixturenames and not metafunc.config.getoption("--uno-on"):
+        metafunc.parametrize("uno", boards(metafunc.config), indirect=True)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -46,8 +46,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """
     for url in filter(is_live, boards(config)) if items and not config.option.collectonly else ():
         try:
-            with Rig.open(url) as rig:
-                rig.next_hello(within_s=START_S)
+            with open_uno(url, Wanted(robot="shieldbot", motors=False)) as uno:
+                Rig(uno).next_hello(within_s=START_S)
         except AssertionError:
             firmware = f"expected its firmware: boebot flash --on {url}"
             raise pytest.UsageError(f"the board at {url} does not speak the kit's protocol; {firmware}") from None
@@ -58,13 +58,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Raises Cannot where only an emulated board can be asked, and the board under test is another."""
     params: dict[str, str] = item.callspec.params if hasattr(item, "callspec") else {}
-    if item.get_closest_marker("emulated") and is_live(params.get("board_url", boards(item.config)[0])):
+    if item.get_closest_marker("emulated") and is_live(params.get("uno", boards(item.config)[0])):
         raise Cannot(EMULATED)
 
 
 @pytest.fixture
-def rig(board_url: str) -> Iterator[Rig]:
+def rig(uno: Uno) -> Rig:
     """The board, greeted."""
-    with Rig.open(board_url) as rig:
-        rig.start()
-        yield rig
+    rig = Rig(uno)
+    rig.start()
+    return rig

@@ -1,6 +1,6 @@
-"""A test rig: one board, its serial line and, where it is emulated, its pins.
+"""One raw end of the protocol at an Uno under test: it sends and hears frames, also wrong ones.
 
-Every wait is in the board's own time and says what it waits for.
+All else of the board is the fixture `uno`'s. Every wait is in the board's own time and says what it waits for.
 """
 
 from __future__ import annotations
@@ -9,13 +9,11 @@ import contextlib
 from collections.abc import Callable
 from typing import Any, ClassVar, TypeVar
 
-import numpy as np
-
-from boebot.boards import BoardRequest, BoardSession, open_board
-from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import frame, messages
-from sim_bridge.bench.pins import pulses_of
+from boebot.link.transport import Transport
+from sim_bridge.bench.uno import Uno
 from sim_bridge.bench.waiting import Cannot
+from sim_bridge.pins import BoardPins
 
 _M = TypeVar("_M")  # a message
 
@@ -40,13 +38,12 @@ class Rig:
     may_move: ClassVar[bool] = False
     """Whether the motors of a board behind a port may turn."""
 
-    def __init__(self, session: BoardSession) -> None:
-        self.session = session
-        self.transport = session.transport
+    def __init__(self, uno: Uno) -> None:
+        self.uno = uno
+        self._taken = 0  # of the bytes that came
         self.decoder = frame.Decoder(frame.NO_SESSION)
         self.telemetry: list[messages.Telemetry] = []
         self.answers: list[Any] = []
-        self.received = bytearray()
         self.events: list[messages.Event] = []
         self.heard: list[Any] = []  # all messages
         self.hello: messages.Hello | None = None
@@ -57,24 +54,15 @@ class Rig:
         self._number = 0
         self._probed = 0.0
 
-    @classmethod
-    def open(cls, url: str, robot: str | RobotDescription = "shieldbot", **request: Any) -> Rig:
-        """A rig around the board at `url`; `request`: what else a BoardRequest has, by default an empty field without
-        noise."""
-        described = load_robot(robot) if isinstance(robot, str) else robot
-        asked: dict[str, Any] = {"arena": "empty", "noise": False} | request
-        return cls(open_board(url, BoardRequest(robot=described, **asked)))
-
-    def __enter__(self) -> Rig:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.session.close()
+    @property
+    def board(self) -> BoardPins:
+        """What lies below the fixture's pins. Raises Cannot where the board is behind a port."""
+        return self.uno.bench("pins").pins
 
     @property
-    def board(self) -> Any:
-        """The emulated board's pins."""
-        return self.session.board  # type: ignore[attr-defined]
+    def transport(self) -> Transport:
+        """The raw line; its clock is the board's."""
+        return self.uno.serial.line.transport
 
     # ---- line --------------------------------------------------------------------------------------------------------
 
@@ -108,12 +96,13 @@ class Rig:
             if self.alive and self.seed and self.transport.now() >= self._probed + PROBE_S:
                 self._probed = self.transport.now()
                 self.send(messages.ClockProbe(0))
-            wait = min(left, PROBE_S) if self.alive else left
-            self._take(self.transport.read(wait, wait))
+            self.uno.run(min(left, PROBE_S) if self.alive else left)
+            self._take()
         return self.telemetry[before:]
 
-    def _take(self, data: bytes) -> None:
-        self.received += data
+    def _take(self) -> None:
+        heard = self.uno.serial.heard
+        data, self._taken = bytes(heard[self._taken :]), len(heard)
         for message_id, _, payload in self.decoder.feed(data):
             message = messages.MESSAGES[message_id].unpack(payload)
             self.heard.append(message)
@@ -266,10 +255,3 @@ class Rig:
     def stop(self) -> None:
         """Stops the motors until they are armed again."""
         self.ask(messages.Stop(7), messages.Stopped)
-
-    # ---- pins --------------------------------------------------------------------------------------------------------
-
-    def pulses(self, pin: int) -> np.ndarray:
-        """Start and width, in cycles, of every high pulse that the board gave on `pin`: shape (n, 2)."""
-        log = self.board.pin_log()
-        return pulses_of(log[log["pin"] == pin])

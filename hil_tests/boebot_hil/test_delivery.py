@@ -10,6 +10,9 @@ from boebot.link import messages
 from boebot.link.messages import AnswerStatus, Devices, EventKind, Latch
 from boebot.link.transport import BaudSelectable
 from boebot_hil.rig import CYCLES_PER_S, HOST_NONCE, TICK_S, Rig
+from sim_bridge.bench.uno import Uno
+
+pytestmark = pytest.mark.uno(robot="shieldbot", motors=False)
 
 WHISKER_LEFT, BUZZER = 5, 4
 FRAME_BYTES = messages.Telemetry.LENGTH + 8
@@ -76,7 +79,7 @@ def test_touches_without_a_session_and_what_waited_before_a_reset_are_forgotten(
     rig.send(messages.Close(rig.seed))
     rig.listen(0.05)
     for level in (0, 1):
-        rig.board.drive(WHISKER_LEFT, level)
+        rig.uno.pin(WHISKER_LEFT).drive(level)
         rig.listen(0.1)
     rig.events.clear()
     rig.acknowledges = True
@@ -88,7 +91,7 @@ def test_touches_without_a_session_and_what_waited_before_a_reset_are_forgotten(
     rig.listen(0.1)
     rig.acknowledges = False
     rig.stop()
-    rig.board.reset("external")
+    rig.uno.reset("external")
     rig.listen(0.5)
     rig.events.clear()
     rig.acknowledges = True
@@ -121,7 +124,7 @@ def test_while_a_save_goes_on_parameters_are_busy(rig: Rig) -> None:
         assert (answer.status, answer.value) == (AnswerStatus.BUSY, 0), kind
     assert rig.request(messages.GetParameter, track_width).value == 12_345
     rig.listen(0.5)
-    rig.board.reset("external")
+    rig.uno.reset("external")
     assert rig.start(arm=False).parameters_saved == 1
     assert rig.request(messages.GetParameter, track_width).value == 12_345
 
@@ -135,7 +138,7 @@ def test_while_a_save_goes_on_parameters_are_busy(rig: Rig) -> None:
 def test_telemetry_fills_no_more_than_half_of_the_line(rig: Rig, baud: int) -> None:
     rig.set("baud_rate", baud // 100)
     assert rig.request(messages.SaveParameters, within_s=1.0).status == AnswerStatus.OK
-    rig.board.reset("external")
+    rig.uno.reset("external")
     assert isinstance(rig.transport, BaudSelectable)
     rig.transport.set_baud(baud)
     hello = rig.start(arm=False)
@@ -149,38 +152,41 @@ def test_telemetry_fills_no_more_than_half_of_the_line(rig: Rig, baud: int) -> N
 
 @pytest.mark.emulated
 @pytest.mark.promise("`devices_telemetry` comes every `devices_period` ticks while one of its devices")
-def test_slow_devices_are_told_every_devices_period(board_url: str) -> None:
-    with Rig.open(board_url, robot="boebot") as rig:
-        rig.start(arm=False)
-        for period in (2, 5, 20):
-            rig.set("devices_period", period)
-            rig.listen(0.3)
-            begun = len(rig.heard)
-            rig.listen(1.0)
-            ticks = [message.tick for message in rig.heard[begun:] if isinstance(message, messages.DevicesTelemetry)]
-            assert {after - before for before, after in itertools.pairwise(ticks)} == {period}
-        rig.set("devices", Devices.SERVO)
-        rig.listen(0.1)
+@pytest.mark.uno(robot="boebot")
+def test_slow_devices_are_told_every_devices_period(uno: Uno) -> None:
+    rig = Rig(uno)
+    rig.start(arm=False)
+    for period in (2, 5, 20):
+        rig.set("devices_period", period)
+        rig.listen(0.3)
         begun = len(rig.heard)
-        rig.listen(0.5)
-        assert not [message for message in rig.heard[begun:] if isinstance(message, messages.DevicesTelemetry)]
+        rig.listen(1.0)
+        ticks = [message.tick for message in rig.heard[begun:] if isinstance(message, messages.DevicesTelemetry)]
+        assert {after - before for before, after in itertools.pairwise(ticks)} == {period}
+    rig.set("devices", Devices.SERVO)
+    rig.listen(0.1)
+    begun = len(rig.heard)
+    rig.listen(0.5)
+    assert not [message for message in rig.heard[begun:] if isinstance(message, messages.DevicesTelemetry)]
 
 
 @pytest.mark.emulated
 @pytest.mark.promise("A tone that comes twice has the same token and sounds once; a session begins with token 0")
-def test_a_tone_that_comes_twice_sounds_once(board_url: str) -> None:
-    with Rig.open(board_url, robot="boebot") as rig:
-        rig.start(arm=False)
-        assert rig.devices().buzzer_token == 0
-        for _ in range(5):
-            rig.send(messages.Buzzer(1000, 20, 9))
-            rig.listen(0.1)
-        pulses = rig.pulses(BUZZER)
-        assert 0.18 <= (pulses[-1].sum() - pulses[0, 0]) / CYCLES_PER_S <= 0.20
-        assert rig.devices().buzzer_token == 9
-        rig.send(messages.Close(rig.seed))
-        rig.start(arm=False)
-        assert rig.devices().buzzer_token == 0
+@pytest.mark.uno(robot="boebot")
+def test_a_tone_that_comes_twice_sounds_once(uno: Uno) -> None:
+    rig = Rig(uno)
+    rig.start(arm=False)
+    assert rig.devices().buzzer_token == 0
+    begun = rig.board.cycle
+    for _ in range(5):
+        rig.send(messages.Buzzer(1000, 20, 9))
+        rig.listen(0.1)
+    pulses = rig.uno.pin(BUZZER).all_pulses(begun)
+    assert 0.18 <= (pulses[-1].sum() - pulses[0, 0]) / CYCLES_PER_S <= 0.20
+    assert rig.devices().buzzer_token == 9
+    rig.send(messages.Close(rig.seed))
+    rig.start(arm=False)
+    assert rig.devices().buzzer_token == 0
 
 
 @pytest.mark.promise("one event under way at a time, never changes it, and sends it again after `retry_time`")

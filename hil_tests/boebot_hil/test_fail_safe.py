@@ -7,6 +7,9 @@ import pytest
 from boebot.link import messages
 from boebot.link.messages import AnswerStatus, Latch, Status
 from boebot_hil.rig import TICK_S, Rig
+from sim_bridge.bench.uno import Uno
+
+pytestmark = pytest.mark.uno(robot="shieldbot", motors=False)
 
 LEFT, TURRET, BUZZER = 13, 11, 4
 FULL, HALF = 27_200, 25_600  # pulses of the left servo, in 1/16 us
@@ -86,26 +89,27 @@ def test_a_low_supply_latches_and_keeps_the_motors_from_being_armed(rig: Rig) ->
 )
 @pytest.mark.promise("While latched `turret` is refused, unless it releases; `buzzer` is not: it moves nothing")
 @pytest.mark.parametrize("how", ["stop", "dead-man", "close"])
-def test_what_stops_the_motors_stops_turret_and_buzzer(board_url: str, how: str) -> None:
-    with Rig.open(board_url, robot="boebot") as rig:
-        rig.start(arm=False)
-        rig.send(messages.Turret(3000, 1))
-        rig.send(messages.Buzzer(1000, 10, 1))
-        assert rig.devices(after_s=0.05).turret_pulse == 0
-        assert rig.devices().buzzer_token == 1 and len(rig.pulses(BUZZER)) > 30
-        rig.arm()
-        rig.drive(0.5, 0.5, 100)
-        rig.send(messages.Turret(3000, 1))
-        rig.send(messages.Buzzer(1000, 250, 2))
-        assert rig.devices(after_s=0.05).turret_pulse > 0
-        if how == "stop":
-            rig.stop()
-        elif how == "close":
-            rig.alive = False
-            rig.send(messages.Close(rig.seed))
-        rig.listen(0.1)
-        stopped = rig.board.cycle
-        rig.listen(0.3)
-        for pin in (TURRET, BUZZER):
-            pulses = rig.pulses(pin)
-            assert len(pulses) and pulses[-1, 0] < stopped, pin
+@pytest.mark.uno(robot="boebot")
+def test_what_stops_the_motors_stops_turret_and_buzzer(uno: Uno, how: str) -> None:
+    rig = Rig(uno)
+    rig.start(arm=False)
+    rig.send(messages.Turret(3000, 1))
+    rig.send(messages.Buzzer(1000, 10, 1))
+    assert rig.devices(after_s=0.05).turret_pulse == 0
+    assert rig.devices().buzzer_token == 1 and len(rig.uno.pin(BUZZER).all_pulses()) > 30
+    rig.arm()
+    rig.drive(0.5, 0.5, 100)
+    rig.send(messages.Turret(3000, 1))
+    rig.send(messages.Buzzer(1000, 250, 2))
+    assert rig.devices(after_s=0.05).turret_pulse > 0
+    if how == "stop":
+        rig.stop()
+    elif how == "close":
+        rig.alive = False
+        rig.send(messages.Close(rig.seed))
+    rig.listen(0.1)
+    stopped = rig.board.cycle
+    rig.listen(0.3)
+    for pin in (TURRET, BUZZER):
+        pulses = rig.uno.pin(pin).all_pulses()
+        assert len(pulses) and pulses[-1, 0] < stopped, pin

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
 from boebot.link import messages
 from boebot.link.messages import AnswerStatus, EventKind, Latch, Status
 from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
 
-pytestmark = pytest.mark.emulated
+pytestmark = [pytest.mark.emulated, pytest.mark.uno(robot="boebot", motors=False)]
 
 LEFT = 13
 AFTER_S = 0.4
@@ -18,12 +16,10 @@ WAITS_S = 0.5  # stands still when it has taken over (firmware/src/fallback.c)
 
 
 @pytest.fixture
-def rig(board_url: str) -> Iterator[Rig]:
-    """A robot with IR pairs and whiskers in an empty field."""
-    with Rig.open(board_url, robot="boebot") as rig:
-        rig.start()
-        rig.set("fallback_after", round(1000 * AFTER_S))
-        yield rig
+def rig(rig: Rig) -> Rig:
+    """Of a robot with IR pairs and whiskers in an empty field."""
+    rig.set("fallback_after", round(1000 * AFTER_S))
+    return rig
 
 
 def be_silent(rig: Rig, seconds: float) -> None:
@@ -33,7 +29,7 @@ def be_silent(rig: Rig, seconds: float) -> None:
 
 def drives(rig: Rig) -> bool:
     """There was a pulse within the last two frames."""
-    pulses = rig.pulses(LEFT)
+    pulses = rig.uno.pin(LEFT).all_pulses()
     return len(pulses) > 0 and bool(pulses[-1, 0] > rig.board.cycle - 2 * FRAME_CYCLES)
 
 
@@ -45,7 +41,7 @@ def test_the_dead_mans_stop_comes_first_and_the_host_is_told_of_both(rig: Rig) -
     rig.drive(0.5, 0.5, 300)
     begun = rig.board.cycle
     be_silent(rig, 0.9)
-    starts = rig.pulses(LEFT)[:, 0]
+    starts = rig.uno.pin(LEFT).all_pulses()[:, 0]
     (gap,) = [place for place in range(len(starts) - 1) if starts[place + 1] - starts[place] > FRAME_CYCLES + 16]
     assert 0.27 < (starts[gap] - begun) / CYCLES_PER_S < 0.33
     assert WAITS_S <= (starts[gap + 1] - starts[gap]) / CYCLES_PER_S < WAITS_S + 0.06
@@ -105,6 +101,6 @@ def test_after_a_reset_it_drives_only_if_that_was_saved_and_nothing_was_wrong(ri
     rig.set("fallback_at_start", int(at_start))
     assert rig.request(messages.SaveParameters, within_s=1.0).status == AnswerStatus.OK
     for cause in ("watchdog", "brown_out", "external", "power"):
-        rig.board.reset(cause)
+        rig.uno.reset(cause)
         be_silent(rig, 2.0)
         assert drives(rig) == (at_start and cause in ("external", "power")), cause

@@ -9,6 +9,8 @@ import pytest
 from boebot.link import frame, messages
 from boebot_hil.rig import HOST_NONCE, Rig
 
+pytestmark = pytest.mark.uno(robot="shieldbot", motors=False)
+
 PROBE = bytes([messages.ClockProbe.ID, 0x55, 0x11, 0x22])  # id, sequence, token
 
 
@@ -41,9 +43,9 @@ def is_answered(rig: Rig, wire: bytes) -> bool:
 @pytest.mark.promise("a delimiter before and after each frame, so that two stand between neighbours")
 def test_two_delimiters_stand_between_neighbours(rig: Rig) -> None:
     rig.listen(0.1)
-    rig.received.clear()
+    begun = len(rig.uno.serial.heard)
     rig.listen(0.3)
-    pieces = bytes(rig.received).split(b"\0")[1:-1]
+    pieces = bytes(rig.uno.serial.heard[begun:]).split(b"\0")[1:-1]
     frames = [place for place, piece in enumerate(pieces) if piece]
     assert len(frames) > 25
     assert {after - before for before, after in itertools.pairwise(frames)} == {2}
@@ -138,7 +140,7 @@ def test_the_rest_of_a_frame_that_was_cut_is_refused(rig: Rig) -> None:
 @pytest.mark.emulated
 @pytest.mark.promise("that came before the first delimiter that it has seen: it has joined in the midst of a frame")
 def test_what_comes_before_the_first_delimiter_is_refused(rig: Rig) -> None:
-    rig.board.reset("external")
+    rig.uno.reset("external")
     rig.alive, rig.seed, rig.decoder.seed = False, 0, frame.NO_SESSION
     opening = messages.Open(messages.PROTOCOL_VERSION, rig.next_hello().board_nonce, HOST_NONCE)
     for is_heard in (False, True):

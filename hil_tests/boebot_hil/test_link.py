@@ -12,6 +12,8 @@ from boebot.description.robots import load_robot
 from boebot.link import frame, messages
 from boebot_hil.rig import Rig
 
+pytestmark = pytest.mark.uno(robot="shieldbot", motors=False)
+
 
 def type_name(value: Any) -> str:
     return type(value).__name__

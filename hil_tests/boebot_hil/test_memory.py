@@ -8,7 +8,7 @@ from boebot.link import messages
 from boebot.link.messages import AnswerStatus, ResetCause
 from boebot_hil.rig import CYCLES_PER_S, Rig
 
-pytestmark = pytest.mark.emulated
+pytestmark = [pytest.mark.emulated, pytest.mark.uno(robot="shieldbot", motors=False)]
 
 CHANGED = {"track_width": 12_345, "servo_left_centre": 24_016, "servo_right_gain": -3100, "bandgap": 1050}
 CAUSES = ("power", "external", "brown_out", "watchdog")
@@ -31,7 +31,7 @@ def test_saved_parameters_outlive_every_reset_and_are_reset_to_the_robots(rig: R
     assert rig.request(messages.SaveParameters, within_s=1.0).status == AnswerStatus.OK
     rig.set("track_width", 54_321)  # is not saved
     for cause in CAUSES:
-        rig.board.reset(cause)
+        rig.uno.reset(cause)
         assert rig.start(arm=False).parameters_saved == 1
         assert in_force(rig) == CHANGED
     assert rig.request(messages.ResetParameters).status == AnswerStatus.OK
@@ -43,7 +43,7 @@ def test_saved_parameters_outlive_every_reset_and_are_reset_to_the_robots(rig: R
 def test_cause_of_each_reset_is_told_and_the_nonce_is_another_one(rig: Rig) -> None:
     nonces = []
     for cause in CAUSES:
-        rig.board.reset(cause)
+        rig.uno.reset(cause)
         hello = rig.start(arm=False)
         # the watchdog's may have come while a task was running, which is then said, too
         assert ResetCause(hello.reset_cause).name.partition("_IN_")[0] == cause.upper()
@@ -56,10 +56,10 @@ def test_cause_of_each_reset_is_told_and_the_nonce_is_another_one(rig: Rig) -> N
 def test_starts_that_last_are_counted(rig: Rig) -> None:
     """One that runs for 10 s; not one that is cut before."""
     assert rig.next_hello().boot_counter == 1
-    rig.board.reset("external")
+    rig.uno.reset("external")
     assert rig.start(arm=False).boot_counter == 1
     rig.listen(11.0)
-    rig.board.reset("external")
+    rig.uno.reset("external")
     assert rig.start(arm=False).boot_counter == 2
 
 
@@ -70,7 +70,7 @@ def test_nothing_is_saved_while_the_supply_is_low(rig: Rig) -> None:
     rig.listen(0.05)
     assert rig.request(messages.SaveParameters, within_s=1.0).status == AnswerStatus.SUPPLY_LOW
     rig.board.supply(None)
-    rig.board.reset("external")
+    rig.uno.reset("external")
     assert rig.start(arm=False).parameters_saved == 0
 
 

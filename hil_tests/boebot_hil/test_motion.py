@@ -7,6 +7,9 @@ import pytest
 
 from boebot.link import messages
 from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, Rig
+from sim_bridge.bench.uno import Uno
+
+pytestmark = pytest.mark.uno(robot="shieldbot", motors=False)
 
 LEFT, RIGHT = 13, 12
 EDGE_TOLERANCE = 16  # cycles: 1 us
@@ -22,7 +25,7 @@ EDGE_TOLERANCE = 16  # cycles: 1 us
 def test_signal_becomes_pulse_width_at_the_pin(rig: Rig, left: float, right: float) -> None:
     rig.drive_for(left, right, 0.3)
     for pin, signal, mirror in ((LEFT, left, 1), (RIGHT, right, -1)):
-        pulses = rig.pulses(pin)[1:]
+        pulses = rig.uno.pin(pin).all_pulses()[1:]
         expected = (1500 + mirror * 200 * signal) * CYCLES_PER_US
         assert len(pulses) >= 10
         assert np.all(np.abs(pulses[:, 1] - expected) <= EDGE_TOLERANCE), (pin, pulses[:, 1] - expected)
@@ -41,7 +44,7 @@ def test_width_holds_while_the_line_is_saturated_and_encoders_fire(rig: Rig) -> 
         rig.board.square_wave(pin, period, seconds=1.0)
     rig.flood(messages.SetpointSignal(3000, -3000, 250, 0), seconds=0.9)
     for pin, expected in ((LEFT, 1560 * CYCLES_PER_US), (RIGHT, 1560 * CYCLES_PER_US)):
-        widths = rig.pulses(pin)[3:, 1]
+        widths = rig.uno.pin(pin).all_pulses()[3:, 1]
         assert len(widths) >= 35
         assert np.all(np.abs(widths - expected) <= EDGE_TOLERANCE), widths - expected
 
@@ -71,7 +74,7 @@ def test_e67_dead_man_stops_the_pulses_after_the_time_to_live(rig: Rig, time_to_
     sent = rig.transport.now() * CYCLES_PER_S  # at most 3 ms after the start of the tick that it answers
     frames = rig.listen(time_to_live_ms / 1000 + 0.2)
     for pin in (LEFT, RIGHT):
-        stopped_after = (rig.pulses(pin)[-1].sum() - sent) / CYCLES_PER_S
+        stopped_after = (rig.uno.pin(pin).all_pulses()[-1].sum() - sent) / CYCLES_PER_S
         assert time_to_live_ms / 1000 - 0.025 <= stopped_after <= time_to_live_ms / 1000 + 0.020
     assert frames[-1].pulse_left == frames[-1].pulse_right == 0
     assert frames[-1].status & messages.Status.DEAD_MAN
@@ -94,7 +97,7 @@ def test_stop_stops_at_once_and_pulses_are_whole(rig: Rig) -> None:
         assert now.pulse_left == now.pulse_right == 0
         assert now.latch == messages.Latch.STOP_COMMAND and now.status & messages.Status.LATCHED
         rig.arm()
-    widths = {pin: rig.pulses(pin)[:, 1] for pin in (LEFT, RIGHT)}
+    widths = {pin: rig.uno.pin(pin).all_pulses()[:, 1] for pin in (LEFT, RIGHT)}
     assert np.all(np.abs(widths[LEFT] - 1700 * CYCLES_PER_US) <= EDGE_TOLERANCE)
     assert np.all(np.abs(widths[RIGHT] - 1300 * CYCLES_PER_US) <= EDGE_TOLERANCE)
 
@@ -103,7 +106,7 @@ def test_stop_stops_at_once_and_pulses_are_whole(rig: Rig) -> None:
 @pytest.mark.promise("a fresh set-point is in force")
 def test_no_pulse_before_the_first_setpoint(rig: Rig) -> None:
     rig.listen(0.5)
-    assert len(rig.pulses(LEFT)) == len(rig.pulses(RIGHT)) == 0
+    assert len(rig.uno.pin(LEFT).all_pulses()) == len(rig.uno.pin(RIGHT).all_pulses()) == 0
 
 
 @pytest.mark.promise("It is refused when a field is out of range, and while the motors are latched")
@@ -116,20 +119,20 @@ def test_setpoint_out_of_range_is_refused(rig: Rig, signal: int) -> None:
 
 @pytest.mark.emulated
 @pytest.mark.promise("A latch discards the set-point in force. Only `arm` ends it")
-def test_latched_motors_do_not_move_until_they_are_armed(board_url: str) -> None:
-    with Rig.open(board_url) as rig:
-        rig.start(arm=False)
-        assert rig.latest().latch == messages.Latch.START
-        rig.drive_for(1.0, 1.0, 0.2)
-        rig.arm()
-        rig.listen(0.1)
-        assert len(rig.pulses(LEFT)) == 0, "nor by what was sent before"
-        rig.drive_for(1.0, 1.0, 0.1)
-        rig.stop()
-        count = len(rig.pulses(LEFT))
-        assert count > 0
-        rig.drive_for(1.0, 1.0, 0.2)
-        assert len(rig.pulses(LEFT)) <= count + 1, "the pulse under way is whole, no other follows"
+def test_latched_motors_do_not_move_until_they_are_armed(uno: Uno) -> None:
+    rig = Rig(uno)
+    rig.start(arm=False)
+    assert rig.latest().latch == messages.Latch.START
+    rig.drive_for(1.0, 1.0, 0.2)
+    rig.arm()
+    rig.listen(0.1)
+    assert len(rig.uno.pin(LEFT).all_pulses()) == 0, "nor by what was sent before"
+    rig.drive_for(1.0, 1.0, 0.1)
+    rig.stop()
+    count = len(rig.uno.pin(LEFT).all_pulses())
+    assert count > 0
+    rig.drive_for(1.0, 1.0, 0.2)
+    assert len(rig.uno.pin(LEFT).all_pulses()) <= count + 1, "the pulse under way is whole, no other follows"
 
 
 @pytest.mark.promise("`arm` names `latches`, and is refused if there has been another since")
@@ -151,7 +154,7 @@ def test_end_of_the_session_stops_and_latches(rig: Rig) -> None:
     closed_at = rig.board.cycle
     rig.alive = False
     rig.listen(0.2)
-    assert (rig.pulses(LEFT)[-1].sum() - closed_at) / CYCLES_PER_S < 0.025
+    assert (rig.uno.pin(LEFT).all_pulses()[-1].sum() - closed_at) / CYCLES_PER_S < 0.025
     rig.start(arm=False)
     assert rig.latest().latch == messages.Latch.SESSION_ENDED
 
@@ -166,7 +169,7 @@ def test_silence_of_the_host_ends_the_session(rig: Rig) -> None:
     silent_from = rig.transport.now()
     rig.alive = rig.acknowledges = False
     rig.listen(0.6)
-    stopped_after = rig.pulses(LEFT)[-1].sum() / CYCLES_PER_S - silent_from
+    stopped_after = rig.uno.pin(LEFT).all_pulses()[-1].sum() / CYCLES_PER_S - silent_from
     assert 0.28 <= stopped_after <= 0.34
 
 
@@ -177,7 +180,7 @@ def test_reset_in_mid_run_stops_the_motors_and_the_link_comes_back(rig: Rig) -> 
         rig.drive_for(0.5, 0.5, 0.2)
         rig.answers.clear()
         reset_at = rig.board.cycle
-        rig.board.reset(cause)
+        rig.uno.reset(cause)
         hello = rig.wait_for(
             lambda: next((a for a in rig.answers if isinstance(a, messages.Hello)), None),
             1.0,
@@ -186,7 +189,7 @@ def test_reset_in_mid_run_stops_the_motors_and_the_link_comes_back(rig: Rig) -> 
         assert hello.reset_cause == messages.ResetCause[cause.upper()]
         rig.start()
         rig.listen(0.3)
-        pulses = rig.pulses(LEFT)
+        pulses = rig.uno.pin(LEFT).all_pulses()
         assert np.all(pulses[:, 0] <= reset_at), "a pulse after the reset"
         assert rig.latest().tick < 60
     assert rig.board.cycle > reset_at, "the board's clock goes on across resets"

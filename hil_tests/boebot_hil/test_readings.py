@@ -7,8 +7,9 @@ import pytest
 from boebot.link import messages
 from boebot.link.messages import PingStatus
 from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from sim_bridge.bench.uno import Uno
 
-pytestmark = pytest.mark.emulated
+pytestmark = [pytest.mark.emulated, pytest.mark.uno(robot="shieldbot", motors=False)]
 
 LED, RECEIVER = 9, 10
 LOOK_S = 0.0002  # how often a test looks at what the board does to a pin: its answer is that late at the soonest
@@ -41,24 +42,25 @@ def test_edge_period_is_forgotten_after_half_a_second(rig: Rig) -> None:
 
 
 @pytest.mark.promise("signed only where the encoder knows direction")
-def test_quadrature_counts_both_directions(board_url: str) -> None:
-    with Rig.open(board_url, robot="shieldbot-quad") as rig:
-        rig.start()
-        rig.set("encoder_gap", 0)
-        rig.latest()  # it counts from the next tick on
-        now = rig.board.cycle + 64_000
-        before = rig.telemetry[-1].encoder_left
-        a_then_b = [(14, 1), (15, 1), (14, 0), (15, 0)]
-        for i, (pin, level) in enumerate(a_then_b * 5):
-            rig.board.drive(pin, level, now + i * 16_000)
-        rig.listen(0.1)
-        forward = rig.latest().encoder_left - before
-        now = rig.board.cycle + 64_000
-        for i, (pin, level) in enumerate([(15, 1), (14, 1), (15, 0), (14, 0)] * 3):
-            rig.board.drive(pin, level, now + i * 16_000)
-        rig.listen(0.1)
-        assert abs(forward) == 20
-        assert rig.latest().encoder_left - before == forward - (12 if forward > 0 else -12)
+@pytest.mark.uno(robot="shieldbot-quad")
+def test_quadrature_counts_both_directions(uno: Uno) -> None:
+    rig = Rig(uno)
+    rig.start()
+    rig.set("encoder_gap", 0)
+    rig.latest()  # it counts from the next tick on
+    now = rig.board.cycle + 64_000
+    before = rig.telemetry[-1].encoder_left
+    a_then_b = [(14, 1), (15, 1), (14, 0), (15, 0)]
+    for i, (pin, level) in enumerate(a_then_b * 5):
+        rig.board.drive(pin, level, now + i * 16_000)
+    rig.listen(0.1)
+    forward = rig.latest().encoder_left - before
+    now = rig.board.cycle + 64_000
+    for i, (pin, level) in enumerate([(15, 1), (14, 1), (15, 0), (14, 0)] * 3):
+        rig.board.drive(pin, level, now + i * 16_000)
+    rig.listen(0.1)
+    assert abs(forward) == 20
+    assert rig.latest().encoder_left - before == forward - (12 if forward > 0 else -12)
 
 
 @pytest.mark.promise("the line fired above its limit in the last tick and was masked until the tick ended")

@@ -9,6 +9,8 @@ import pytest
 from boebot.link import frame, messages
 from boebot_hil.rig import HOST_NONCE, TICK_S, Rig
 
+pytestmark = pytest.mark.uno(robot="shieldbot", motors=False)
+
 OTHER_NONCE = 0x012345
 
 
@@ -161,12 +163,12 @@ def test_a_description_is_for_who_knows_the_nonce(rig: Rig) -> None:
 
 @pytest.mark.promise("`sequence` starts anywhere and goes on over sessions")
 def test_sequence_numbers_go_on_over_sessions(rig: Rig) -> None:
-    rig.received.clear()
+    begun = len(rig.uno.serial.heard)
     rig.listen(0.1)
     closed(rig)
     rig.start(arm=False)
     rig.listen(0.1)
-    contents = [unstuff(piece) for piece in bytes(rig.received).split(b"\0")[1:-1] if piece]
+    contents = [unstuff(piece) for piece in bytes(rig.uno.serial.heard[begun:]).split(b"\0")[1:-1] if piece]
     numbers = [content[1] for content in contents]
     assert len(numbers) > 20
     assert {(after - before) & 0xFF for before, after in itertools.pairwise(numbers)} == {1}

@@ -99,7 +99,7 @@ class Uno:
         self._record, self._showing = Record(), Showing()
         self._showing.is_kept = True
         if bench is not None and wanted.robot is not None:
-            bench.after_slice.append(self._put_aside)
+            bench.at(TICK_CYCLES, self._put_aside)
         self.recorded: Cycles | None = None
 
     def __repr__(self) -> str:
@@ -303,8 +303,9 @@ class Uno:
     def _put_aside(self) -> None:
         """What the robot's parts show, every 10 ms."""
         bench = self.bench("robot")
-        if (tick := bench.now // TICK_CYCLES) > self._record.count("readings"):
-            append_parts(self._record, self._showing, bench.session, bench.now / CLOCK_HZ, tick)
+        tick = bench.now // TICK_CYCLES
+        append_parts(self._record, self._showing, bench.session, bench.now / CLOCK_HZ, tick)
+        bench.at((tick + 1) * TICK_CYCLES, self._put_aside)
 
     def save_record(self, folder: Path) -> None:
         """Writes the record of the test as that of a run, for `boebot report`, where there is a robot."""
@@ -422,21 +423,24 @@ _holds: dict[str, bytes] = {}
 """The flash of each board behind a port, as this process has seen or written it."""
 
 
-def _at_port(url: str, wanted: Wanted, may_flash: bool) -> Uno:
+def _at_port(url: str, wanted: Wanted, flash: bool) -> Uno:
     """A board behind a port, which opening has reset where the port can."""
     robot = None if wanted.robot is None else load_robot(wanted.robot)
     uart = None if robot is None else robot.device.get("uart")
     baud = uart.baud if wanted.baud is None and isinstance(uart, Uart) else wanted.baud
     if baud is None:
         raise CallError(f"{url} does not know the program's bit rate; expected it in the mark: baud=9600")
-    image = wanted.image or avr_image(robot.pin_map if robot else "")
-    flash = read_program(image).flash
-    if _holds.get(url) != flash:
-        if may_flash:
-            flashing.write(flash, url)
-        elif not flashing.holds(flash, url):
-            raise BoardError(f"the board at {url} has another program than {image.name}; expected it, or --uno-flash")
-        _holds[url] = flash
+    if wanted.image is not None or flash:  # the kit's firmware that is there says itself which it is
+        image = wanted.image or avr_image(robot.pin_map if robot else "")
+        program = read_program(image).flash
+        if _holds.get(url) != program:
+            if flash:
+                flashing.write(program, url)
+            elif not flashing.holds(program, url):
+                raise BoardError(
+                    f"the board at {url} has another program than {image.name}; expected it, or --uno-flash"
+                )
+            _holds[url] = program
     transport = open_port(url, baud)
     line = Line(transport, starts_s=transport.now() + START_S, allowance_s=ALLOWANCE_S)
     uno = Uno(url, wanted, line, None)

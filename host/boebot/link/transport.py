@@ -106,4 +106,4 @@ def stamped_read(transport: Transport) -> Callable[[float, float], list[tuple[fl
         data = transport.read(wait_s, quiet_s)
         return [(transport.now(), data)] if data else []
 
-    return transport.read_stamped if isinstance(transport, Stamping) else read
+    return transport.read_stamped if hasattr(transport, "read_stamped") else read

@@ -14,10 +14,11 @@ from boebot.errors import BoardError
 from boebot.link import messages
 from boebot.link.link import Link
 from boebot.link.transport import BaudSelectable
-from boebot_hil.rig import CYCLES_PER_US, HOST_NONCE, TICK_S, Rig
+from boebot_hil.rig import CYCLES_PER_US, HOST_NONCE, TICK_S
 from boebot_timing.board import measure
 from sim_bridge.bench.bench import bare
 from sim_bridge.tests.firmware.test_planted_faults import CLI, JUMP_TO_ITSELF, RETURN, SEI, delay, planted
+from sim_bridge.tests.rigs import SessionRig
 
 FRAME_S = 2 * TICK_S  # of the servos: the turret's task runs once in each
 CALL_CYCLES = 4 + 4 + 2  # call, return, and CLI with SEI
@@ -28,18 +29,18 @@ READING_CYCLES = 160  # from the first reading of the timer to the call, and fro
 LONGEST = 0xFFFF
 
 
-def alone(image: str | None = None) -> Rig:
+def alone(image: str | None = None) -> SessionRig:
     """A board with nothing at its pins."""
-    return Rig.open("avr", robot=bare("shieldbot"), image=image)
+    return SessionRig.open("avr", robot=bare("shieldbot"), image=image)
 
 
-def session(image: str | None = None) -> Rig:
+def session(image: str | None = None) -> SessionRig:
     host = alone(image)
     host.open_session()
     return host
 
 
-def next_time(host: Rig, task: messages.Task) -> int:
+def next_time(host: SessionRig, task: messages.Task) -> int:
     """The next time that the board sends of a task; meanwhile the session is kept open."""
     host.send(messages.ClockProbe(0))
     return host.first(
@@ -120,7 +121,7 @@ def test_the_task_that_hung_is_told_by_the_next_hello(tmp_path: Path, task: str,
     assert host.next_hello().reset_cause == messages.ResetCause.EXTERNAL, "reported once"
 
 
-def after_reset(host: Rig) -> int:
+def after_reset(host: SessionRig) -> int:
     """The cause in the first hello after a reset."""
     return host.first(
         messages.Hello, lambda hello: hello.reset_cause != messages.ResetCause.POWER, 1.0, "a hello after a reset"

@@ -13,11 +13,11 @@ import msgspec
 
 from boebot.arenas import Arena, ArenaDescription, Disc, Light, Patch, Polygon
 from boebot.description.robots import RobotDescription, load_robot
-from boebot_hil.rig import Rig
 from sim_bridge.boards import avr
 from sim_bridge.boards.emulated import avr_image, native_board, native_library
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sim import Sim, SimRobot
+from sim_bridge.tests.rigs import SessionRig
 
 WALL_THICKNESS_M = 0.05
 
@@ -44,13 +44,13 @@ def wall_at(x: float, height: float | None = None) -> Polygon:
     return block(x, -3.0, x + WALL_THICKNESS_M, 3.0, height)
 
 
-class CircleRig(Rig):
+class CircleRig(SessionRig):
     """A rig whose board sits in a robot in an arena."""
 
     @property
     def robot(self) -> SimRobot:
         """The robot in its world."""
-        robot: SimRobot = self.session.robot  # type: ignore[attr-defined]
+        robot: SimRobot = self.session.robot
         return robot
 
     def place(self, x: float, y: float, heading: float = 0.0) -> None:

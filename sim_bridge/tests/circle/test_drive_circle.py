@@ -124,9 +124,9 @@ def test_brown_out_switches_the_motors_off_and_the_link_comes_back(board_url: st
         rig.board.supply(2.5)
         rig.listen(0.02)
         held_at = rig.board.cycle
-        silent = len(rig.received)
+        silent = len(rig.uno.serial.heard)
         rig.listen(0.5)
-        assert len(rig.received) == silent, "a board in reset is silent"
+        assert len(rig.uno.serial.heard) == silent, "a board in reset is silent"
         assert all(rig.board.output(pin) == 2 for pin in (LEFT, RIGHT))
         assert rig.robot.body().speed < 0.01, "wheels without pulses roll out"
         x = rig.robot.body().x

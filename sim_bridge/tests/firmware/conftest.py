@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from boebot_hil.rig import Rig
+from sim_bridge.tests.rigs import SessionRig
 
 
 @pytest.fixture
-def rig(board_url: str) -> Iterator[Rig]:
-    with Rig.open(board_url) as rig:
+def rig(board_url: str) -> Iterator[SessionRig]:
+    with SessionRig.open(board_url) as rig:
         rig.start()
         yield rig

@@ -10,10 +10,11 @@ import pytest
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.messages import CompassStatus, Devices
-from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, LINE_BYTES_PER_TICK, TICK_S
 from sim_bridge.bench.bench import bare
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.devices import Capacitor, Receiver, TwoWireDevice
+from sim_bridge.tests.rigs import SessionRig
 
 pytestmark = [pytest.mark.unsanitized, pytest.mark.soak_on_native]
 
@@ -23,19 +24,19 @@ STAMP_LATE_US = 3530 / CYCLES_PER_US  # at most, of port D's changes in overload
 
 
 @pytest.fixture
-def bench(board_url: str) -> Iterator[Rig]:
-    with Rig.open(board_url, robot=bare("boebot")) as rig:
+def bench(board_url: str) -> Iterator[SessionRig]:
+    with SessionRig.open(board_url, robot=bare("boebot")) as rig:
         rig.start()
         yield rig
 
 
-def pulses_since(rig: Rig, pin: int, cycle: int) -> np.ndarray:
+def pulses_since(rig: SessionRig, pin: int, cycle: int) -> np.ndarray:
     """Start and width of each whole pulse on `pin` that began since then, in cycles."""
     pulses = rig.pulses(pin)
     return pulses[pulses[:, 0] >= cycle]
 
 
-def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: Rig) -> None:
+def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: SessionRig) -> None:
     device = TwoWireDevice(bench.board, COMPASS_ADDRESS)
     for x, y, z in ((1, -2, 3), (-4096, 2047, -2048), (255, 256, -256)):
         device.registers[3:9] = b"".join(value.to_bytes(2, "big", signed=True) for value in (x, z, y))
@@ -46,7 +47,7 @@ def test_compass_is_set_and_read_in_the_order_of_its_registers(bench: Rig) -> No
     assert device.registers[:3] == bytes([0x78, 0x20, 0x00])
 
 
-def test_compass_without_a_device_a_held_bus_and_a_recovery(bench: Rig) -> None:
+def test_compass_without_a_device_a_held_bus_and_a_recovery(bench: SessionRig) -> None:
     device = TwoWireDevice(bench.board, COMPASS_ADDRESS)
     device.plugged = False
     assert bench.devices(after_s=0.1).compass_status == CompassStatus.NO_ANSWER
@@ -61,7 +62,7 @@ def test_compass_without_a_device_a_held_bus_and_a_recovery(bench: Rig) -> None:
 
 
 @pytest.mark.parametrize("us", [20, 600, 1500, 4200, 9000])
-def test_light_is_the_decay_time(bench: Rig, us: int) -> None:
+def test_light_is_the_decay_time(bench: SessionRig, us: int) -> None:
     Capacitor(bench.board, LIGHT_LEFT, us)
     Capacitor(bench.board, LIGHT_RIGHT, us + 1000)
     reported = bench.devices(after_s=0.08)
@@ -73,7 +74,7 @@ def test_light_is_the_decay_time(bench: Rig, us: int) -> None:
 @pytest.mark.parametrize("us", [7, 400, 2_500, 13_000, 20_000])
 def test_light_sensors_of_the_basic_shieldbot(board_url: str, us: int) -> None:
     """The left one on Timer1's capture pin, where others have the Ping."""
-    with Rig.open(board_url, robot=bare("shieldbot-basic")) as rig:
+    with SessionRig.open(board_url, robot=bare("shieldbot-basic")) as rig:
         rig.start()
         Capacitor(rig.board, 8, us)
         Capacitor(rig.board, LIGHT_RIGHT, us + 500)
@@ -83,7 +84,7 @@ def test_light_sensors_of_the_basic_shieldbot(board_url: str, us: int) -> None:
         assert reported.light_age <= 2
 
 
-def test_analog_inputs_are_ratios_of_the_supply(bench: Rig) -> None:
+def test_analog_inputs_are_ratios_of_the_supply(bench: SessionRig) -> None:
     for battery, sharp in ((3.1, 0.42), (2.2, 2.9), (0.0, 4.9)):
         bench.board.analog(0, battery)
         bench.board.analog(2, sharp)
@@ -95,7 +96,7 @@ def test_analog_inputs_are_ratios_of_the_supply(bench: Rig) -> None:
 
 
 @pytest.mark.parametrize("angle", [-1.2, -0.3, 0.0, 0.7, 1.5])
-def test_turret_turns_and_is_released_by_a_stop(bench: Rig, angle: float) -> None:
+def test_turret_turns_and_is_released_by_a_stop(bench: SessionRig, angle: float) -> None:
     bench.send(messages.Turret(round(angle * 1e4), 1))
     bench.listen(0.05)
     since = bench.board.cycle
@@ -114,7 +115,7 @@ def test_turret_turns_and_is_released_by_a_stop(bench: Rig, angle: float) -> Non
 
 
 @pytest.mark.parametrize("frequency", [60, 440, 2000, 8000])
-def test_buzzer_has_its_frequency_and_ends(bench: Rig, frequency: int) -> None:
+def test_buzzer_has_its_frequency_and_ends(bench: SessionRig, frequency: int) -> None:
     bench.send(messages.Buzzer(frequency, 20, 1))
     bench.listen(0.4)
     pulses = bench.pulses(BUZZER)
@@ -125,7 +126,7 @@ def test_buzzer_has_its_frequency_and_ends(bench: Rig, frequency: int) -> None:
     assert bench.devices().buzzer_token == 1
 
 
-def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: Rig) -> None:
+def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: SessionRig) -> None:
     for receiver in (10, 3):
         bench.board.drive(receiver, Level.HIGH)
     bench.set("infrared_sweep", 1)
@@ -143,7 +144,7 @@ def test_zones_count_the_frequencies_at_which_the_receiver_answers(bench: Rig) -
         assert sum(abs(frequency - expected) <= 300 for frequency in found) >= 1
 
 
-def saturate(rig: Rig, seconds: float) -> None:
+def saturate(rig: SessionRig, seconds: float) -> None:
     """All that the line carries to the board; back come answers (15 bytes for 11), telemetry (46 bytes a tick) and that
     of the slow devices (39 bytes a tick): 480 of 500 bytes."""
     wire, request = bytearray(), rig.numbered(messages.GetParameter, 0)
@@ -160,7 +161,7 @@ def saturate(rig: Rig, seconds: float) -> None:
 def test_all_devices_on_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, pin_map: str) -> None:
     """Every device of the map at work, encoders at 1.5 kHz, the UART saturated both ways: ±4 cycles, no tick missed,
     no byte lost."""
-    with Rig.open(board_url, robot=bare(pin_map)) as rig:
+    with SessionRig.open(board_url, robot=bare(pin_map)) as rig:
         rig.start()
         device = TwoWireDevice(rig.board, COMPASS_ADDRESS)
         Capacitor(rig.board, LIGHT_LEFT, 1300.0)

@@ -9,8 +9,9 @@ from boebot.arenas import load_arena
 from boebot.description.robots import load_robot
 from boebot.link import messages
 from boebot.link.messages import Status
-from boebot_hil.rig import CYCLES_PER_US, FRAME_CYCLES, Rig
+from boebot_hil.rig import CYCLES_PER_US, FRAME_CYCLES
 from sim_bridge.tests.circle.circle import arena_of, circle
+from sim_bridge.tests.rigs import SessionRig
 
 pytestmark = pytest.mark.unsanitized
 
@@ -25,12 +26,12 @@ SPEED_M_S = 0.1  # about: the servos' curve and the pack's voltage say more
 DEVICES = sum(bit for bit, device in messages.DEVICE_OF_BIT.items() if load_robot("boebot").has(device))
 
 
-def be_silent(rig: Rig, seconds: float) -> None:
+def be_silent(rig: SessionRig, seconds: float) -> None:
     rig.alive = rig.acknowledges = False
     rig.listen(seconds)
 
 
-def switch_on(rig: Rig, after_ms: int = AFTER_MS) -> None:
+def switch_on(rig: SessionRig, after_ms: int = AFTER_MS) -> None:
     rig.set("fallback_after", after_ms)
 
 

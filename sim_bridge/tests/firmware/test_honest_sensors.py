@@ -13,7 +13,8 @@ import pytest
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.link.messages import PingStatus
-from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US
+from sim_bridge.tests.rigs import SessionRig
 
 pytestmark = pytest.mark.unsanitized
 
@@ -29,7 +30,7 @@ def pulse(begin_us: float, length_us: float) -> list[Change]:
     return [(begin_us, 1), (begin_us + length_us, 0)]
 
 
-def fallen(rig: Rig, pin: int, since: int) -> list[int]:
+def fallen(rig: SessionRig, pin: int, since: int) -> list[int]:
     """When the board drove a pin low."""
     log = rig.board.pin_log(4000)
     of_pin = (log["pin"] == pin) & (log["level"] == 0) & (log["cycle"] > since)
@@ -39,7 +40,7 @@ def fallen(rig: Rig, pin: int, since: int) -> list[int]:
 # ---- Ping ------------------------------------------------------------------------------------------------------------
 
 
-def ping_that_does(rig: Rig, changes: list[Change], seconds: float = READINGS_S) -> messages.Telemetry:
+def ping_that_does(rig: SessionRig, changes: list[Change], seconds: float = READINGS_S) -> messages.Telemetry:
     """The last reading of a sensor that does this to its line after each trigger."""
     seen = rig.board.cycle
     for _ in range(round(seconds / LOOK_S)):
@@ -59,7 +60,7 @@ def unplugged(name: str) -> RobotDescription:
 
 
 def test_a_ping_that_was_never_there_is_absent(board_url: str) -> None:
-    with Rig.open(board_url, robot=unplugged("ping")) as rig:
+    with SessionRig.open(board_url, robot=unplugged("ping")) as rig:
         rig.start()
         now = rig.listen(READINGS_S)[-1]
     assert (now.ping_status, now.ping_echo) == (PingStatus.ABSENT, 0)
@@ -67,7 +68,7 @@ def test_a_ping_that_was_never_there_is_absent(board_url: str) -> None:
 
 
 @pytest.mark.parametrize("phase_ms", [0.5, 2, 10, 18])
-def test_a_wire_that_breaks_in_mid_echo_is_no_empty_field(rig: Rig, phase_ms: float) -> None:
+def test_a_wire_that_breaks_in_mid_echo_is_no_empty_field(rig: SessionRig, phase_ms: float) -> None:
     """From the next measurement on; in this one the line may fall, as it does at the end of an echo."""
     rig.listen(READINGS_S)
     triggered = fallen(rig, PING, 0)[-1]
@@ -83,18 +84,18 @@ def test_a_wire_that_breaks_in_mid_echo_is_no_empty_field(rig: Rig, phase_ms: fl
 NOISE = list(itertools.chain.from_iterable(pulse(at, 10) for at in range(300, 720, 60)))
 
 
-def test_noise_in_the_hold_off_is_no_echo(rig: Rig) -> None:
+def test_noise_in_the_hold_off_is_no_echo(rig: SessionRig) -> None:
     now = ping_that_does(rig, NOISE)
     assert (now.ping_status, now.ping_echo) == (PingStatus.ABSENT, 0)
 
 
-def test_noise_in_the_hold_off_hides_no_echo(rig: Rig) -> None:
+def test_noise_in_the_hold_off_hides_no_echo(rig: SessionRig) -> None:
     now = ping_that_does(rig, [*NOISE, *pulse(755, 3000)])
     assert now.ping_status == PingStatus.OK
     assert abs(now.ping_echo - 3000) <= 1
 
 
-def test_a_line_that_is_stuck_is_absent(rig: Rig) -> None:
+def test_a_line_that_is_stuck_is_absent(rig: SessionRig) -> None:
     for level in (1, 0):
         rig.board.drive(PING, level)
         rig.listen(READINGS_S)
@@ -102,12 +103,12 @@ def test_a_line_that_is_stuck_is_absent(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("length_us", [1, 2, 3, 5, 8, 13, 20, 40, 80, 95])
-def test_an_echo_that_is_too_short_is_too_near(rig: Rig, length_us: float) -> None:
+def test_an_echo_that_is_too_short_is_too_near(rig: SessionRig, length_us: float) -> None:
     now = ping_that_does(rig, pulse(755, length_us))
     assert (now.ping_status, now.ping_echo) == (PingStatus.TOO_NEAR, 0)
 
 
-def test_a_short_echo_is_measured_or_too_near(rig: Rig) -> None:
+def test_a_short_echo_is_measured_or_too_near(rig: SessionRig) -> None:
     """The line full both ways and noise on an encoder's line: the interrupt that stamps the echo comes late."""
     for length_us in (115, 116, 118, 122, 130, 145, 175):
         rig.board.answer_ping(length_us)
@@ -122,7 +123,7 @@ def test_a_short_echo_is_measured_or_too_near(rig: Rig) -> None:
 # ---- encoders --------------------------------------------------------------------------------------------------------
 
 
-def bouncing(rig: Rig, edges: list[tuple[int, int, int]]) -> None:
+def bouncing(rig: SessionRig, edges: list[tuple[int, int, int]]) -> None:
     """Edges (cycle from now on, pin, level), each with two more 20 us apart."""
     start = rig.board.cycle + 2 * MS
     for cycle, pin, level in edges:
@@ -135,7 +136,7 @@ def one_line(count: int, period: int) -> list[tuple[int, int, int]]:
     return [(i * period, ENCODER, (i + 1) % 2) for i in range(count)]
 
 
-def test_a_bouncing_encoder_counts_each_edge_once(rig: Rig) -> None:
+def test_a_bouncing_encoder_counts_each_edge_once(rig: SessionRig) -> None:
     """75 edges at the wheel's top speed count 75, and the speed is that of the wheel."""
     period = 19_000 * CYCLES_PER_US
     before = rig.latest().encoder_left
@@ -146,14 +147,14 @@ def test_a_bouncing_encoder_counts_each_edge_once(rig: Rig) -> None:
     assert reported and all(abs(period_us - 19_000) <= 32 for period_us in reported)
 
 
-def test_without_a_gap_every_edge_counts(rig: Rig) -> None:
+def test_without_a_gap_every_edge_counts(rig: SessionRig) -> None:
     rig.set("encoder_gap", 0)
     before = rig.latest().encoder_left
     bouncing(rig, one_line(20, 10 * MS))
     assert rig.listen(0.1)[-1].encoder_left - before == 60
 
 
-def test_a_wheel_that_stands_for_long_counts_its_next_edge(rig: Rig) -> None:
+def test_a_wheel_that_stands_for_long_counts_its_next_edge(rig: SessionRig) -> None:
     """Whatever the time since its last one is modulo that of any counter: 4.096 ms, 1.05 s."""
     before = rig.latest().encoder_left
     for number, rest_s in enumerate((0.0045, 0.0085, 0.03, 0.3, 1.04, 1.05, 1.06, 2.1)):
@@ -164,9 +165,9 @@ def test_a_wheel_that_stands_for_long_counts_its_next_edge(rig: Rig) -> None:
 
 
 @contextlib.contextmanager
-def with_two_lines(board_url: str) -> Iterator[Rig]:
+def with_two_lines(board_url: str) -> Iterator[SessionRig]:
     """A robot whose left encoder has two lines, both low."""
-    with Rig.open(board_url, robot="shieldbot-quad") as rig:
+    with SessionRig.open(board_url, robot="shieldbot-quad") as rig:
         rig.start()
         for pin in (14, 15):
             rig.board.drive(pin, 0)

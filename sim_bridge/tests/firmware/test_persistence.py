@@ -11,11 +11,12 @@ from elftools.elf.elffile import ELFFile
 
 from boebot import resources
 from boebot.link import messages
-from boebot_hil.rig import CYCLES_PER_S, Rig
+from boebot_hil.rig import CYCLES_PER_S
 from sim_bridge.bench.bench import bare
 from sim_bridge.boards.board import Damage
 from sim_bridge.tests.boards.avr.bootloader import KITS
 from sim_bridge.tests.boards.symbols import DATA_BASE, entry_of
+from sim_bridge.tests.rigs import SessionRig
 from tools.avr_program import IMAGES
 
 pytestmark = pytest.mark.unsanitized
@@ -36,26 +37,26 @@ OK, SUPPLY_LOW = messages.AnswerStatus.OK, messages.AnswerStatus.SUPPLY_LOW
 
 
 @pytest.fixture
-def host(board_url: str) -> Iterator[Rig]:
-    with Rig.open(board_url, robot=bare("shieldbot")) as rig:
+def host(board_url: str) -> Iterator[SessionRig]:
+    with SessionRig.open(board_url, robot=bare("shieldbot")) as rig:
         yield rig
 
 
-def run(host: Rig, cycles: int) -> None:
+def run(host: SessionRig, cycles: int) -> None:
     """Lets time pass in which the host says nothing."""
-    host.session.sim.run(cycles)  # type: ignore[attr-defined]
+    host.session.sim.run(cycles)
 
 
-def choose(host: Rig, values: dict[int, int]) -> None:
+def choose(host: SessionRig, values: dict[int, int]) -> None:
     for parameter, value in values.items():
         assert host.request(messages.SetParameter, parameter, value).status == OK
 
 
-def in_force(host: Rig) -> dict[int, int]:
+def in_force(host: SessionRig) -> dict[int, int]:
     return {parameter: host.request(messages.GetParameter, parameter).value for parameter in VALUES[0]}
 
 
-def restart(host: Rig, cause: str) -> messages.Hello:
+def restart(host: SessionRig, cause: str) -> messages.Hello:
     """Resets the board and opens a session with it; returns what it says of itself."""
     host.board.reset(cause)
     return host.open_session()
@@ -63,7 +64,7 @@ def restart(host: Rig, cause: str) -> messages.Hello:
 
 @pytest.mark.soak_on_avr
 @pytest.mark.parametrize("damage", list(Damage))
-def test_power_cut_at_every_cell_of_a_save(host: Rig, damage: Damage) -> None:
+def test_power_cut_at_every_cell_of_a_save(host: SessionRig, damage: Damage) -> None:
     """Cuts 3 ms apart meet each write of 3.4 ms; after each one the values are all old or all new."""
     host.board.eeprom_damage(damage, garbage=0x33)
     host.open_session()
@@ -98,7 +99,7 @@ def test_power_cut_at_every_cell_of_a_save(host: Rig, damage: Damage) -> None:
 
 
 @pytest.mark.soak_on_avr
-def test_power_cut_in_the_boot_counter(host: Rig) -> None:
+def test_power_cut_in_the_boot_counter(host: SessionRig) -> None:
     """Started again and again, cut in mid-write: it goes up by one or stays, and never anything else."""
     host.board.eeprom_damage(Damage.GARBAGE, garbage=0xA5)
     counter = host.next_hello().boot_counter
@@ -131,7 +132,7 @@ def test_power_cut_in_the_boot_counter(host: Rig) -> None:
         assert host.next_hello().boot_counter == counter
 
 
-def test_nothing_is_written_while_the_supply_is_low(host: Rig) -> None:
+def test_nothing_is_written_while_the_supply_is_low(host: SessionRig) -> None:
     host.open_session()
     choose(host, VALUES[0])
     assert host.request(messages.SaveParameters, within_s=1.0).status == OK
@@ -155,7 +156,7 @@ def test_nothing_is_written_while_the_supply_is_low(host: Rig) -> None:
 # ---- resets ----------------------------------------------------------------------------------------------------------
 
 
-def test_nonce_is_another_one_after_each_reset(host: Rig) -> None:
+def test_nonce_is_another_one_after_each_reset(host: SessionRig) -> None:
     nonces = [host.next_hello().board_nonce]
     for i in range(40):
         host.board.reset("external" if i % 2 else "watchdog")
@@ -203,7 +204,7 @@ def test_a_hang_is_told(
     marks the record, either, by which a program behind a bootloader knows it."""
     image = patched(tmp_path, HANG_AT, code)
     loader = str(KITS) if bootloader else None
-    host = Rig.open("avr", robot=bare("shieldbot"), image=str(image), bootloader=loader)
+    host = SessionRig.open("avr", robot=bare("shieldbot"), image=str(image), bootloader=loader)
     host.next_hello()
     host.send(messages.Identify())
     host.listen(reset_s - 0.003)
@@ -219,7 +220,7 @@ def test_a_hang_is_told(
 def test_behind_a_bootloader_the_memory_tells_the_cause(pin_map: str) -> None:
     """It leaves nothing of the chip's own answer. RAM holds something else whenever the power comes; a brown-out that
     leaves it whole looks like an external reset."""
-    host = Rig.open("avr", robot=bare(pin_map), bootloader=str(KITS))
+    host = SessionRig.open("avr", robot=bare(pin_map), bootloader=str(KITS))
     assert host.next_hello().reset_cause == POWER
     for cause, reported in [
         ("external", EXTERNAL),
@@ -257,7 +258,7 @@ def crc16(data: bytes) -> int:
     return crc
 
 
-def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(host: Rig) -> None:
+def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(host: SessionRig) -> None:
     """Up to now a record began at address 0 and one at 128; the ring of the boot counter has its old place."""
     values = b"".join((1000 + i).to_bytes(2, "little") for i in range(24))
     content = b"\x05\x34\x12" + values
@@ -275,7 +276,7 @@ def test_parameters_of_an_older_layout_are_forgotten_and_the_starts_go_on(host: 
     assert host.board.read_eeprom()[: len(record)] == record
 
 
-def test_what_becomes_of_the_first_cell_does_not_matter(host: Rig) -> None:
+def test_what_becomes_of_the_first_cell_does_not_matter(host: SessionRig) -> None:
     """When the supply fails it is address 0 that is written (data sheet, 8.4.2)."""
     host.open_session()
     choose(host, VALUES[0])

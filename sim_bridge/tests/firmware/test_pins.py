@@ -11,10 +11,11 @@ from boebot.description.robots import load_robot
 from boebot.devices.servo import ContinuousServo
 from boebot.devices.uart import Uart
 from boebot.link import messages
-from boebot_hil.rig import CYCLES_PER_S, Rig
+from boebot_hil.rig import CYCLES_PER_S
 from sim_bridge.bench.bench import bare
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.avr.bootloader import KITS
+from sim_bridge.tests.rigs import SessionRig
 from tools.avr_program import IMAGES
 
 pytestmark = pytest.mark.unsanitized
@@ -29,7 +30,7 @@ def device_pins(pin_map: str) -> dict[str, list[int]]:
     return {name: sorted(d.pins().values()) for name, d in devices if not isinstance(d, ContinuousServo | Uart)}
 
 
-def levels(host: Rig, seconds: float) -> dict[int, set[Level]]:
+def levels(host: SessionRig, seconds: float) -> dict[int, set[Level]]:
     """What the board does to each pin within that time."""
     begun = host.board.cycle
     seen = {pin: {host.board.output(pin)} for pin in range(20)}
@@ -43,7 +44,7 @@ def levels(host: Rig, seconds: float) -> dict[int, set[Level]]:
 @pytest.mark.parametrize("kind", [pytest.param("native", marks=pytest.mark.soak), "avr"])
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: str) -> None:
-    host = Rig.open(kind, robot=bare(pin_map))
+    host = SessionRig.open(kind, robot=bare(pin_map))
     host.open_session()
     assert host.request(messages.SetParameter, messages.PARAMETERS["devices"].id, 0).status == messages.AnswerStatus.OK
     host.listen(0.1)
@@ -57,7 +58,7 @@ def test_devices_that_are_off_drive_no_pin_and_none_floats(kind: str, pin_map: s
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) -> None:
     """All devices on: an echo is awaited for 20 ms, a decay for 14 ms; what an analog sensor gives is not pulled at."""
-    host = Rig.open(kind, robot=bare(pin_map))
+    host = SessionRig.open(kind, robot=bare(pin_map))
     host.open_session()
     built = sum(int(bit) for bit, name in messages.DEVICE_OF_BIT.items() if name in load_robot(pin_map).device)
     host.request(messages.SetParameter, messages.PARAMETERS["devices"].id, built)
@@ -74,7 +75,7 @@ def test_a_pin_floats_only_while_its_device_measures(kind: str, pin_map: str) ->
 @pytest.mark.parametrize("pin_map", IMAGES)
 def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> None:
     """Who knows what is wired to the board before anyone says so?"""
-    host = Rig.open(kind, robot=bare(pin_map))
+    host = SessionRig.open(kind, robot=bare(pin_map))
     seen = levels(host, 1.5)
     for device, pins in device_pins(pin_map).items():
         for pin in pins:
@@ -86,7 +87,7 @@ def test_before_a_host_speaks_no_device_is_driven(kind: str, pin_map: str) -> No
 
 def low_after_ms(pin_map: str, bootloader: Path | None = None) -> float:
     """From the reset until the servos' lines are low, where they stay."""
-    host = Rig.open("avr", robot=bare(pin_map), bootloader=bootloader and str(bootloader))
+    host = SessionRig.open("avr", robot=bare(pin_map), bootloader=bootloader and str(bootloader))
     host.listen(2.0)
     start = host.board.cycle
     host.board.reset("power")

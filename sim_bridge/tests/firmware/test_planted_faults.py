@@ -15,7 +15,8 @@ from boebot.boards import BoardRequest, open_board
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
 from boebot.link import messages
-from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US
+from sim_bridge.tests.rigs import SessionRig
 
 pytestmark = pytest.mark.unsanitized
 
@@ -42,8 +43,10 @@ def planted(folder: Path, function: str, code: bytes) -> str:
     return str(path)
 
 
-def rig_with(image: str) -> Rig:
-    return Rig(open_board("avr", BoardRequest(robot=load_robot("shieldbot"), arena="empty", noise=False, image=image)))
+def rig_with(image: str) -> SessionRig:
+    return SessionRig(
+        open_board("avr", BoardRequest(robot=load_robot("shieldbot"), arena="empty", noise=False, image=image))
+    )
 
 
 def test_program_that_hangs_is_reset_by_the_watchdog_and_stops_the_motors(tmp_path: Path) -> None:

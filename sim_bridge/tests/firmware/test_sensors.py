@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from boebot.link import messages
-from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S, Rig
+from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, FRAME_CYCLES, TICK_S
+from sim_bridge.tests.rigs import SessionRig
 
 pytestmark = pytest.mark.unsanitized
 
 
-def test_sensors_go_on_when_parameters_are_reset(rig: Rig) -> None:
+def test_sensors_go_on_when_parameters_are_reset(rig: SessionRig) -> None:
     assert rig.request(messages.ResetParameters).status == messages.AnswerStatus.OK
     rig.listen(0.3)
     seen = rig.latest()
@@ -23,7 +24,7 @@ def test_sensors_go_on_when_parameters_are_reset(rig: Rig) -> None:
 
 @pytest.mark.parametrize("robot", ["boebot", "shieldbot", "shieldbot-quad"])
 def test_wheels_at_rest_count_nothing_from_power_on(board_url: str, robot: str) -> None:
-    with Rig.open(board_url, robot=robot) as rig:
+    with SessionRig.open(board_url, robot=robot) as rig:
         rig.start()
         seen = rig.latest()
         assert (seen.encoder_left, seen.encoder_right) == (0, 0)
@@ -41,7 +42,7 @@ class Noise:
     def __str__(self) -> str:
         return f"{self.robot}-{len(self.pins)}x{self.high}of{self.period}"
 
-    def drive(self, rig: Rig, seconds: float) -> None:
+    def drive(self, rig: SessionRig, seconds: float) -> None:
         start = rig.board.cycle + 100
         for i, pin in enumerate(self.pins):
             for rise in range(start + 3 * i, start + round(seconds * CYCLES_PER_S), self.period):
@@ -60,7 +61,7 @@ QUAD = [Noise(p, h, (14, 15, 16, 17), "shieldbot-quad") for p, h in ((160, 80), 
 def test_noise_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: str, noise: Noise) -> None:
     """With the UART saturated both ways: no tick missed, pulses exact to a microsecond, the noise reported. Bytes may
     be lost."""
-    with Rig.open(board_url, robot=noise.robot) as rig:
+    with SessionRig.open(board_url, robot=noise.robot) as rig:
         rig.start()
         rig.set("encoder_gap", 0)
         request = rig.numbered(messages.GetParameter, 0)
@@ -93,7 +94,7 @@ def test_noise_and_a_saturated_line_disturb_neither_tick_nor_pulse(board_url: st
             assert np.all(np.abs(np.diff(pulses[:, 0]) - FRAME_CYCLES) <= 16)
 
 
-def test_a_line_that_comes_back_has_no_period_across_the_gap(rig: Rig) -> None:
+def test_a_line_that_comes_back_has_no_period_across_the_gap(rig: SessionRig) -> None:
     """Switched off and on, and after noise: the first period is that of two edges that were both seen."""
     devices = messages.PARAMETERS["devices"]
     expected = 13_000  # us between edges
@@ -121,7 +122,7 @@ PHASES_S = (0.0, 0.0011, 0.0037, 0.0062, 0.0093)  # where in the tick a test beg
 
 
 @pytest.mark.parametrize("phase_s", PHASES_S)
-def test_bounce_of_a_millisecond_is_one_press(rig: Rig, phase_s: float) -> None:
+def test_bounce_of_a_millisecond_is_one_press(rig: SessionRig, phase_s: float) -> None:
     rig.listen(0.02 + phase_s)
     shown = [bool(rig.telemetry[-1].whiskers & messages.Whiskers.LEFT)]
     start = rig.board.cycle + 100_000
@@ -134,7 +135,7 @@ def test_bounce_of_a_millisecond_is_one_press(rig: Rig, phase_s: float) -> None:
 
 
 @pytest.mark.parametrize("phase_s", PHASES_S)
-def test_noise_on_the_ping_pin_is_no_echo(rig: Rig, phase_s: float) -> None:
+def test_noise_on_the_ping_pin_is_no_echo(rig: SessionRig, phase_s: float) -> None:
     """Of a measurement that begins in the noise. One that was under way ends with the first edge of the noise: in an
     empty field the Ping holds its pulse for 18.5 ms, and noise that cuts it short looks like an echo."""
     rig.listen(0.05 + phase_s)
@@ -147,7 +148,7 @@ def test_noise_on_the_ping_pin_is_no_echo(rig: Rig, phase_s: float) -> None:
 
 
 @pytest.mark.parametrize("phase_s", PHASES_S)
-def test_infrared_burst_is_38_khz_for_a_millisecond(rig: Rig, phase_s: float) -> None:
+def test_infrared_burst_is_38_khz_for_a_millisecond(rig: SessionRig, phase_s: float) -> None:
     rig.listen(phase_s)
     start = rig.board.cycle
     rig.listen(0.5)

@@ -6,7 +6,8 @@ import numpy as np
 
 from boebot.link import messages
 from boebot.running.tasks import Request
-from boebot_hil.rig import CYCLES_PER_US, Rig
+from boebot_hil.rig import CYCLES_PER_US
+from sim_bridge.tests.rigs import SessionRig
 from tools.tests.bench.figures import figure, ran
 
 SERVO_LEFT, SERVO_RIGHT = 13, 12
@@ -19,7 +20,7 @@ SERVO_LEFT, SERVO_RIGHT = 13, 12
 )
 def servo_width() -> float:
     worst = 0.0
-    with Rig.open("avr") as rig:
+    with SessionRig.open("avr") as rig:
         rig.start()
         for signal in np.linspace(-1.0, 1.0, 9):
             counts = round(float(signal) * 1e4)

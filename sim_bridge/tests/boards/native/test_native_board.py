@@ -11,11 +11,12 @@ import pytest
 
 from boebot.errors import BoardError
 from boebot.link import frame, messages
-from boebot_hil.rig import CYCLES_PER_S, Rig
+from boebot_hil.rig import CYCLES_PER_S
 from sim_bridge import _core
 from sim_bridge.boards.board import Edge, Level, ResetCause
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.tests.boards.access import BoardAccess, SentByte
+from sim_bridge.tests.rigs import SessionRig
 
 MS = 16_000  # cycles
 TICK = 10 * MS
@@ -43,7 +44,7 @@ def make() -> Iterator[Maker]:
 
 
 class Alone:
-    """A board with nothing around it, as a session that a Rig speaks with."""
+    """A board with nothing around it, as a session that a SessionRig speaks with."""
 
     realtime = False
 
@@ -59,11 +60,11 @@ class Alone:
         return self.board.received()[0]
 
 
-def rig_of(board: BoardAccess) -> Rig:
-    return Rig(Alone(board))  # type: ignore[arg-type]
+def rig_of(board: BoardAccess) -> SessionRig:
+    return SessionRig(Alone(board))
 
 
-def drive(board: BoardAccess, left: int, right: int) -> Rig:
+def drive(board: BoardAccess, left: int, right: int) -> SessionRig:
     """Opens a session, arms the motors and sends one set-point that lives for 2 s."""
     host = rig_of(board)
     host.open_session()
@@ -79,7 +80,7 @@ def said(sent: list[SentByte]) -> list[tuple[int, int, bytes]]:
     return frame.Decoder().feed(b"\0" + bytes(byte.byte for byte in sent))
 
 
-def telemetry(host: Rig, seconds: float) -> messages.Telemetry:
+def telemetry(host: SessionRig, seconds: float) -> messages.Telemetry:
     """The last telemetry of the seconds to come."""
     return host.listen(seconds)[-1]
 
