@@ -40,6 +40,7 @@ MEASURED, CANNOT, CYCLES = "uno.measured.", "uno.cannot", "uno.cycles"
 BASELINE, UPDATE = "uno-baseline.json", "update"
 MEASURED_FILE, COVER_FILE = "measured.json", "cover.info"
 LONGEST_NAME = 80  # letters of a folder's name, before its hash
+KIT = ("boebot", "sim_bridge")  # packages
 UNO: pytest.StashKey[Uno] = pytest.StashKey()
 SESSION: pytest.StashKey[Session] = pytest.StashKey()
 KEYWORDS = ("image", "robot", "arena", "seed", "noise", "baud", "motors", "cycles", "faults")
@@ -119,17 +120,12 @@ def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
         raise pytest.fail.Exception(sentence, pytrace=False) from None
     request.node.stash[UNO] = opened
     yield opened
-    failure = ""
-    try:
-        request.config.stash[SESSION].take_cover(opened)
-        request.node.user_properties += [(MEASURED + one.name, json.dumps(vars(one))) for one in opened.measured]
-        if (judged := request.node.stash.get(JUDGED, None)) is not None:
-            failure = "\n".join(filter(None, [*_beyond(opened, judged), opened.unfired()]))
-            failure += f"\n{_keep(request.node, opened)}" if failure else ""
-    finally:
-        opened.close()
-    if failure:
-        pytest.fail(f"uno: {failure}", pytrace=False)
+    request.config.stash[SESSION].take_cover(opened)
+    request.node.user_properties += [(MEASURED + one.name, json.dumps(vars(one))) for one in opened.measured]
+    judged = request.node.stash.get(JUDGED, None)
+    wrong = [] if judged is None else [*_beyond(opened, judged), *filter(None, [opened.unfired()])]
+    if wrong:
+        pytest.fail("uno: " + "\n".join(wrong), pytrace=False)
 
 
 def _wanted(item: pytest.Item) -> Wanted:
@@ -207,6 +203,12 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     return result
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
+    """What the board cannot do is skipped."""
+    return (yield from _judged(item))
+
+
 def _beyond(opened: Uno, begin: int = 0) -> list[str]:
     """What was measured beyond its limits, in sentences, without the first `begin` measurements."""
     return [one.text for one in opened.measured[begin:] if one.verdict == "fail"]
@@ -220,19 +222,23 @@ def _judged(item: pytest.Item) -> Generator[None, object, object]:
             item.user_properties.append((CANNOT, str(error)))
             raise pytest.skip.Exception(str(error), _use_item_location=True) from None
         if (errors := sys.modules.get("boebot.errors")) and isinstance(error, AssertionError | errors.BoebotError):
-            _end_at_the_test(item, error.__traceback__)
+            _leave_out_the_kit(item, error.__traceback__)
         raise
 
 
-def _end_at_the_test(item: pytest.Item, trace: TracebackType | None) -> None:
-    """Cuts what the kit did off a traceback: it ends by the line of the test's own folder, which has called it."""
-    last = None
-    while trace is not None:
-        if Path(trace.tb_frame.f_code.co_filename).is_relative_to(item.path.parent):
-            last = trace
-        trace = trace.tb_next
-    if last is not None:
-        last.tb_next = None
+def _leave_out_the_kit(item: pytest.Item, first: TracebackType | None) -> None:
+    """Of a traceback: it ends by the line of the test's own folder that has called the kit, or that the kit has."""
+    frames: list[TracebackType] = []
+    own = 0  # up to the last of the folder
+    while first is not None:
+        name = first.tb_frame.f_globals.get("__name__", "").partition(".")[0]
+        is_own = Path(first.tb_frame.f_code.co_filename).is_relative_to(item.path.parent)
+        if not frames or is_own or name not in KIT:
+            frames.append(first)
+            own = len(frames) if is_own else own
+        first = first.tb_next
+    for frame, following in zip(frames[:own], [*frames[1:own], None], strict=True) if own else ():
+        frame.tb_next = following
 
 
 @pytest.hookimpl(wrapper=True)
@@ -245,10 +251,13 @@ def pytest_runtest_makereport(
         seen = [dataclasses.asdict(one) for one in opened.recorded.seen()]
         item.user_properties.append((CYCLES, json.dumps(seen)))
     report = yield
-    if opened is not None and call.when != "teardown":
-        shutil.rmtree(_folder(item), ignore_errors=True)  # of an earlier time
+    if opened is not None:
+        if call.when == "setup" or report.failed:
+            shutil.rmtree(_folder(item), ignore_errors=True)  # of an earlier time
         if report.failed:
             report.sections.append(("uno", _keep(item, opened)))
+        if call.when == "teardown":
+            opened.close()
     return report
 
 

@@ -119,6 +119,40 @@ def test_firmware(uno):
         assert read.run_time == pytest.approx(0.2) and read.record.count("pins") > 0
 
 
+def test_a_chip_and_a_fixture_that_fail_show_the_users_lines_and_leave_files(users: pytest.Pytester) -> None:
+    result = run(
+        users,
+        """
+from sim_bridge.bench.buses import SpiDevice
+
+class Chip(SpiDevice):
+    select = 9  # where the pulses are
+
+    def begin(self):
+        assert False, "selected"
+
+@pytest.mark.uno(image="own.elf")
+def test_chip(uno):
+    uno.spi.add(Chip())
+    uno.run(0.1)
+
+@pytest.fixture
+def parked(uno):
+    yield
+    uno.serial.expect(b"parked", within=0.1)
+
+@pytest.mark.uno(image="own.elf")
+def test_parks(parked):
+    pass
+""",
+    )
+    result.assert_outcomes(passed=1, failed=1, errors=1)
+    text = result.stdout.str()
+    assert "AssertionError: selected" in text and "waited 0.1 s for b'parked'" in text
+    assert "sim_bridge/" not in text.replace("rootdir", "") and "raised in repr" not in text
+    assert text.count("again: pytest") == len([*users.path.glob(".uno/*/pins.vcd")]) == 2
+
+
 def test_what_cannot_be_kept_leaves_the_rest(users: pytest.Pytester) -> None:
     result = run(
         users,
