@@ -73,7 +73,7 @@ def _avrdude(
     if len(flash) > ROOM:
         raise BoardError(f"the program has {len(flash)} bytes; expected {ROOM} at most, before the boot loader")
     if shutil.which("avrdude") is None:
-        raise BoardError(missing.program("Writing programs into boards", "avrdude", **_PACKAGES))
+        raise BoardError(missing.program("writing programs into boards", "avrdude", **_PACKAGES))
     path = _path(port)
     if holder := None if path.startswith("net:") else holder_of(path):
         raise BoardError(f"{port} is busy: {holder} has it open")

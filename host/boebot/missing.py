@@ -3,9 +3,11 @@ program of the operating system, a file that only a checkout can build."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from importlib import import_module
+from sysconfig import get_platform
 from typing import Any
 
 from boebot import resources
@@ -44,6 +46,14 @@ def installer(**packages: str) -> str:
     named = {manager.replace("_", "-"): those for manager, those in packages.items()}
     here = (one for one in _INSTALL if one in named and shutil.which(one))
     return next((f"{_INSTALL[one]} {named[one]}" for one in here), "")
+
+
+def in_c(error: ImportError) -> str:
+    """Of a module of the kit's that is written in C and cannot be loaded; "": the error is about something else."""
+    if not re.match(r"(boebot|sim_bridge)\..*\b_\w+$", error.name or ""):
+        return ""
+    way = "pip install --force-reinstall boebot" if resources.checkout() is None else "make setup"
+    return f"this copy of boebot is of another system, or not compiled: {error}; for {get_platform()}: {way}"
 
 
 def built(target: str) -> str:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+import boebot
 from boebot import missing, resources
 from boebot.errors import BoardError
 
@@ -28,6 +32,17 @@ def test_a_package_that_is_broken_is_no_missing_one(tmp_path: Path, monkeypatch:
         missing.imported("broken_package", "CAN", "x", "can", BoardError)
     with pytest.raises(BoardError, match=r"^CAN needs x, which is not installed: pip install .boebot\[can\].$"):
         missing.imported("not_there.module", "CAN", "x", "can", BoardError)
+
+
+def test_a_copy_of_another_system_is_one_sentence(tmp_path: Path) -> None:
+    """Its parts in C have other names: another system's wheel, unpacked by hand."""
+    library = Path(boebot.__file__).parent
+    shutil.copytree(library, tmp_path / "boebot", ignore=shutil.ignore_patterns("*.so", "*.pyd", "__pycache__"))
+    command = [sys.executable, "-c", "from boebot.cli import main; main()", "list", "robots"]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("boebot: this copy of boebot is of another system, or not compiled: No module named")
+    assert ended.stderr.endswith(": pip install --force-reinstall boebot\n") and len(ended.stderr.splitlines()) == 1
 
 
 def test_what_only_a_checkout_can_build(monkeypatch: pytest.MonkeyPatch) -> None:

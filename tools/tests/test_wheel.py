@@ -46,7 +46,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     ("brain", "board"),
-    [("wander", "native"), ("wander", "avr"), pytest.param("clearway", "native", marks=pytest.mark.soak)],
+    [("wander", "native"), ("demo", "avr"), pytest.param("clearway", "native", marks=pytest.mark.soak)],
 )
 def test_an_installed_wheel_runs_bundled_brains(installed: Path, tmp_path: Path, brain: str, board: str) -> None:
     out = tmp_path / "out"
@@ -72,6 +72,30 @@ def test_an_installed_wheel_says_what_only_a_checkout_can(installed: Path, tmp_p
         assert done.returncode in (1, 2)
         assert "; only a checkout of boebot can build it with `make " in done.stderr
         assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "extra"),
+    [
+        ("run wander --on can:virtual:lab", "can"),
+        ("can bridge native --can virtual:lab", "can"),
+        ("run {sketch}", "firmware"),
+        ("report {run} --quiet --as foxglove", "foxglove"),
+        ("report {run} --quiet --as can.log", "can"),
+    ],
+)
+def test_an_installed_wheel_names_the_extra_that_is_missing(
+    installed: Path, tmp_path: Path, command: str, extra: str
+) -> None:
+    boebot = str(installed / "bin" / "boebot")
+    if "{run}" in command:
+        made = [boebot, "run", "wander", "--seconds", "0.1", "--quiet", "--out", "made"]
+        subprocess.run(made, cwd=tmp_path, check=True)
+    words = command.format(run="made", sketch=PROJECT / "host/boebot/sketches/whiskers").split()
+    done = subprocess.run([boebot, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.endswith(f", which is not installed: pip install 'boebot[{extra}]'\n"), done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_an_installed_wheel_has_the_sketches(installed: Path, tmp_path: Path) -> None:

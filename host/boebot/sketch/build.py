@@ -185,7 +185,7 @@ class _Tools:
         kits = [one.read_bytes() for one in sorted(HERE.rglob("*.*")) if one.suffix in (".py", ".json")]
         compiler, framework = shutil.which("avr-gcc"), core_directory.ARDUINO / "platform.txt"
         if importlib.util.find_spec("platformio") is None:
-            raise BoebotError(missing.package("Building sketches", "PlatformIO", "firmware"))
+            raise BoebotError(missing.package("building sketches", "PlatformIO", "firmware"))
         if importlib.util.find_spec("SCons") and compiler and framework.is_file():
             files = [one.stat() for one in (Path(compiler).resolve(), framework)]
             told = [version("platformio"), version("scons"), *((one.st_size, one.st_mtime_ns) for one in files)]

@@ -92,7 +92,7 @@ def save_for_foxglove(results: Sequence[Run], folder: Path) -> Path:
     Raises:
         BoebotError: Foxglove's schemas are not installed, or the folder cannot be written to.
     """
-    imported("foxglove_schemas_protobuf", "--as foxglove", "Foxglove's schemas", "foxglove")
+    imported("foxglove_schemas_protobuf", "--as foxglove", "foxglove-schemas-protobuf", "foxglove")
     from boebot.view import foxglove
 
     return write_whole(folder / "foxglove.mcap", partial(foxglove.write, results))
