@@ -70,16 +70,19 @@ def show_arena(
     json: options.Json = False,
 ) -> None:
     """Show an arena: a picture, its size, where a robot starts, and its shapes. Lengths in m, x to the right, y up."""
-    # here, as numpy and matplotlib take a while: no other command should wait for them
+    # here, as numpy takes a while: no other command should wait for it, nor --json for matplotlib
     from boebot.arenas import load_arena
     from boebot.arenas.floor_plan import floor_plan, path_end
-    from boebot.view import arena_picture
 
     loaded = load_arena(arena)
     plan = floor_plan(loaded, 0.0, path_end(loaded))
     if out is None and not json:
         out = Path(f"arena-{Path(arena).stem}.png")
-    picture = None if out is None else str(arena_picture.write(loaded, out))
+    picture = None
+    if out is not None:
+        from boebot.view import arena_picture
+
+        picture = str(arena_picture.write(loaded, out))
     x, y, heading = loaded.start
     shapes = list(_shapes(plan))
     size = _size(plan)
@@ -121,15 +124,17 @@ def show_robot(
 
     Wires without a colour are yours. A device that is off keeps its pins, and is not in the picture.
     """
-    # here, as matplotlib takes a while: no other command should wait for it
     from boebot.description.robots import load_robot
     from boebot.description.wiring import connections, free_pins
-    from boebot.view import robot_picture
 
     described = load_robot(robot)
     if out is None and not json:
         out = Path(f"robot-{Path(robot).name.removesuffix('.toml')}.svg")
-    picture = None if out is None else robot_picture.write(described, out)
+    picture = None
+    if out is not None:
+        from boebot.view import robot_picture
+
+        picture = robot_picture.write(described, out)
     body = described.body
     values: dict[str, Any] = {
         "name": described.name,
