@@ -115,11 +115,15 @@ class BoardPins(BoardMemory):
         """Gives a pin back to its part, or lets go of it."""
         lib.robot_release(self._with_board, checked_pin("release", pin))
 
-    def analog(self, channel: int, volts: float | None) -> None:
-        """Holds the voltage at analog channel 0..5; None: what its part gives, or 0 V."""
+    def analog(self, channel: int, volts: float) -> None:
+        """Holds the voltage at analog channel 0..5, until its pin is driven or released. The pin's level follows: low
+        below 0.3 of the supply, high above 0.6 of it, and else it stays (ATmega328P data sheet, section 29.2)."""
         channel = whole("analog: the channel", channel, BoardError, least=0, most=5)
-        held = math.nan if volts is None else number("analog: the voltage", volts, BoardError, least=0, most=5.5)
-        self._with_board.held[channel] = held
+        volts = number("analog: the voltage", volts, BoardError, least=0, most=5.5)
+        share = volts / max(self._robot.supply_voltage, 1e-6)
+        if not 0.3 <= share <= 0.6:
+            lib.robot_drive(self._with_board, 0, ANALOG_PINS[channel], share > 0.6)
+        self._with_board.held[channel] = volts
 
     def square_wave(self, pin: int, period: int, seconds: float) -> None:
         """Takes a pin from its part; its level changes every half `period` (cycles) for that long."""
@@ -173,11 +177,6 @@ class BoardPins(BoardMemory):
         if values["reset_v"] >= values["erratic_v"]:
             raise BoardError(f"brown_out: reset_v is {values['reset_v']:g}; expected less than erratic_v")
         self._with_board.brown_out.parameters = values
-
-    def brown_outs(self) -> tuple[int, int]:
-        """Resets by the brown-out detector so far, and upsets above its voltage."""
-        brown_out = self._robot.handle.brown_out
-        return int(brown_out.resets), int(brown_out.upsets)
 
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog."""

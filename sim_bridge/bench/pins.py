@@ -26,7 +26,6 @@ from boebot.errors import CallError
 from boebot.record.record import net_level
 from sim_bridge.bench.bench import RXEN0, TXEN0, Bench
 from sim_bridge.bench.waiting import LONGEST_S, Cannot, WaitError
-from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import CLOCK_HZ, PINS, Level
 
 NET = np.dtype([("cycle", "<u8"), ("level", "u1")])  # RELEASED: it hangs in the air
@@ -69,7 +68,7 @@ class Square:
 class Pin:
     """A pin by its number, 0..13 or "A0".."A5". Pins 0 and 1 are the serial line's while the program uses that."""
 
-    __slots__ = ("_cycles", "_does", "_levels", "_seen", "bench", "number")
+    __slots__ = ("_cycles", "_does", "_fight", "_held", "_is_native", "_levels", "_seen", "bench", "number")
 
     def __init__(self, bench: Bench, name: int | str) -> None:
         """Raises CallError where there is no such pin."""
@@ -78,9 +77,11 @@ class Pin:
         except ValueError as refused:
             raise CallError(str(refused)) from None
         self.bench = bench
+        self._is_native = bench.board.extension("outside log", "board_outside_log") is None
         self._cycles, self._levels = [0], [int(Level.RELEASED)]  # of its changes
         self._does = [int(Level.RELEASED), int(Level.RELEASED)]  # the firmware, the outside
         self._seen = [0, 0]
+        self._held, self._fight = math.inf, ""  # from which cycle on the test drives it; against the program: in words
 
     def __str__(self) -> str:
         return f"pin {pin_name(self.number)}"
@@ -95,7 +96,9 @@ class Pin:
     def release(self) -> None:
         """Gives it back to the part that drives it; lets go of it where none does."""
         self._begin()
+        self.take()
         self.bench.pins.release(self.number)
+        self._held = math.inf
 
     def square(self, hz: float, count: int | None = None, after: float = 0.0) -> None:
         """Drives a square wave: `count` whole periods that begin high, and then low; without end where it is None."""
@@ -151,6 +154,7 @@ class Pin:
         bench, program = self.bench, self.bench.pins.output(self.number)
         if program <= Level.HIGH and first <= bench.now and bench.board.reacts_at is None:
             raise CallError(f"{self}: the program drives it, to {program}; expected a pin that it reads")
+        self._held = min(self._held, first)
         bench.acted()
         bench.sources[:] = [one for one in bench.sources if not (isinstance(one, Square) and one.pin == self.number)]
 
@@ -162,20 +166,35 @@ class Pin:
         self._look()
         return Level(self._levels[-1])
 
-    def edges(self, since: int = 0) -> NDArray[Any]:
-        """Its changes (dtype NET: cycle and level from then on) from a cycle on, else from power-on."""
+    def edges(self, since: float = 0.0) -> NDArray[Any]:
+        """Its changes (dtype NET: cycle and level from then on) since power-on, or since then (s)."""
+        return self._changes(round(number(f"{self}: since", since, CallError) * CLOCK_HZ))
+
+    def _changes(self, since: int) -> NDArray[Any]:
+        """Those from a cycle on."""
         self._look()
-        first = bisect_left(self._cycles, since)
+        first = max(1, bisect_left(self._cycles, since))
         return np.array(list(zip(self._cycles[first:], self._levels[first:], strict=True)), NET)
 
     def _look(self) -> None:
-        """Takes the edges that are new. What comes and goes within one cycle is no change."""
+        """Takes the edges that are new. Raises CallError where the program drives the pin, and the test does."""
         self._expect_no_line()
+        if self._is_native and self._held < math.inf:
+            raise Cannot(f"what a test does to {self} cannot be looked at{NATIVE}")
+        if fight := self.take():
+            raise CallError(fight)
+
+    def take(self) -> str:
+        """Takes the edges that are new. What comes and goes within one cycle is no change. Returns, in a sentence, that
+        program and test have driven it against each other; or ""."""
         logs = [self.bench.edges[self.number], self.bench.driven[self.number]]
         found = merge(*([(e.cycle, who, e.level) for e in logs[who][self._seen[who] :]] for who in (0, 1)))
         self._seen = [len(log) for log in logs]
         for cycle, who, level in found:
             self._does[who] = level
+            if not self._fight and cycle >= self._held and {*self._does} == {Level.LOW, Level.HIGH}:
+                what = "the program drives it, to {}, and the test to {}".format(*self._does)
+                self._fight = f"{self}: {what}, at {cycle / CLOCK_HZ:.6f} s; expected a pin that the program reads"
             if (net := net_level(*self._does)) == self._levels[-1]:
                 continue
             if cycle > self._cycles[-1] or len(self._cycles) == 1:
@@ -185,10 +204,11 @@ class Pin:
                 self._levels[-1] = net
                 if net == self._levels[-2]:
                     del self._cycles[-1], self._levels[-1]
+        return self._fight
 
     def _expect_no_line(self) -> None:
         if self.number in LINE_PINS and self.bench.uses_line(LINE_PINS[self.number]):
-            kind = CallError if isinstance(self.bench.board, AvrBoard) else Cannot  # which no program there can leave
+            kind = Cannot if self._is_native else CallError  # which no program there can leave
             raise kind(f"{self} is the serial line's while the program uses that; expected uno.serial, or another pin")
 
     # ---- waited for --------------------------------------------------------------------------------------------------
@@ -207,7 +227,7 @@ class Pin:
             levels = self._levels[at:]
             return max(mark, self._cycles[at + levels.index(level)]) if level in levels else None
 
-        cycle = self._wait(found, lambda cycle: cycle, within, f"to be {level}")
+        cycle = self._wait(found, lambda cycle: cycle, within, f"to be {level}", Level.RELEASED)
         return cycle / CLOCK_HZ
 
     def pulse(self, within: float = WITHIN_S, level: int = 1) -> Pulse:
@@ -227,11 +247,11 @@ class Pin:
             some = self.all_pulses(mark, level) if self._has(2 * count, mark) else ()
             return [Pulse(int(at), int(cycles), level) for at, cycles in some[:count]] if len(some) >= count else None
 
-        return self._wait(found, lambda some: some[-1].start + some[-1].cycles, within, f"for {_many(count, level)}")
+        return self._wait(found, lambda some: some[-1].start + some[-1].cycles, within, _many(count, level), level)
 
     def all_pulses(self, since: int = 0, level: int = 1) -> NDArray[np.int64]:
         """Start and length, in cycles, of each pulse that has ended and began at `since` or later: shape (n, 2)."""
-        return pulses_of(self.edges(since), level)
+        return pulses_of(self._changes(since), level)
 
     def frequency(self, periods: int = 8, within: float = WITHIN_S) -> float:
         """Hz, over that many whole periods, from rise to rise, from the mark on. Raises as `pulse`."""
@@ -246,7 +266,7 @@ class Pin:
         periods = whole(f"{self}: the periods", periods, CallError, least=1, most=EDGES_MAXIMUM)
 
         def found(mark: int) -> tuple[int, int, int] | None:
-            changes = self.edges(mark if self._has(2 * periods + 1, mark) else self.bench.now)
+            changes = self._changes(mark if self._has(2 * periods + 1, mark) else self.bench.now)
             rises = np.flatnonzero(changes["level"] == Level.HIGH)[: periods + 1]
             if len(rises) <= periods:
                 return None
@@ -256,36 +276,38 @@ class Pin:
             return high, int(lengths.sum()), int(inside["cycle"][-1])
 
         what = f"for {periods} periods"
-        high, in_all, _ = self._wait(found, lambda some: some[2], within, what)
+        high, in_all, _ = self._wait(found, lambda some: some[2], within, what, Level.HIGH)
         return periods * CLOCK_HZ / in_all, high / in_all
 
     def _has(self, changes: int, since: int) -> bool:
         """It has had that many changes from that cycle on."""
         return len(self._cycles) - bisect_left(self._cycles, since) >= changes
 
-    def _wait(self, found: Callable[[int], T | None], event: Callable[[T], int], within: float, what: str) -> T:
-        """What is found at last; its event's cycle is then the mark."""
+    def _wait(
+        self, found: Callable[[int], T | None], event: Callable[[T], int], within: float, what: str, of: int
+    ) -> T:
+        """What is found at last; its event's cycle is then the mark. `of`: the level of the pulses that are meant."""
         within = number(f"{self}: within", within, CallError, least=0.0, most=LONGEST_S)
         bench = self.bench
         mark, begin, end = bench.mark, bench.now, bench.now + round(within * CLOCK_HZ)
         self._look()
         while (some := found(mark)) is None or event(some) > end:
             if bench.now >= end:
-                raise WaitError(f"{self}: waited {within:g} s {what}; {self._seen_since(begin)}")
+                raise WaitError(f"{self}: waited {within:g} s {what}; {self._seen_since(begin, of)}")
             bench.run_until(end, edge_of=(self.number,))
             self._look()
         bench.mark = event(some)
         return some
 
-    def _seen_since(self, begin: int) -> str:
-        """In words: what it did since a cycle."""
+    def _seen_since(self, begin: int, level: int) -> str:
+        """In words: what it did since a cycle, and the last pulse of that level that began before the mark."""
         names = {Level.LOW: "0", Level.HIGH: "1", Level.RELEASED: "in the air"}
         count = len(self._cycles) - bisect_right(self._cycles, begin)
-        native = "" if self.bench.board.extension("outside log", "board_outside_log") else NATIVE
-        return (
-            f"it had {count} edges meanwhile, and has been {names[Level(self._levels[-1])]} since "
-            f"{self._cycles[-1] / CLOCK_HZ:.6f} s; now it is {self.bench.now / CLOCK_HZ:.6f} s{native}"
-        )
+        text = f"it had {count} edges meanwhile, and has been {names[Level(self._levels[-1])]} since "
+        text += f"{self._cycles[-1] / CLOCK_HZ:.6f} s; now it is {self.bench.now / CLOCK_HZ:.6f} s"
+        for at, _ in [row for row in self.all_pulses(0, level).tolist() if row[0] < self.bench.mark][-1:]:
+            text += f"; the last one began at {at / CLOCK_HZ:.6f} s, before what was last waited for or done"
+        return text + (NATIVE if self._is_native else "")
 
 
 def pulses_of(changes: NDArray[Any], level: int = 1) -> NDArray[np.int64]:
@@ -300,4 +322,4 @@ NATIVE = " (of the native board only what the firmware drives is seen)"
 def _many(count: int, level: int) -> str:
     """Pulses, in words."""
     kind = "high" if level else "low"
-    return f"a {kind} pulse" if count == 1 else f"{count} {kind} pulses"
+    return f"for a {kind} pulse" if count == 1 else f"for {count} {kind} pulses"

@@ -302,7 +302,7 @@ class Session:
     def __init__(self, config: pytest.Config) -> None:
         self._config, self._root = config, config.rootpath
         self._folder = Path(config.rootpath, config.getoption("--uno-keep"))
-        self._programs: dict[Path, Path | Exception] = {}
+        self._programs: dict[object, Path | Exception] = {}
         self._measured: dict[str, list[dict[str, Any]]] = {}
         self._cannot: Counter[str] = Counter()
         self._cycles: dict[str, list[dict[str, Any]]] = {}
@@ -315,19 +315,20 @@ class Session:
             self.coverage = Coverage()
 
     def program(self, file: Path) -> Path:
-        """The ELF or HEX file, which is built once; what is wrong with it is said of each test. Raises BoebotError."""
-        from boebot.brains import load_program
+        """The ELF or HEX file, which is built once for the same sources; what is wrong with it is said
+        of each test. Raises BoebotError."""
+        from boebot.brains import load_program, program_state
         from boebot.errors import BoebotError, CallError
 
-        if file not in self._programs:
+        if (state := program_state(file)) not in self._programs:
             try:
                 program = load_program(file)
                 if program is None or program.path is None:
                     raise CallError(f"{file} is no program; expected an ELF or HEX file, a sketch or a folder of one")
-                self._programs[file] = program.path
+                self._programs[state] = program.path
             except BoebotError as error:
-                self._programs[file] = error
-        if isinstance(found := self._programs[file], Exception):
+                self._programs[state] = error
+        if isinstance(found := self._programs[state], Exception):
             raise found
         return found
 

@@ -25,6 +25,7 @@ class Line:
         transport: carries the bytes.
         is_heard: whether the board's receiver is on, so that a byte would not be lost.
         not_heard: why it would, in words.
+        rates: in words: the bit rates of both ends, where a test chooses one.
         mark: is called with the instant of what was waited for, the end of a byte's stop bit, or of what was sent (s).
         starts_s: when a program that has said nothing yet has begun at the latest: a wait does not begin before.
         allowance_s: by which a wait is longer, as the way to a real board takes time that is not the board's.
@@ -33,6 +34,7 @@ class Line:
     transport: Transport
     is_heard: Callable[[], bool] = lambda: True
     not_heard: str = ""
+    rates: Callable[[], str] = str
     mark: Callable[[float], object] = lambda at_s: None
     starts_s: float = 0.0
     allowance_s: float = 0.0
@@ -148,7 +150,7 @@ class Serial:
         new, before = bytes(self.heard[self._begin :]), bytes(self.heard[: self._begin])
         saw = f"saw {_end_of(new)}" if new else "nothing came"
         earlier = f"; before that came {_end_of(before)}" if before else ""
-        return f"waited {within:g} s{allowed} for {wanted} from the board: {saw}{earlier}"
+        return f"waited {within:g} s{allowed} for {wanted} from the board: {saw}{earlier}{self.line.rates()}"
 
 
 def _end_of(data: bytes) -> str:

@@ -44,19 +44,21 @@ class Symbol:
         self[()] = value
 
     def __getitem__(self, index: Any) -> Any:
-        """An element of an array. Raises CallError: there is none."""
+        """An element of an array, or a part of it, that cannot be written to. Raises CallError: there is none."""
         return _plain(self._element(self._cells(), index))
 
     def __setitem__(self, index: Any, value: Any) -> None:
         """Raises CallError where there is none, or it does not fit."""
-        cells = self._cells()
+        cells = self._cells().copy()
         before = self._element(cells, index)
         kind, shape = before.dtype, np.shape(before)
+        is_text = isinstance(value, bytes) and kind.itemsize == len(shape) == 1
+        cell_values = np.frombuffer(value.ljust(shape[0], b"\0"), kind) if is_text else value  # as C has it
         look: Any = {"f": np.isfinite, "V": np.shape}.get(kind.kind, np.asarray)
         try:
             with np.errstate(over="ignore"):
-                cells[index] = value
-            fits = np.shape(value) == shape and np.array_equal(look(cells[index]), look(value))
+                cells[index] = cell_values
+            fits = np.shape(cell_values) == shape and np.array_equal(look(cells[index]), look(cell_values))
         except (OverflowError, ValueError, TypeError):
             fits = False
         if not fits:
@@ -67,10 +69,10 @@ class Symbol:
         self._memory.write_memory(self.variable.address, cells.tobytes())
 
     def _cells(self) -> NDArray[Any]:
-        """The variable as its bytes are now."""
+        """The variable as its bytes are now, not to be written to: that would not reach the program."""
         kind = self.variable.dtype
         data = self._memory.read_memory(self.variable.address, kind.itemsize)
-        return np.frombuffer(bytearray(data), kind.base).reshape(kind.shape)
+        return np.frombuffer(data, kind.base).reshape(kind.shape)
 
     def _element(self, cells: NDArray[Any], index: Any) -> Any:
         try:

@@ -98,6 +98,8 @@ class Uno:
         self._fired: dict[str, Callable[[], int]] = {}
         self._record, self._showing = Record(), Showing()
         self._showing.is_kept = True
+        if bench is not None:
+            bench.forget = self.serial.forget
         if bench is not None and wanted.robot is not None:
             bench.at(TICK_CYCLES, self._put_aside)
         self.recorded: Cycles | None = None
@@ -158,11 +160,7 @@ class Uno:
     def reset(self, cause: str = "external") -> None:
         """Resets the microcontroller: power, external, brown_out or watchdog. What it has said before is no answer."""
         self.bench("reset line").pins.reset(cause)
-        self._begins_anew()
-
-    def _begins_anew(self) -> None:
         self.bench("reset line").acted()
-        self.serial.forget()
 
     # ---- what is at the board ----------------------------------------------------------------------------------------
 
@@ -259,6 +257,8 @@ class Uno:
         if not isinstance(what, str):
             raise CallError(f"fault: got {shown(what)}; expected a text, as 'board.reset@20ms'")
         owner = what.partition(".")[0]
+        if owner == "host":
+            raise CallError(f"fault {what!r}: the host is the test itself; expected its line's, as 'cable.out@1s..2s'")
         if self._robot.name == BARE and owner not in OWNERS:
             raise CallError(f"fault {what!r}: the board is on no robot; expected one in the mark: robot='shieldbot'")
         fault = read(what, self._robot)
@@ -269,7 +269,7 @@ class Uno:
         self._fired[str(fault)] = inject(fault, self._robot, session, self._bad_line, self.serial.opened_s)
         if bench is not None:
             if owner == "board":
-                bench.at(round(fault.begin_s * CLOCK_HZ), self._begins_anew)
+                bench.at(round(fault.begin_s * CLOCK_HZ), bench.acted)
             bench.acted()
             bench.session.sim.do_due()  # what begins now
 
@@ -278,8 +278,9 @@ class Uno:
         return line
 
     def unfired(self) -> str:
-        """In a sentence: those that changed nothing so far; or ""."""
-        return str(unfired({name: fired() for name, fired in self._fired.items()}) or "")
+        """In sentences: those that changed nothing so far, and pins that program and test drive against each other."""
+        said = [str(unfired({name: fired() for name, fired in self._fired.items()}) or "")]
+        return "\n".join(filter(None, [*said, *(pin.take() for pin in self._pins.values())]))
 
     # ---- what was measured -------------------------------------------------------------------------------------------
 
@@ -292,11 +293,10 @@ class Uno:
 
     def save_pins(self, path: Path) -> None:
         """Writes what all pins did so far, for viewers of logic signals; nothing of a board at a port."""
-        if self._bench_or_none is None:
+        if (bench := self._bench_or_none) is None:
             return
         from boebot.view import vcd
 
-        bench = self._bench_or_none
         record, what = Record.of(bench.streams()), str(self._wanted.image or self._wanted.robot)
         vcd.write_boards([(bench.robot.description, record)], what, path)
 
@@ -349,10 +349,7 @@ class Uno:
 
     def close(self) -> None:
         """Gives board and world, or the port, back. May be called twice."""
-        if self._bench_or_none is not None:
-            self._bench_or_none.close()
-        else:
-            self.serial.line.transport.close()
+        (self._bench_or_none or self.serial.line.transport).close()
 
     def __enter__(self) -> Uno:
         return self
@@ -403,7 +400,7 @@ def _on_bench(on: str, wanted: Wanted) -> Uno:
     if on == NATIVE and wanted.image is not None:
         raise Cannot(f"the native board is the kit's own firmware; it cannot run {wanted.image.name}")
     if wanted.image is None and wanted.robot is None:
-        raise CallError("there is nothing to test; expected image= or robot=, or both")
+        raise CallError("there is nothing to test; expected image= or robot= in @pytest.mark.uno(...), or both")
     around: dict[str, Any] = {"robot": wanted.robot, "arena": wanted.arena, "seed": wanted.seed, "noise": wanted.noise}
     bench = Bench(wanted.image, on=on, **around)
     transport = bench.session.transport
@@ -415,8 +412,12 @@ def _on_bench(on: str, wanted: Wanted) -> Uno:
     def mark(at_s: float) -> None:
         bench.mark = round(at_s * CLOCK_HZ)
 
+    def rates() -> str:
+        rate = bench.line_rate() if wanted.baud and on == AVR else 0
+        return f"; the program's rate is {rate:.0f} bit/s, the mark says baud={wanted.baud}" if rate else ""
+
     not_heard = "the program has not switched its receiver on (Serial.begin)"
-    return Uno(on, wanted, Line(transport, lambda: bench.uses_line(RXEN0), not_heard, mark), bench)
+    return Uno(on, wanted, Line(transport, lambda: bench.uses_line(RXEN0), not_heard, rates, mark), bench)
 
 
 _holds: dict[str, bytes] = {}

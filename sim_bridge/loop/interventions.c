@@ -33,9 +33,10 @@ int sim_place_shape(sim *self, int shape, double x, double y, double heading) {
   return SIM_OK;
 }
 
-/* Takes a pin from its part, or gives it back. Returns what the part does there (PART_DRIVES, ...); 0: none drives it. */
+/* Takes a pin from its part, or gives it back; no voltage is held there any more. Returns what the part does there (PART_DRIVES, ...); 0: none drives it. */
 static int override(robot *r, uint8_t pin, int overridden) {
   int role = 0;
+  if (pin >= BOARD_FIRST_ANALOG_PIN) r->held[pin - BOARD_FIRST_ANALOG_PIN] = NAN;
   for (int i = 0; i < r->part_count; i++) {
     part *p = r->parts[i];
     for (int k = 0; k < PART_PINS; k++) {

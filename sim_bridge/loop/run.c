@@ -43,6 +43,12 @@ double robot_on_analog(void *context, uint64_t cycle, uint8_t channel) {
   if (channel >= BOARD_ANALOG_COUNT) return 0.0;
   if (!isnan(self->held[channel])) return self->sampled[channel] = self->held[channel];
   part *p = self->analog[channel];
+  const uint8_t pin = (uint8_t)(BOARD_FIRST_ANALOG_PIN + channel), driven = self->chassis.driven[pin];
+  if (driven <= BOARD_HIGH && (p == NULL || !self->drives[pin])) { /* by a digital part, or by a test */
+    const uint8_t *levels = self->board->op->extension(self->board, BOARD_PIN_LEVELS);
+    return self->sampled[channel] =
+               (levels == NULL ? driven : levels[pin]) ? self->chassis.supply * BOARD_NOMINAL_VOLTS : 0.0;
+  }
   return self->sampled[channel] = p == NULL || p->unplugged ? 0.0 : p->op->analog(p, cycle);
 }
 

@@ -24,12 +24,10 @@ def _reset(robot: SimRobot, _: int, cause: float) -> Acting:
 
 
 def _brown_out(robot: SimRobot, _: int, volts: float) -> Acting:
-    """It has changed something where the brown-out detector resets the board, or the board goes astray above the
-    detector's voltage."""
+    """It changes the supply, whether or not that resets the board."""
     pins = BoardPins(robot)
-    before = sum(pins.brown_outs())
     pins.supply(volts)
-    return partial(pins.supply, None), lambda: sum(pins.brown_outs()) - before
+    return partial(pins.supply, None), lambda: 1
 
 
 def _corrupted(robot: SimRobot, _: int, count: float) -> Acting:

@@ -146,6 +146,18 @@ def load_program(source: object, progress: Callable[[float], object] | None = No
     return LoadedBrain(as_utf8(path.name), lambda robot: None, path=path.resolve())
 
 
+def program_state(path: Path) -> object:
+    """What the program in a file, or of a sketch or project, depends on: another one where it is to be loaded again.
+    Raises as `load_program`."""
+    from boebot.sketch.find import below, find
+
+    if path.suffix.lower() in PROGRAMS:
+        return path
+    found = find(path)
+    times = [(one, one.stat().st_mtime_ns) for one in below(found.folder, ("",)) if not found.files]  # of a project
+    return path, *found.files.items(), *times
+
+
 def load_brain(source: object) -> LoadedBrain:
     """The brain in a file, of a bundled name, or the function, class, object or module itself.
 

@@ -71,8 +71,8 @@ class WheelEncoder(Device, frozen=True, kw_only=True):
     LINES: ClassVar[int]
 
     FAULTS: ClassVar[Mapping[str, FaultKind]] = {
-        "missing": FaultKind("this share of the edges is not seen", default=1.0),
-        "extra": FaultKind("after this share of the edges the line flickers", default=1.0),
+        "missing": FaultKind("this share of the edges is not seen", default=1.0, harmless=0.0),
+        "extra": FaultKind("after this share of the edges the line flickers", default=1.0, harmless=0.0),
         "noisy": FaultKind("a square wave is on its first line", "Hz", default=100e3, least=1.0, most=1e6),
     }
 

@@ -71,7 +71,7 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
     )
     FAULTS: ClassVar = {
         "stuck": FaultKind("the contact is stuck", words=("open", "pressed")),
-        "bouncing": FaultKind("the contact bounces for so long on average", "s", default=0.02, most=1.0),
+        "bouncing": FaultKind("the contact bounces for so long on average", "s", default=0.02, most=1.0, harmless=0.0),
     }
 
     def checkup(self, readings: Sequence[Whisker]) -> Checkup:

@@ -33,10 +33,10 @@ Fired = Callable[[], int]
 
 OWNERS: Mapping[str, Mapping[str, FaultKind]] = {
     "serial": {
-        "dropped": FaultKind("bytes are lost, this share of them", default=0.01),
-        "doubled": FaultKind("bytes come twice, this share of them", default=0.01),
-        "repeated": FaultKind("whole frames come twice, this share of them", default=0.1),
-        "flipped": FaultKind("bits are wrong, this share of them", default=1e-4),
+        "dropped": FaultKind("bytes are lost, this share of them", default=0.01, harmless=0.0),
+        "doubled": FaultKind("bytes come twice, this share of them", default=0.01, harmless=0.0),
+        "repeated": FaultKind("whole frames come twice, this share of them", default=0.1, harmless=0.0),
+        "flipped": FaultKind("bits are wrong, this share of them", default=1e-4, harmless=0.0),
         "delayed": FaultKind("bytes come later by this", "s", default=0.1, most=10.0, harmless=0.0),
         "stalled": FaultKind("bytes are held back until END, and come all at once", when="until END"),
         "rate": FaultKind("the host's bit rate is off by this share", default=0.03, least=-0.1, most=0.1, harmless=0.0),
@@ -49,7 +49,7 @@ OWNERS: Mapping[str, Mapping[str, FaultKind]] = {
     },
     "board": {
         "reset": FaultKind("the microcontroller is reset", words=RESET_CAUSES, when="once"),
-        "brown_out": FaultKind("the 5 V rail falls to this", "V", default=2.5, most=5.0),
+        "brown_out": FaultKind("the 5 V rail falls to this", "V", default=2.5, most=5.0, harmless=5.0),
     },
     "eeprom": {"corrupted": FaultKind("bytes get other values", default=1.0, least=1.0, most=1024.0, when="once")},
 }

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import boebot
-from boebot.brains import bundled, load_brain
+from boebot.brains import bundled, load_brain, program_state
 from boebot.errors import BrainError
 from boebot.robot import Robot
 from boebot.running.tasks import Request
@@ -32,6 +32,27 @@ def test_wander_backs_off_from_a_touch_and_turns_away() -> None:
     assert after.true_x_m < 1.35
     assert math.radians(80) < abs(after.true_heading_rad) < math.radians(140)
     assert after.command_left == after.command_right > 0  # straight on
+
+
+def test_the_state_of_a_program_changes_with_its_sources(tmp_path: Path) -> None:
+    sketch, project = tmp_path / "own", tmp_path / "project"
+    (project / "lib" / "motor").mkdir(parents=True)
+    (sketch / "libraries").mkdir(parents=True)
+    (project / "platformio.ini").touch()
+    for path, made in (
+        (sketch, [sketch / "own.ino", sketch / "libraries" / "more.h"]),
+        (sketch / "own.ino", [sketch / "own.ino"]),
+        (project, [project / "platformio.ini", project / "lib" / "motor" / "motor.h", project / "more.py"]),
+    ):
+        states = []
+        for file in made:
+            for text in ("1;", "20;"):
+                file.write_text(text)
+                states.append(program_state(path))
+        assert len(set(states)) == len(states) and program_state(path) == states[-1]
+        (made[0].parent / ".pio").mkdir(exist_ok=True)
+        (made[0].parent / ".pio" / "made.h").write_text("2;")
+        assert program_state(path) == states[-1]
 
 
 def test_function_in_a_file(tmp_path: Path) -> None:

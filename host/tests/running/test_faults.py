@@ -69,6 +69,8 @@ def test_read(text: str, fault: Fault) -> None:
         ("host.stopped@3..1e9", "fault host.stopped@3s..1000000000s outlasts the run of 5 s; expected an earlier END"),
         ("host.stopped@1", "host.stopped@1s never ends; expected an END"),
         ("serial.delayed=0@1..2", "fault serial.delayed=0@1s..2s changes nothing; expected another value than 0"),
+        ("serial.dropped=0@0", "fault serial.dropped=0@0s changes nothing"),
+        ("board.brown_out=5@1", "fault board.brown_out=5@1s changes nothing"),
         ("servo_left.weak=100%@1", "fault servo_left.weak=1@1s changes nothing"),
         ("cable.out@1..2 cable.out@1s..2s", "fault cable.out@1s..2s is there twice"),
         ("cable.out@-1", "begins at -1 s; expected a time of the run"),
@@ -127,9 +129,10 @@ def test_motors_stop_where_no_host_speaks(fault: str) -> None:
         assert result.sessions_lost == ("slow" not in fault)
 
 
-def test_a_brown_out_that_lasts_fires_as_it_begins(tmp_path: Path) -> None:
+@pytest.mark.parametrize("volts", [2.5, 4.0])
+def test_a_brown_out_that_lasts_fires_as_it_begins(volts: float, tmp_path: Path) -> None:
     program = compiled("int main(void) { for (;;) ; }", tmp_path / "waits.elf")
-    result = boebot.run(program, seconds=0.3, faults=["board.brown_out=2.5@0.1"])
+    result = boebot.run(program, seconds=0.3, faults=[f"board.brown_out={volts}@0.1"])
     assert list(result.faults.values()) == [1]
 
 
@@ -146,8 +149,6 @@ def test_a_reset_is_at_its_time_and_said_by_the_board(cause: str) -> None:
 def test_a_brown_out_resets_the_board() -> None:
     result = boebot.run(straight, on="native", seconds=2.0, faults=["board.brown_out=0@0.5..0.6"])
     assert result.resets == 1 and result.sessions_lost == 1
-    with pytest.raises(UnfiredError, match=r"fault board.brown_out=4.9@0.5s..0.6s did not fire"):
-        boebot.run(straight, on="native", seconds=2.0, faults=["board.brown_out=4.9@0.5..0.6"])
 
 
 def test_a_damaged_memory_is_noticed_at_the_next_start() -> None:

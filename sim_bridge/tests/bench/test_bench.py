@@ -95,7 +95,7 @@ def test_a_voltage_is_held_at_a_pin(volts: float, reads: int) -> None:
         bench.pins.analog(0, volts)
         bench.run(100_000)
         assert bench.robot.received()[0][-1] == reads
-        bench.pins.analog(0, None)
+        bench.pins.release(14)
         bench.run(100_000)
         assert bench.robot.received()[0][-1] == 0
         with pytest.raises(BoardError, match="the voltage is nan"):

@@ -70,7 +70,7 @@ def test_answers_do_not_depend_on_how_far_the_board_has_run(servo: Bench, step: 
         servo.run_until(servo.now + step)
     assert pin.wait(1) == start
     assert pin.pulse().start == round(start * CLOCK_HZ)
-    assert len(pin.edges(servo.mark)) == 5 and pin.edges()["cycle"][-1] > 800_000
+    assert len(pin.edges(servo.mark / CLOCK_HZ)) == 5 and pin.edges()["cycle"][-1] > 800_000
 
 
 def test_a_program_answers_what_the_test_drives(button: Bench) -> None:
@@ -102,6 +102,12 @@ def test_a_wait_in_vain_says_what_it_waited_for_and_saw(servo: Bench, button: Be
         Pin(servo, "A0").pulse(within=0.01, level=0)
     with pytest.raises(WaitError, match=r"pin 9: waited 0\.1 s for 20 periods"):
         Pin(servo, SERVO).frequency(20, within=0.1)
+    servo.run(WIDTH)
+    begun = Pin(servo, SERVO).pulse().start / CLOCK_HZ
+    missed = rf"; the last one began at {begun:.6f} s, before what was last waited for or done"
+    servo.run(1000)
+    with pytest.raises(WaitError, match=missed):
+        Pin(servo, SERVO).pulse(within=0.01)
     with pytest.raises(WaitError, match="pin 13: waited 0 s to be 1; it had 0 edges meanwhile, and has been 0 since"):
         Pin(button, LED).wait(1, within=0)
 
@@ -130,7 +136,7 @@ def test_a_contact_bounces(button: Bench) -> None:
     button.run(64_000)
     edges = driven(contact)
     assert [level for _, level in edges] == [0, 1] * 5 + [0] and edges[0][0] >= begun
-    assert edges[-1][0] - edges[0][0] <= 32_000 and len(led.edges(begun)) == 11
+    assert edges[-1][0] - edges[0][0] <= 32_000 and len(led.edges(begun / CLOCK_HZ)) == 11
     other = Pin(button, OPEN)
     other.bounce(1, count=0)
     button.run(100)
@@ -153,7 +159,8 @@ def test_what_comes_and_goes_within_a_cycle_is_no_change(servo: Bench) -> None:
     servo.drive(OPEN, 0, at=1_000)
     servo.wave(OPEN, [2_000, 2_000, 3_000], 1)
     servo.run(10_000)
-    assert pin.edges(0).tolist() == [(0, 2), (1_000, 0), (3_000, 1)] and pin.edges(0).dtype == NET
+    assert pin.edges().tolist() == [(1_000, 0), (3_000, 1)] and pin.edges(0).dtype == NET
+    assert len(Pin(servo, LED).edges()) == 0
 
 
 def test_what_a_part_of_the_world_does_is_seen_and_its_again_after_release() -> None:
@@ -174,6 +181,11 @@ def test_the_native_board_shows_what_its_firmware_drives() -> None:
             Pin(bench, 5).wait(0, within=0.01)
         with pytest.raises(Cannot, match="pin 1 is the serial line's"):
             Pin(bench, 1).wait(0)
+        whisker = Pin(bench, 5)
+        whisker.drive(0)
+        for look in (lambda: whisker.level, whisker.edges, lambda: whisker.wait(0)):
+            with pytest.raises(Cannot, match="what a test does to pin 5 cannot be looked at"):
+                look()
 
 
 def test_pins_of_the_line_are_the_lines_while_it_is_on(servo: Bench) -> None:

@@ -231,7 +231,7 @@ def test_robot(uno):
 
 
 BAD_MARKS = {
-    "": "there is nothing to test; expected image= or robot=, or both",
+    "": "there is nothing to test; expected image= or robot= in @pytest.mark.uno(...), or both",
     "image='no.elf'": "there is no no.elf, neither in * nor in *",
     "image='text.elf'": "*text.elf*",
     "imgae='own.elf'": "*uno(imgae=...): expected one of image, robot, *; did you mean 'image'?",

@@ -54,6 +54,10 @@ def test_what_the_program_has_made_of_it_and_what_it_makes_of_what_is_set(runnin
     running["count"].value = 300
     running.board.run(400)
     assert (running["twice"].value, running["sum"].value) == (600, 115)
+    with pytest.raises(ValueError, match="read-only"):
+        running["table"].value[1] = 5
+    running["table"].value = b"AB"
+    assert bytes(running["table"].value) == b"AB\0"
     running["table"].value = [1, 2, 3]
     assert running["table"].value.tolist() == [1, 2, 3] and running["table"][-1] == 3
 
@@ -82,6 +86,8 @@ def test_elements_that_are_not_there(running: Running) -> None:
             running[name][key] = 1
     with pytest.raises(CallError, match=r"share: 1e\+300 does not fit; expected a value of type float32"):
         running["share"].value = 1e300
+    with pytest.raises(CallError, match=r"table: b'ABCD' does not fit"):
+        running["table"].value = b"ABCD"
     with pytest.raises(CallError, match=r"table: 5 does not fit; expected an array \(3,\) of 0 to 255"):
         running["table"].value = 5
 

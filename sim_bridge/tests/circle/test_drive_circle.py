@@ -137,7 +137,7 @@ def test_brown_out_switches_the_motors_off_and_the_link_comes_back(board_url: st
             "hello",
         )
         assert hello.reset_cause == messages.ResetCause.BROWN_OUT
-        assert rig.board.brown_outs()[0] == 1
+        assert rig.board.counters()["resets"] == 1
         rig.start()
         rig.listen(0.5)
         for pin in (LEFT, RIGHT):
