@@ -298,7 +298,7 @@ static void execute(avr_board *b, uint64_t until) {
     address = b->debug ? run_debugged(b, until) : avr_run(core, until, NULL);
     b->counters.executed_cycles += core->cycle - start;
   }
-  check_jump(b, address);
+  if (avr_looks_where_it_goes(core->code[address / 2u].kind)) check_jump(b, address);
 }
 
 board_state run_until(avr_board *b, uint64_t until) {

@@ -156,7 +156,10 @@ static avr_instruction decode(const avr_core *core, uint32_t address) {
   const bool in_ram = next >= AVR_RAM_BEGIN && next < AVR_DATA_SIZE;
   if (kind == LDS && in_ram) kind = LDS_RAM;
   if (kind == STS && in_ram) kind = STS_RAM;
-  return with_operands(kind, (operands)PATTERNS[p].operands, opcode, next, address / 2u);
+  avr_instruction i = with_operands(kind, (operands)PATTERNS[p].operands, opcode, next, address / 2u);
+  const bool is_branch = PATTERNS[p].operands == FLAG_K7;
+  if (is_branch && i.k * 2u >= core->code_end) i.kind = opcode & 0x0400u ? BRBC : BRBS; /* these look where they go */
+  return i;
 }
 
 void avr_core_flash_changed(avr_core *core, uint32_t address, uint32_t bytes) {

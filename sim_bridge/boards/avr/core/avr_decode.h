@@ -34,6 +34,11 @@ enum { AVR_KINDS(AVR_ENUMERATOR) };
 
 static inline bool avr_has_two_words(unsigned kind) { return kind >= LDS && kind <= CALL; }
 
+/* It stops where it leads to no code; what only runs on does so at the next instruction. */
+static inline bool avr_looks_where_it_goes(unsigned kind) {
+  return (kind >= LONG_JUMP && kind <= RETI) || kind == BRBS || kind == BRBC || kind == OUTSIDE;
+}
+
 static inline bool avr_is_stack_half(const avr_instruction *i) { return i->k == REG_SPL || i->k == REG_SPH; }
 
 #endif
