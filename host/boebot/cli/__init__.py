@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import gc
 import os
 import signal
 import sys
@@ -21,7 +20,6 @@ from boebot.running import interrupts
 from boebot.running.interrupts import SIGNALS
 
 EXIT_ERROR, EXIT_INTERRUPTED = 1, 130
-GARBAGE = 20_000  # objects, until Python looks for some; at its 700 that is a twentieth of the time until a run begins
 
 
 def main() -> NoReturn:
@@ -29,7 +27,6 @@ def main() -> NoReturn:
     code: object
     interrupts.first = None
     others = set(threading.enumerate())
-    gc.set_threshold(GARBAGE)
     try:
         for number in SIGNALS:  # motors are stopped and the record is written at each of them
             if signal.getsignal(number) != signal.SIG_IGN:  # as `nohup` wants it

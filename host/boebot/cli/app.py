@@ -3,6 +3,7 @@ of all is there at once."""
 
 from __future__ import annotations
 
+import gc
 import sys
 from importlib import import_module
 from typing import Annotated, Any
@@ -113,6 +114,9 @@ def command(name: str) -> Any:
         work.command()(function)
     made = typer.main.get_command(work)
     made.name = name
+    # What is loaded stays, and is no garbage: to look for some in it takes a fifth of a short run's time.
+    if not gc.get_freeze_count():
+        gc.freeze()
     return made
 
 
