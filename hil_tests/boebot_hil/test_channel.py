@@ -16,7 +16,7 @@ from sim_bridge.bench.uno import Uno
 pytestmark = [pytest.mark.emulated, pytest.mark.uno(robot="shieldbot", motors=False)]
 
 TICK_S = 0.010
-LOOK_S = 0.002  # between two looks at what has come
+LOOK_S = 0.004  # between two looks at what has come
 PING = messages.PARAMETERS["ping_period"]
 
 

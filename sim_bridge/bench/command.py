@@ -68,10 +68,11 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
     own += [*(f"--uno-on={board}" for board in boards), *["--uno-motors"] * motors]
     if find_spec("xdist") is not None and not any(map(is_live, boards)):
         own.append("--numprocesses=auto")
+    suite = [] if any(".py" in one and Path(one.partition("::")[0]).is_file() for one in arguments) else [SUITE]
     with tempfile.TemporaryDirectory() as folder:
         settings = Path(folder, "pytest.ini")
         settings.write_text(f"[pytest]\ncache_dir = {cache() / 'tests'}\n", "utf-8")
-        command = [sys.executable, "-P", "-m", "pytest", "--pyargs", SUITE, "-c", str(settings), *own, *arguments]
+        command = [sys.executable, "-P", "-m", "pytest", "--pyargs", *suite, "-c", str(settings), *own, *arguments]
         with ended(subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)) as process:
             code = process.wait()
     if code == _USAGE:

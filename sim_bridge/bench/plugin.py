@@ -37,7 +37,7 @@ MARK = "uno"
 JUDGED = pytest.StashKey[int]()  # of a test that passed so far: how many of its measurements were looked at
 # Names of the properties of a test's report, which reach JUnit's file.
 MEASURED, CANNOT, CYCLES = "uno.measured.", "uno.cannot", "uno.cycles"
-BASELINE, UPDATE = "uno-baseline.json", "update"
+BASELINE, UPDATE, KEEP = "uno-baseline.json", "update", ".uno"
 MEASURED_FILE, COVER_FILE = "measured.json", "cover.info"
 LONGEST_NAME = 80  # letters of a folder's name, before its hash
 KIT = ("boebot", "sim_bridge")  # packages
@@ -64,7 +64,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption("--uno-cover", action="store_true", help="lines and conditional jumps that the tests have executed")
     keep_help = "where what failing tests leave goes, and measured.json (.uno)"
-    group.addoption("--uno-keep", metavar="DIR", default=".uno", help=keep_help)
+    group.addoption("--uno-keep", metavar="DIR", default=KEEP, help=keep_help)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -290,6 +290,8 @@ def _command(config: pytest.Config, name: str) -> str:
     """What repeats one test."""
     options = [f"--uno-on={board}" for board in config.getoption("--uno-on") or ()]
     options += [f"--uno-{name}" for name in ("flash", "motors") if config.getoption(f"--uno-{name}")]
+    if (keep := config.getoption("--uno-keep")) != KEEP:
+        options.append(f"--uno-keep={keep}")
     if (baseline := config.getoption("--uno-baseline")) not in (None, UPDATE):
         options.append(f"--uno-baseline={os.path.relpath(config.invocation_params.dir / baseline, config.rootpath)}")
     there = "" if Path.cwd() == config.rootpath else f"cd {shlex.quote(str(config.rootpath))} && "

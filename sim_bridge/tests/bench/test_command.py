@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import boebot_hil
 from boebot.errors import CallError
 from sim_bridge.bench import command
 
@@ -20,6 +22,32 @@ def test_it_says_how_it_went(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --no-such-option\n")
     monkeypatch.chdir(tmp_path)
     assert command.run_suite(["native"], ["-q", "-n0", "-k", "test_handshake_names_version"]) == command.PASSED
+
+
+BROKEN = """
+import pytest
+
+@pytest.fixture(autouse=True)
+def broken(monkeypatch):
+    from boebot_hil.rig import Rig
+    monkeypatch.setattr(Rig, "arm", None)
+"""
+
+
+def test_a_test_by_its_file_that_fails_is_kept_and_its_command_repeats_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "broken.py").write_text(BROKEN)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)
+    test = f"{Path(boebot_hil.__file__).parent}/test_delivery.py::test_each_stop_is_confirmed_with_its_token"
+    assert command.run_suite(["native"], ["-q", "-n0", "-p", "broken", test]) == command.FAILED
+    (kept,) = (tmp_path / ".uno").iterdir()
+    assert {file.name for file in kept.iterdir()} == {"again.txt", "pins.vcd", "run", "serial.txt"}
+    assert b"shieldbot" in (kept / "serial.txt").read_bytes()
+    again = subprocess.run((kept / "again.txt").read_text(), shell=True, capture_output=True, text=True, check=False)
+    assert "1 passed" in again.stdout
 
 
 @pytest.mark.wall_clock
