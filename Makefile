@@ -38,7 +38,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: help run test check bench soak fuzz experiments wheel wheels firmware pictures timing format setup clean lock
 
 help:
-	@echo "make run       build everything, let the demonstration brain drive the emulated robot, write build/run"
+	@echo "make run       build what it takes, let the demonstration brain drive the emulated robot, write build/run"
 	@echo "make test      all tests: Python, firmware units, whole circle, wheel"
 	@echo "make check     formatting, types, static analysis, warnings as errors, generated files"
 	@echo "make bench     the figures, as a table and in build/bench.json; ONLY=laser for some, PAGE=FILE for a page of the docs"
