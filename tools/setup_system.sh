@@ -50,6 +50,8 @@ for purpose in "$@"; do
       ;;
     soak)
       need qemu-system-misc has qemu-system-avr
+      need qemu-user has qemu-aarch64
+      need "wine wine64" has wine
       ;;
     *)
       echo "setup_system.sh: unknown purpose '$purpose'; known: run test check bench soak" >&2

@@ -86,6 +86,8 @@ def build(tag: str) -> Path:
     folder = BUILD / tag
     for made in folder.glob("lib*"):  # objects are kept
         shutil.rmtree(made)
+    for old in WHEELS.glob(f"boebot-*-{tag}.whl"):
+        old.unlink()
     command = [sys.executable, "setup.py", "--quiet", "build", "--build-base", str(folder)]
     command += ["bdist_wheel", "--plat-name", tag, "--bdist-dir", str(folder / "wheel"), "--dist-dir", str(WHEELS)]
     log = BUILD / f"{tag}.log"
