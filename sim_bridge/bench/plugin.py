@@ -186,6 +186,9 @@ def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
     return (yield from _judged(item))
 
 
+pytest_runtest_teardown = pytest_runtest_setup
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """What the board cannot do is skipped; values beyond their limits, and cycles that are not as they were, fail the
@@ -201,12 +204,6 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     elif any(mark.name == MARK for mark in item.own_markers):
         pytest.fail(f"uno: {item.name} has the mark, and no board; expected the fixture: def test(uno)", pytrace=False)
     return result
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
-    """What the board cannot do is skipped."""
-    return (yield from _judged(item))
 
 
 def _beyond(opened: Uno, begin: int = 0) -> list[str]:

@@ -405,7 +405,11 @@ def _on_bench(on: str, wanted: Wanted) -> Uno:
     bench = Bench(wanted.image, on=on, **around)
     transport = bench.session.transport
     if wanted.baud is not None:
-        transport.set_baud(wanted.baud)
+        try:
+            transport.set_baud(wanted.baud)
+        except BoebotError:
+            bench.close()
+            raise
     elif on == AVR:
         transport.follow()
 
