@@ -94,8 +94,8 @@ def firmware_sources() -> list[str]:
 
 def headers() -> list[str]:
     """Every header of ours, and frame.c, which the codec includes: a change of one compiles anew what may need it."""
-    found = [path for folder in ("sim_bridge", "host") for path in Path(folder).rglob("*.h")]
-    found += [FIRMWARE / "link" / "frame.c", *FIRMWARE.rglob("*.h"), *FIRMWARE.rglob("*.def")]
+    ends, folders = ("*.h", "*.def"), (Path("sim_bridge"), Path("host"), FIRMWARE)
+    found = [FIRMWARE / "link" / "frame.c", *(path for one in folders for end in ends for path in one.rglob(end))]
     return sorted(str(path) for path in found)
 
 

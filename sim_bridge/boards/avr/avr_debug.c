@@ -131,7 +131,7 @@ bool avr_debug_write(board *self, uint32_t address, uint8_t value) {
     b->core.code_end = AVR_FLASH_SIZE; /* another program, of which nothing is known */
     avr_core_flash_changed(&b->core, 0, AVR_FLASH_SIZE);
     b->variables_end = b->core.stack_floor = AVR_RAM_BEGIN;
-  } else if (address < EEPROM_BEGIN) {
+  } else if (address - DATA_BEGIN < BOARD_DATA_SIZE) {
     poke(b, (uint16_t)(address - DATA_BEGIN), value);
   } else {
     b->eeprom.cells[address - EEPROM_BEGIN] = value;
