@@ -153,13 +153,12 @@ static uint8_t read_control(avr_board *b, uint16_t address, uint64_t cycle) { re
 static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_t end) {
   flash_state *f = &b->programming;
   const uint8_t action = value & (RWWSRE | BLBSET | PGWRT | PGERS);
-  const bool has_one_action = !(action & (action - 1u));
   if (b->eeprom.writing && (value & SPMEN)) {
     note(b, b->core.pc, "writes to", "SPMCSR", "it is dropped: the EEPROM is being written (27.8.8)");
     return;
   }
   f->control = (uint8_t)((f->control & ~SPMIE) | (value & SPMIE));
-  if (!f->busy && (value & SPMEN) && has_one_action) {
+  if (!f->busy && (value & SPMEN) && !(action & (action - 1u))) { /* one of them at most */
     f->control = value & (uint8_t)~RWWSB;
     clear_flag(b, VECTOR_SPM_READY);
     set_due(b, DUE_FLASH, end + ARMED_CYCLES);

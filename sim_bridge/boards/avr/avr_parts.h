@@ -127,6 +127,7 @@ typedef struct {
   uint16_t open_half; /* address of the byte that was written last, if its other half was not written before it */
   /* where it is at cycle `known` */
   uint64_t known;
+  uint64_t next;      /* counts from there until something happens; 0: to be found anew */
   uint32_t count;     /* TCNTn */
   bool falling;       /* in phase-correct modes: on its way down */
   bool match_blocked; /* the count was written: no compare match at the next count (17.10.4) */

@@ -132,7 +132,7 @@ static bool grows_stack(const avr_core *core, uint32_t at) {
   const uint8_t source = core->code[at / 2u].d;
   for (uint32_t words = 1; words <= FRAME_WORDS && 2 * words <= at; words++) {
     const avr_instruction *i = &core->code[at / 2u - words];
-    const bool reads_stack = i->kind == IN && avr_is_stack_half(i);
+    const bool reads_stack = i->kind == IN && (i->k == REG_SPL || i->k == REG_SPH);
     const bool loads = i->kind == LDI || i->kind == LDD || i->kind == LD_UP || i->kind == LD_DOWN || i->kind == LDS ||
                        i->kind == LDS_RAM || i->kind == POP;
     if ((loads || reads_stack) && i->d == source) return reads_stack;

@@ -203,8 +203,9 @@ void timer_bring_up(timer_state *t, uint64_t cycle) {
     uint64_t done = (t->known - base) >> t->prescaler;
     uint64_t counts = ((cycle - base) >> t->prescaler) - done;
     while (counts) {
-      uint64_t next = distance_to_next(t, UINT32_MAX);
-      if (next > counts) {
+      const uint64_t next = t->next ? t->next : distance_to_next(t, UINT32_MAX);
+      t->next = next > counts ? next - counts : 0;
+      if (t->next) {
         move(t, counts);
         break;
       }
@@ -218,6 +219,7 @@ void timer_bring_up(timer_state *t, uint64_t cycle) {
 }
 
 void timer_plan(timer_state *t) {
+  t->next = 0; /* whatever has changed */
   uint64_t next = t->prescaler != NO_CLOCK ? distance_to_next(t, t->owner->core.enabled) : NEVER;
   uint64_t due = NEVER;
   if (next != NEVER) {

@@ -39,6 +39,4 @@ static inline bool avr_looks_where_it_goes(unsigned kind) {
   return (kind >= LONG_JUMP && kind <= RETI) || kind == BRBS || kind == BRBC || kind == OUTSIDE;
 }
 
-static inline bool avr_is_stack_half(const avr_instruction *i) { return i->k == REG_SPL || i->k == REG_SPH; }
-
 #endif

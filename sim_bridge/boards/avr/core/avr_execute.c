@@ -297,8 +297,6 @@ static void set_flag(avr_core *core, unsigned number, bool set) {
   core->flags = flags_of((uint8_t)(set ? before | bit : before & ~bit));
 }
 
-static ALWAYS_INLINE uint32_t cycles_of_rare(unsigned kind) { return kind == SBI || kind == CBI ? 2 : 1; }
-
 /* What is left of the instructions; the core is handed over. Without an owner WDR and SPM do nothing. */
 static NOT_INLINE void do_rare(avr_core *core, avr_instruction i, uint32_t takes) {
   const avr_owner_calls *calls = core->calls;
