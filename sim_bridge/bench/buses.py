@@ -75,7 +75,7 @@ class I2c:
         self._spoken_to: I2cDevice | None = None
 
     def add(self, device: I2cDevice) -> None:
-        """The chip is there from now on, with pull-ups of its own.
+        """The chip is there from now on, and so are the bus's pull-ups.
 
         Raises:
             CallError: it is no I2cDevice, has no address, or another chip has it.

@@ -42,7 +42,7 @@ class Line:
 
 @dataclass
 class Serial:
-    """Bytes to and from a board. All times are of its own clock (s).
+    """Bytes to and from a board. All times are by the board's clock (s).
 
     Attributes:
         heard: all that has come so far, where no time passes any more.

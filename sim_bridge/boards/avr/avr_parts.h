@@ -3,7 +3,7 @@
  * core/ has the CPU: it executes the instructions and keeps data memory and flash. Here is what has to do with time or
  * pins: run loop and interrupts (avr_run.c), registers (avr_registers.c), construction (avr_board.c), ports and edge detectors (avr_pins.c), timers (avr_timers.c,
  * avr_timer_count.c), USART (avr_usart.c), two-wire interface (avr_twi.c), SPI (avr_spi.c), ADC (avr_converter.c), watchdog (avr_watchdog.c),
- * EEPROM (avr_eeprom.c), recorder (avr_spans.c), debugger (avr_debug.c), checks of the program (avr_checks.c).
+ * EEPROM (avr_eeprom.c), self-programming (avr_flash.c), recorder (avr_spans.c), debugger (avr_debug.c), checks of the program (avr_checks.c).
  *
  * When something happens: avr_core.h. Each source of events has one due time; the core runs no further than the earliest
  * of them, so that every event happens at its own cycle, however long the instruction during which it falls and however

@@ -53,7 +53,7 @@ int main(void) {
   step(0);
   put(TWDR);
   step(1 << TWSTA);
-  put(put_byte(0x51 << 1)); /* nobody */
+  put(put_byte(0x51 << 1)); /* no chip has this address */
   TWCR = 1 << TWINT | 1 << TWEN | 1 << TWSTO;
   for (;;) {
   }

@@ -105,7 +105,7 @@ static unsigned word_at(const avr_core *core, uint32_t address) {
   return core->flash[address] | (unsigned)core->flash[address + 1] << 8;
 }
 
-/* A program address so many words behind the next instruction; flash is a ring. */
+/* The program address that is `words` behind the next instruction; flash is a ring. */
 static uint16_t relative(uint32_t word, int offset) {
   return (uint16_t)((word + 1u + (uint32_t)offset) % (AVR_FLASH_SIZE / 2u));
 }

@@ -1,5 +1,5 @@
 /* programs.c: what random programs do. Prints, for the machine that it is linked with, of each program where it is and a
- * checksum of its memory every so many cycles:
+ * checksum of its memory at fixed intervals of cycles:
  *
  *   cycle address SP flags checksum     address in words; the checksum is that of r0 to r31, I/O registers and RAM
  *
