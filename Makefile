@@ -86,7 +86,7 @@ soak: experiments
 	@failed=0; for seed in $(SEEDS); do echo "Experiments at seed $$seed"; \
 	  $(VENV)/bin/boebot experiment --all --seed $$seed --out build/experiments/seed-$$seed || failed=1; done; exit $$failed
 	@$(VENV)/bin/boebot run wander --on avr --arena room --seconds $(SECONDS) --out build/soak
-	@$(PYTHON_VENV) -m tools.qemu
+	@$(PYTHON_VENV) -m tools.tests.qemu
 	@$(PYTHON_VENV) -m pytest -q -m soak -o faulthandler_timeout=1800
 	@for core in $$(seq $(JOBS)); do while kill -0 $$$$ 2>/dev/null; do :; done & done; \
 	  for run in $$(seq 60); do [ $$run -le 50 ] && on=native || on=avr; \

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from elftools.elf.elffile import ELFFile
 
-from tools.avr_program import IMAGES, SOURCES, flags
+from tools.tests.avr_program import IMAGES, SOURCES, flags
 
 FOLDER = Path(__file__).resolve().parents[2] / "build" / "images"
 NOT_SAID = 0xFFFFFFFF

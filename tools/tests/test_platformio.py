@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import avr_program
+from tools.tests import avr_program
 
 PROJECT = Path(__file__).resolve().parents[2]
 IMAGES = PROJECT / "build" / "images"

@@ -22,7 +22,7 @@ from boebot.result import read_run, robots_of
 from boebot_timing.emulated.measure import run
 from sim_bridge.tests.boards.symbols import entry_of, find_symbol
 from sim_bridge.tests.firmware.test_planted_faults import JUMP_TO_ITSELF, planted
-from tools import avr_program
+from tools.tests import avr_program
 
 DATA_SPACE = 0x800000
 

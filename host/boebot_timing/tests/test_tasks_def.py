@@ -9,7 +9,7 @@ import pytest
 from boebot.image.elf import read_image
 from boebot_timing.table import read_table
 from sim_bridge.boards.emulated import avr_image
-from tools.avr_program import IMAGES, SOURCES
+from tools.tests.avr_program import IMAGES, SOURCES
 
 ROW = re.compile(r"^(TASK|INTERRUPT|SENSOR)\((\w+)((?:, \d+)+)\)$", re.MULTILINE)
 

@@ -17,7 +17,7 @@ from sim_bridge.boards.board import Damage
 from sim_bridge.tests.boards.avr.bootloader import KITS
 from sim_bridge.tests.boards.symbols import DATA_BASE, entry_of
 from sim_bridge.tests.rigs import SessionRig
-from tools.avr_program import IMAGES
+from tools.tests.avr_program import IMAGES
 
 pytestmark = pytest.mark.unsanitized
 

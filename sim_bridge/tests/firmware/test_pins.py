@@ -16,7 +16,7 @@ from sim_bridge.bench.bench import bare
 from sim_bridge.boards.board import Level
 from sim_bridge.tests.boards.avr.bootloader import KITS
 from sim_bridge.tests.rigs import SessionRig
-from tools.avr_program import IMAGES
+from tools.tests.avr_program import IMAGES
 
 pytestmark = pytest.mark.unsanitized
 

@@ -1,8 +1,8 @@
 """The firmware's images in QEMU, an emulator of other authors: each says hello and answers `identify`, and no more is
 asked.
 
-`python -m tools.qemu [IMAGE.elf ...]`; `make soak` does it with all images. QEMU 7.2 (Debian: qemu-system-misc) has no
-Timer2, pin changes, EEPROM, converter or watchdog, and its SLEEP never ends.
+`python -m tools.tests.qemu [IMAGE.elf ...]`; `make soak` does it with all images. QEMU 7.2 (Debian:
+qemu-system-misc) has no Timer2, pin changes, EEPROM, converter or watchdog, and its SLEEP never ends.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import zlib
 from pathlib import Path
 
 from boebot.link import frame, messages
-from tools.avr_program import IMAGES, ROOT
+from tools.tests.avr_program import IMAGES, ROOT
 
 QEMU = ["qemu-system-avr", "-M", "uno", "-nographic", "-monitor", "none", "-serial", "stdio", "-bios"]
 WAIT_S = 30.0
@@ -79,7 +79,7 @@ def check(elf: Path) -> str:
 def main() -> int:
     """Asks each image."""
     built = [ROOT / "build" / "images" / f"{name}.elf" for name in IMAGES]
-    parser = argparse.ArgumentParser(prog="python -m tools.qemu", description=(__doc__ or "").split(":")[0])
+    parser = argparse.ArgumentParser(prog="python -m tools.tests.qemu", description=(__doc__ or "").split(":")[0])
     parser.add_argument("images", nargs="*", type=Path, default=built, metavar="IMAGE.elf")
     failed = 0
     for elf in parser.parse_args().images:
