@@ -16,12 +16,12 @@ import msgspec
 
 from boebot import resources
 from boebot.arenas.arena import arena_names, load_arena
-from boebot.arenas.description import ArenaDescription
+from boebot.arenas.description import ArenaDescription, Shape
 
 SCHEMA_URI = "http://json-schema.org/draft-07/schema#"
 LIMITS = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 BEGIN, END = "<!-- keys: begin -->", "<!-- keys: end -->"
-OF_SHAPES = ("name", "height_m", "infrared_reflectance", "sound_reflectance")  # keys of all that keeps robots out
+OF_SHAPES = ("name", *Shape.__struct_fields__)  # keys of all that keeps robots out
 UNITS = {"m": "m", "rad": "rad", "s": "s", "w": "W"}  # by a key's last part
 
 

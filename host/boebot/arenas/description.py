@@ -35,6 +35,9 @@ ShapeName = Annotated[str, Meta(description="for people; no two shapes have the 
 Corners = Annotated[
     list[tuple[Position, Position]], Meta(min_length=3, description="x, y of each corner; the last one joins the first")
 ]
+Bends = Annotated[
+    list[tuple[Position, Position]], Meta(min_length=2, description="x, y of its ends and of the bends between them")
+]
 
 
 class Start(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -45,39 +48,35 @@ class Start(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     heading_rad: Annotated[Angle, Meta(description="0: along x, counter-clockwise")] = 0.0
 
 
-class Polygon(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class Shape(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """What outlines, obstacles, walls, discs and moving shapes are made of; in code these keys are named."""
+
+    height_m: Height | None = None
+    infrared_reflectance: Infrared = 1.0
+    sound_reflectance: Sound = 1.0
+
+
+class Polygon(Shape, frozen=True):
     """A closed polygon: as an outline, the robot is inside it; as an obstacle, outside."""
 
     corners_m: Corners
     name: ShapeName = ""
-    height_m: Height | None = None
-    infrared_reflectance: Infrared = 1.0
-    sound_reflectance: Sound = 1.0
 
 
-class Wall(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class Wall(Shape, frozen=True):
     """A thin wall, seen and felt from both sides."""
 
-    points_m: Annotated[
-        list[tuple[Position, Position]],
-        Meta(min_length=2, description="x, y of its ends and of the bends between them"),
-    ]
+    points_m: Bends
     name: ShapeName = ""
-    height_m: Height | None = None
-    infrared_reflectance: Infrared = 1.0
-    sound_reflectance: Sound = 1.0
 
 
-class Disc(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class Disc(Shape, frozen=True):
     """A round obstacle."""
 
     x_m: Annotated[Position, Meta(description="centre")]
     y_m: Annotated[Position, Meta(description="centre")]
     radius_m: Length
     name: ShapeName = ""
-    height_m: Height | None = None
-    infrared_reflectance: Infrared = 1.0
-    sound_reflectance: Sound = 1.0
 
 
 class Patch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -91,10 +90,7 @@ class Patch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Line(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A line that is painted or taped on the floor; later ones lie on top of earlier ones."""
 
-    points_m: Annotated[
-        list[tuple[Position, Position]],
-        Meta(min_length=2, description="x, y of its ends and of the bends between them"),
-    ]
+    points_m: Bends
     width_m: Length = 0.019
     floor_reflectance: FloorReflectance = 0.05
     name: Name = ""
@@ -127,7 +123,7 @@ class Waypoint(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     heading_rad: Annotated[Angle, Meta(description="not wrapped: from 0 to 12.566 is two turns")] = 0.0
 
 
-class Moving(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class Moving(Shape, frozen=True):
     """A shape on its way: a polygon with corners in its own frame, or a disc."""
 
     path: Annotated[list[Waypoint], Meta(min_length=1)]
@@ -138,9 +134,6 @@ class Moving(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         Meta(description="after the last waypoint: again from the first (which it has to equal), back, or stay"),
     ] = "back_and_forth"
     name: ShapeName = ""
-    height_m: Height | None = None
-    infrared_reflectance: Infrared = 1.0
-    sound_reflectance: Sound = 1.0
 
 
 class ArenaDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
