@@ -35,6 +35,8 @@ GUARD = 64  # cycles; BOARD_GUARD_CYCLES of board.h
 EDGES_KEPT = 1 << 20  # SIM_EDGES_KEPT of loop.h
 EDGES_SHOWN = 20_000  # newest ones that `BoardPins.now` looks at, of SHOWN cycles
 SHOWN = CLOCK_HZ // 10
+# Of the data space: double speed; receiver, transmitter (ATmega328P data sheet 20.11.2, 20.11.3).
+UCSR0A, U2X0, UCSR0B, RXEN0, TXEN0 = 0xC0, 1 << 1, 0xC1, 1 << 4, 1 << 3
 
 
 class BoardPins(BoardMemory):
@@ -81,6 +83,15 @@ class BoardPins(BoardMemory):
         edges = ffi.addressof(self._robot.handle, "edges")
         lib.edge_log_copy(edges, ffi.from_buffer("board_edge[]", log, require_writable=True), count)
         return log
+
+    def uses_line(self, what: int) -> bool:
+        """The program has switched its receiver (RXEN0) or transmitter (TXEN0) on; of a native board it always has."""
+        return self.board.extension("data", "uint8_t") is None or bool(self.read_memory(UCSR0B, 1)[0] & what)
+
+    def bit_cycles(self) -> int:
+        """That a bit takes the serial line of an emulated ATmega328P, by its registers (data sheet, table 20-1)."""
+        registers = self.read_memory(UCSR0A, 6)  # with UBRR0, 12 bits, at the end
+        return (int.from_bytes(registers[4:], "little") % 0x1000 + 1) * (8 if registers[0] & U2X0 else 16)
 
     def now(self) -> list[PinNow]:
         """What is at the board's pins, for people; empty of a board that cannot be seen into."""

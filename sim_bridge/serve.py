@@ -21,6 +21,7 @@ from boebot.boards import BoardRequest, BoardSession, Visit
 from boebot.errors import BoardError
 from boebot.image.program import BOOT_BEGIN
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.pins import RXEN0
 from sim_bridge.served_ports import Port, PtyPort, TcpPort
 from sim_bridge.sessions.session import SimSession
 from sim_bridge.sessions.world import AVR, NATIVE, Pace, open_on
@@ -32,7 +33,6 @@ AHEAD_CYCLES = CLOCK_HZ // 100  # bytes for this time are put on the line at mos
 BITS_PER_BYTE = 10
 LOOK_S = 0.05  # between two looks at where the robot is
 
-RATE_REGISTERS, RXEN, U2X = 0xC0, 0x10, 0x02  # UCSR0A, UCSR0B, UCSR0C, unused, UBRR0L, UBRR0H (20.11)
 LOADER_TURN_S = 0.01  # of a boot loader's time, at most, between two looks at what its client sends
 
 Look = Callable[[BoardSession, bytes], None]
@@ -159,23 +159,15 @@ class Server:
             self._visit(Visit("notes", "the board", sentence))
         self._noted = len(notes)
 
-    def _registers(self) -> bytes:
-        return self._session.board.read_memory(RATE_REGISTERS, 6)
-
-    def _board_bit(self) -> int:
-        """Cycles that a bit takes the board."""
-        status, _, _, _, low, high = self._registers()
-        return (low + 256 * (high & 15) + 1) * (8 if status & U2X else 16)
-
     def _is_heard(self) -> bool:
         """The client's rate is the board's, as far as receivers can tell."""
-        return self._baud is None or abs(self._board_bit() * self._baud / CLOCK_HZ - 1) < 0.05
+        return self._baud is None or abs(self._session.board.bit_cycles() * self._baud / CLOCK_HZ - 1) < 0.05
 
     def _give(self) -> bool:
         """Puts onto the line what it takes of what the client has sent; while an Uno does not listen it waits."""
-        if self._boot is not None and not self._registers()[1] & RXEN:
+        if self._boot is not None and not self._session.board.uses_line(RXEN0):
             return False
-        bit = self._board_bit() if self._baud is None else CLOCK_HZ // self._session.transport.baud
+        bit = self._session.board.bit_cycles() if self._baud is None else CLOCK_HZ // self._session.transport.baud
         byte, now = BITS_PER_BYTE * bit, self._sim.cycle
         start = max(now, self._line_free)
         data = self._port.take(max((now + AHEAD_CYCLES - start) // byte, 1 if start == now else 0))

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 BOARDS_GROUP = "boebot.boards"  # kind, or "direct" -> WorldFactory
 DIRECT = "direct"  # what a robot without a board runs on
+DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 RESET_CAUSES = ("external", "watchdog")  # that a fault can have
 SERVERS_GROUP = "boebot.servers"  # any name -> Server
 
@@ -375,7 +376,7 @@ def open_world(url: str, requests: Sequence[BoardRequest]) -> World:
             raise BoardError(f"the robot at {url!r} is as it is built: imperfections are for simulated runs")
         if request.pose is not None:
             raise BoardError(f"the robot at {url!r} starts where it stands: a pose is for simulated runs")
-        transport = open_port(url, _default_baud(request.robot))
+        transport = open_port(url, request.robot.baud or DEFAULT_BAUD)
         return LiveSession(transport, f"board at {transport.name}")
     kind = guests(BOARDS_GROUP).get(url)
     if kind is None and url == DIRECT:
@@ -486,11 +487,6 @@ def _host_and_port(url: str, address: str, scheme: str) -> tuple[str, int]:
     if match is None or not 0 < int(match[2]) < 65536:
         raise BoardError(f"{url!r} is no {scheme} address; expected {scheme}://HOST:PORT")
     return match[1].strip("[]"), int(match[2])
-
-
-def _default_baud(robot: RobotDescription) -> int:
-    uart = robot.device.get("uart")
-    return int(getattr(uart, "baud", 500_000))
 
 
 def _unknown(url: str) -> str:

@@ -16,9 +16,9 @@ from fractions import Fraction
 
 from boebot import resources
 from boebot.arguments import duration
+from boebot.boards import DEFAULT_BAUD
 from boebot.description.robots import RobotDescription
 from boebot.devices.device import Sensor
-from boebot.devices.uart import Uart
 from boebot.errors import BoebotError, TimingError
 from boebot.link import messages
 from boebot.link.frame import FRAME_OVERHEAD
@@ -223,8 +223,7 @@ def _of_board(
     brain_s: float,
     baud: int | None,
 ) -> Verdict:
-    uart = robot.device.get("uart")
-    rate = baud if baud is not None else uart.baud if isinstance(uart, Uart) else 500_000
+    rate = baud if baud is not None else robot.baud or DEFAULT_BAUD
     if rate <= 0:
         raise BoebotError(f"a line of {rate} bit/s is none; expected more than 0")
     check_time_to_live(period_s)

@@ -22,13 +22,11 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import CallError
 from boebot.record.blocks import Group, merged
 from boebot.record.record import Record
-from sim_bridge.boards.board import CLOCK_HZ, EDGE, FRAME, LEVELS, Edge, EmulatedBoard, Reaction
+from sim_bridge.boards.board import EDGE, FRAME, LEVELS, Edge, EmulatedBoard, Reaction
 from sim_bridge.pins import EDGES_KEPT, streams_of
 from sim_bridge.sessions.world import AVR, NATIVE, open_on
 
 SLICE_CYCLES = 8_000  # 0.5 ms, between two chances for sources
-# Of the data space: double speed; receiver, transmitter (ATmega328P data sheet 20.11.2, 20.11.3).
-UCSR0A, U2X0, UCSR0B, RXEN0, TXEN0 = 0xC0, 1 << 1, 0xC1, 1 << 4, 1 << 3
 BARE = "bare"
 AHEAD_CYCLES = 512  # what is queued for the next slice is queued so much before (BOARD_GUARD_CYCLES at least)
 LONGEST_CYCLES = 160_000  # of a slice: all edges in it are fewer than the simulator keeps
@@ -212,15 +210,6 @@ class Bench:
         board.op.send(board, at, data, len(data))
 
     # ---- what the board does -----------------------------------------------------------------------------------------
-
-    def uses_line(self, what: int) -> bool:
-        """The program has switched its receiver (RXEN0) or transmitter (TXEN0) on; of a native board it always has."""
-        return self.board.extension("data", "uint8_t") is None or bool(self.pins.read_memory(UCSR0B, 1)[0] & what)
-
-    def line_rate(self) -> float:
-        """Of the program's serial line (bit/s; ATmega328P data sheet, table 20-1); of an emulated ATmega328P only."""
-        registers = self.pins.read_memory(UCSR0A, 6)  # with UBRR0, two bytes, at the end
-        return CLOCK_HZ / (8 if registers[0] & U2X0 else 16) / (1 + int.from_bytes(registers[4:], "little"))
 
     def streams(self) -> Group:
         """The streams of a record that tell of its pins, its line and its robot, from the beginning."""

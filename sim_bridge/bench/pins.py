@@ -24,9 +24,10 @@ from boebot.arguments import number, shown, whole
 from boebot.devices.device import pin_name, pin_number
 from boebot.errors import CallError
 from boebot.record.record import net_level
-from sim_bridge.bench.bench import RXEN0, TXEN0, Bench
+from sim_bridge.bench.bench import Bench
 from sim_bridge.bench.waiting import LONGEST_S, Cannot, WaitError
 from sim_bridge.boards.board import CLOCK_HZ, PINS, Level
+from sim_bridge.pins import RXEN0, TXEN0
 
 NET = np.dtype([("cycle", "<u8"), ("level", "u1")])  # RELEASED: it hangs in the air
 LEVELS = (Level.LOW, Level.HIGH, Level.RELEASED)
@@ -207,7 +208,7 @@ class Pin:
         return self._fight
 
     def _expect_no_line(self) -> None:
-        if self.number in LINE_PINS and self.bench.uses_line(LINE_PINS[self.number]):
+        if self.number in LINE_PINS and self.bench.pins.uses_line(LINE_PINS[self.number]):
             kind = Cannot if self._is_native else CallError  # which no program there can leave
             raise kind(f"{self} is the serial line's while the program uses that; expected uno.serial, or another pin")
 

@@ -18,7 +18,6 @@ from boebot import flashing
 from boebot.arguments import number, shown, whole
 from boebot.boards import is_live, open_port
 from boebot.description.robots import load_robot
-from boebot.devices.uart import Uart
 from boebot.errors import BoardError, BoebotError, CallError
 from boebot.image.program import read_program
 from boebot.link.bad_line import BadLine
@@ -27,7 +26,7 @@ from boebot.record.record import Record
 from boebot.running.faults import AT_A_PORT, OWNERS, inject, read, unfired
 from boebot.running.program_driver import append_parts
 from boebot.showing import Showing
-from sim_bridge.bench.bench import BARE, RXEN0, Bench
+from sim_bridge.bench.bench import BARE, Bench
 from sim_bridge.bench.buses import I2c, Spi
 from sim_bridge.bench.measured import Measurement
 from sim_bridge.bench.pins import Pin
@@ -36,6 +35,7 @@ from sim_bridge.bench.waiting import LONGEST_S, Cannot
 from sim_bridge.boards.avr import AvrBoard
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import avr_image
+from sim_bridge.pins import RXEN0
 
 if TYPE_CHECKING:
     from boebot.boards import TruthNow
@@ -417,11 +417,13 @@ def _on_bench(on: str, wanted: Wanted) -> Uno:
         bench.mark = round(at_s * CLOCK_HZ)
 
     def rates() -> str:
-        rate = bench.line_rate() if wanted.baud and on == AVR else 0
-        return f"; the program's rate is {rate:.0f} bit/s, the mark says baud={wanted.baud}" if rate else ""
+        if wanted.baud is None or on != AVR:
+            return ""
+        rate = CLOCK_HZ / bench.pins.bit_cycles()
+        return f"; the program's rate is {rate:.0f} bit/s, the mark says baud={wanted.baud}"
 
     not_heard = "the program has not switched its receiver on (Serial.begin)"
-    return Uno(on, wanted, Line(transport, lambda: bench.uses_line(RXEN0), not_heard, rates, mark), bench)
+    return Uno(on, wanted, Line(transport, lambda: bench.pins.uses_line(RXEN0), not_heard, rates, mark), bench)
 
 
 _holds: dict[str, bytes] = {}
@@ -431,8 +433,7 @@ _holds: dict[str, bytes] = {}
 def _at_port(url: str, wanted: Wanted, flash: bool) -> Uno:
     """A board behind a port, which opening has reset where the port can."""
     robot = None if wanted.robot is None else load_robot(wanted.robot)
-    uart = None if robot is None else robot.device.get("uart")
-    baud = uart.baud if wanted.baud is None and isinstance(uart, Uart) else wanted.baud
+    baud = robot.baud if wanted.baud is None and robot is not None else wanted.baud
     if baud is None:
         raise CallError(f"{url} does not know the program's bit rate; expected it in the mark: baud=9600")
     if wanted.image is not None or flash:  # the kit's firmware that is there says itself which it is

@@ -9,17 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from boebot.boards import PinNow, TruthNow, WatchdogReset
-from boebot.description import robots
-from boebot.devices.uart import Uart
+from boebot.boards import DEFAULT_BAUD, PinNow, TruthNow, WatchdogReset
 from boebot.record.blocks import Group
 from sim_bridge.boards.board import CLOCK_HZ, note_sentences, watchdog_resets
 from sim_bridge.pins import BoardPins, PinRecorder
 from sim_bridge.sessions.board_faults import KINDS, Acting
 from sim_bridge.sim import NEVER, SimRobot
 from sim_bridge.vehicles import STEP_S
-
-DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 
 Wait = Callable[[SimRobot, int, int], object]
 """Lets time pass for a robot: (robot, cycles, quiet) at most `cycles`; after `quiet` of them only until bytes come."""
@@ -101,7 +97,7 @@ class SimTransport:
     def __init__(self, robot: SimRobot, name: str, wait: Wait = SimRobot.wait, pins: PinRecorder | None = None) -> None:
         """`wait` lets time pass, and does what is due. `pins`: collects edges meanwhile."""
         self.name = name
-        self.baud = _baud(robot.description)
+        self.baud = robot.description.baud or DEFAULT_BAUD
         self._robot = robot
         self._sim = robot.sim
         self.wait = wait
@@ -238,9 +234,3 @@ class DirectSession(InWorld):
 
 def _cycle(time_s: float) -> int:
     return NEVER if time_s == math.inf else round(time_s * CLOCK_HZ)
-
-
-def _baud(robot: robots.RobotDescription) -> int:
-    """Of the robot's serial line."""
-    uart = robot.device.get("uart")
-    return uart.baud if isinstance(uart, Uart) else DEFAULT_BAUD

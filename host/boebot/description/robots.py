@@ -25,6 +25,7 @@ from boebot.devices.h_bridge import HBridge
 from boebot.devices.motor import Motor
 from boebot.devices.servo import ContinuousServo
 from boebot.devices.turret import PositionServo
+from boebot.devices.uart import Uart
 from boebot.errors import CallError, RobotError, did_you_mean
 from boebot.imperfections import Imperfection, imperfections, switched_off, unknown
 
@@ -127,6 +128,12 @@ class RobotDescription(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     def takes_brain(self) -> bool:
         """Whether a brain can drive it: by the kit's firmware, or directly."""
         return self.firmware == "kit"
+
+    @property
+    def baud(self) -> int | None:
+        """Bit rate of its serial line; None: it says none."""
+        uart = self.device.get("uart")
+        return uart.baud if isinstance(uart, Uart) else None
 
     def expect_kit(self) -> None:
         """Raises CallError where nothing of the kit's runs on its board."""
