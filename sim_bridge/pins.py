@@ -28,7 +28,6 @@ from sim_bridge.boards.board import (
 )
 from sim_bridge.sim import CYCLES_MAXIMUM, SimRobot
 
-ECHO_MAXIMUM_US = 1e6
 SUPPLY_MAXIMUM_V = 30.0
 EDGES_MAXIMUM = 10_000_000  # of a square wave
 GUARD = 64  # cycles; BOARD_GUARD_CYCLES of board.h
@@ -147,12 +146,6 @@ class BoardPins(BoardMemory):
         levels = (np.arange(len(edges)) + level) % 2
         levels[0] = level  # ends what was queued
         self.drive_edges(pin, start + edges, levels.astype(np.uint8))
-
-    def answer_ping(self, echo_us: float) -> None:
-        """Every trigger is answered by a pulse of that length (us)."""
-        echo_us = number("answer_ping: the pulse", echo_us, BoardError, least=0, most=ECHO_MAXIMUM_US)
-        if lib.robot_answer_ping(self._robot.handle, round(echo_us * CLOCK_HZ / 1e6)) != lib.SIM_OK:
-            raise BoardError("Ping: the robot has no such thing")
 
     def unplug(self, device: str) -> None:
         """Pulls the plug of a device of the robot's description: it hears and drives nothing."""

@@ -8,10 +8,11 @@ from boebot.link import messages
 from boebot.link.messages import PingStatus
 from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US, Rig
 from sim_bridge.bench.uno import Uno
+from sim_bridge.boards.board import Level
 
 pytestmark = [pytest.mark.emulated, pytest.mark.uno(robot="shieldbot", motors=False)]
 
-LED, RECEIVER = 9, 10
+PING, LED, RECEIVER = 8, 9, 10
 LOOK_S = 0.0002  # how often a test looks at what the board does to a pin: its answer is that late at the soonest
 READINGS_S = 0.25  # five of the Ping's, and of the IR pairs'
 MS = CYCLES_PER_S // 1000
@@ -101,9 +102,20 @@ def test_whisker_shows_within_two_ticks(rig: Rig, pin: int, bit: int) -> None:
 def test_echo_becomes_distance(rig: Rig, distance: float) -> None:
     """A pulse of the data sheet's length on the pin, at 20 °C: 343.5 m/s, there and back."""
     echo_us = 2 * distance / (331.5 + 0.6 * 20) * 1e6
-    rig.board.answer_ping(echo_us)
+    before = Level.LOW
+
+    def answer(cycle: int, level: Level) -> None:
+        nonlocal before
+        if before == Level.HIGH:  # a trigger ends
+            begin = cycle + 750 * CYCLES_PER_US
+            rig.board.drive(PING, 1, begin)
+            rig.board.drive(PING, 0, begin + round(echo_us * CYCLES_PER_US))
+        before = level
+
+    rig.board.board.on_edge(PING, answer)
     rig.listen(0.15)
     now = rig.latest()
+    assert now.ping_status == PingStatus.OK
     assert abs(now.ping_echo - echo_us) <= 1.0
     assert now.ping_age <= 6
 
@@ -113,17 +125,13 @@ def test_echo_becomes_distance(rig: Rig, distance: float) -> None:
 def test_a_ping_that_comes_and_goes(rig: Rig) -> None:
     rig.listen(READINGS_S)
     assert rig.latest().ping_status == PingStatus.NOTHING_NEAR, "an empty field"
-    rig.board.answer_ping(1000.0)
-    rig.listen(READINGS_S)
-    now = rig.latest()
-    assert (now.ping_status, now.ping_echo) == (PingStatus.OK, 1000)
     rig.board.unplug("ping")
     rig.listen(READINGS_S)
     now = rig.latest()
     assert (now.ping_status, now.ping_echo) == (PingStatus.ABSENT, 0)
     rig.board.plug("ping")
     rig.listen(READINGS_S)
-    assert rig.latest().ping_status == PingStatus.OK
+    assert rig.latest().ping_status == PingStatus.NOTHING_NEAR
 
 
 @pytest.mark.promise("age of the older IR reading; 255: never or older")

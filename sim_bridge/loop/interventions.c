@@ -1,7 +1,6 @@
 /* interventions.c: see loop.h. Here: what a test does to a simulation, past its parts. */
 #include <stdlib.h>
 
-#include "parts/ping.h"
 #include "state.h"
 
 /* The truth has where it was, and a cycle later where it is. */
@@ -64,17 +63,6 @@ void robot_release(robot *self, uint8_t pin) {
   if (override(self, pin, 0)) return;
   self->chassis.driven[pin] = BOARD_RELEASED;
   self->board->op->drive(self->board, 0, pin, BOARD_RELEASED);
-}
-
-int robot_answer_ping(robot *self, int64_t echo_cycles) {
-  int status = SIM_BAD_ARGUMENT;
-  for (int i = 0; i < self->part_count; i++) {
-    ping *p = ping_of(self->parts[i]);
-    if (p == NULL) continue;
-    p->answer = echo_cycles;
-    status = SIM_OK;
-  }
-  return status;
 }
 
 void robot_unplug(robot *self, int number, int unplugged) {

@@ -119,12 +119,10 @@ int robot_place(robot *self, double x, double y, double heading);
 int sim_place_shape(sim *self, int shape, double x, double y, double heading);
 
 /* For tests: a pin taken from its part and driven at a cycle, or at several, the earliest first; given back to it, or let go;
- * length of every echo pulse in cycles, -1: as the world says; the plug of the part of a number pulled out (1) or put in
- * again (0). Pins and levels have been checked (pins.py). Return SIM_OK or an error. */
+ * the plug of the part of a number pulled out (1) or put in again (0). Pins and levels have been checked (pins.py). */
 void robot_drive(robot *self, uint64_t at, uint8_t pin, uint8_t level);
 void robot_drive_edges(robot *self, uint8_t pin, const uint64_t *at, const uint8_t *levels, size_t count);
 void robot_release(robot *self, uint8_t pin);
-int robot_answer_ping(robot *self, int64_t echo_cycles);
 void robot_unplug(robot *self, int number, int unplugged);
 
 /* Lays a fault (FAULT_...) on the part of that number, or on a wheel or the whole robot, for the cycles from `begin`, now at

@@ -23,7 +23,7 @@ static uint64_t pulse(ping *self, uint64_t start, uint64_t length) {
 /* A trigger ended at `cycle`. */
 static void answer(ping *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
-  const uint64_t length = self->answer >= 0 ? (uint64_t)self->answer : echo(self, &from);
+  const uint64_t length = echo(self, &from);
   part_log_look(&self->part, cycle, LOOK_PING, &from, &self->mount, self->sonar.range_maximum, self->distance);
   if (part_fires(&self->part, FAULT_MISSING, cycle) != NULL) return;
   const fault *late = part_fires(&self->part, FAULT_LATE, cycle);
@@ -54,14 +54,11 @@ static int read(part *base, double *values) {
 
 static const part_operations OPERATIONS = {.edge = edge, .read = read};
 
-ping *ping_of(part *base) { return base->op == &OPERATIONS ? (ping *)base : NULL; }
-
 static int init(ping *self, const part_place *place, const part_pin *pins, int count, const sonar_parameters *p) {
   if (sonar_init(&self->sonar, p) != 0) return -1;
   part_join(&self->part, &OPERATIONS, place, pins, count);
   self->echo_pin = pins[count - 1].pin;
   self->mount = p->beam;
-  self->answer = PING_ANSWER_WORLD;
   self->distance = -1.0;
   return 0;
 }

@@ -17,8 +17,6 @@
 #include "../world/sensors/sonar.h"
 #include "part.h"
 
-enum { PING_ANSWER_WORLD = -1 };
-
 typedef struct {
   part part;
   beam_parameters mount;
@@ -30,7 +28,6 @@ typedef struct {
   uint64_t shortest;       /* echo pulse */
   uint64_t rest;           /* after the echo pulse */
   uint64_t ready;          /* triggers before this cycle are not heard */
-  int64_t answer;          /* length of every echo pulse, cycles; or PING_ANSWER_WORLD */
   double distance;         /* of the last reading, m; -1: none */
   uint64_t ping_cycle;     /* when it was triggered; 0: never */
   uint32_t pings;
@@ -51,8 +48,5 @@ extern const part_kind ping_kind;
 /* Parameters: ultrasonic_parameters. Pins: trigger and echo, which may be one. */
 extern const part_kind ultrasonic_kind;
 /* python: end */
-
-/* The range finder that this part is, or NULL. */
-ping *ping_of(part *base);
 
 #endif

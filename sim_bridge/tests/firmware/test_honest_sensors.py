@@ -14,6 +14,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.link.messages import PingStatus
 from boebot_hil.rig import CYCLES_PER_S, CYCLES_PER_US
+from sim_bridge.boards.board import Level
 from sim_bridge.tests.rigs import SessionRig
 
 pytestmark = pytest.mark.unsanitized
@@ -110,12 +111,21 @@ def test_an_echo_that_is_too_short_is_too_near(rig: SessionRig, length_us: float
 
 def test_a_short_echo_is_measured_or_too_near(rig: SessionRig) -> None:
     """The line full both ways and noise on an encoder's line: the interrupt that stamps the echo comes late."""
+    before = Level.LOW
+
+    def answer(cycle: int, level: Level) -> None:
+        nonlocal before
+        if before == Level.HIGH:  # a trigger ends
+            for after_us, to in pulse(755, length_us):
+                rig.board.drive(PING, to, cycle + round(after_us * CYCLES_PER_US))
+        before = level
+
+    rig.board.board.on_edge(PING, answer)
     for length_us in (115, 116, 118, 122, 130, 145, 175):
-        rig.board.answer_ping(length_us)
         rig.board.square_wave(ENCODER, period=1600, seconds=0.3)
-        before = len(rig.telemetry)
+        first = len(rig.telemetry) + 10
         rig.flood(rig.signal(0.3, -0.3), 0.25)
-        for frame in rig.telemetry[before + 10 :]:
+        for frame in rig.telemetry[first:]:
             reported = (frame.ping_status, frame.ping_echo)
             assert reported in [(PingStatus.TOO_NEAR, 0), *((PingStatus.OK, length_us + d) for d in (-1, 0, 1))]
 

@@ -453,15 +453,6 @@ def test_missed_echoes_and_spread() -> None:
     assert heard.std() / heard.mean() == pytest.approx(0.005, rel=0.1)
 
 
-def test_answers_can_be_given_in_the_worlds_place() -> None:
-    robot = scripted()
-    robot.pins.answer_ping(1234.5)
-    robot.edge(1 * MS, PING, 1)
-    robot.edge(1 * MS + 5 * US, PING, 2)
-    robot.run(0.03)
-    assert echo_us(robot.inputs(PING)) == 1234.5
-
-
 # ---- battery ---------------------------------------------------------------------------------------------
 
 
