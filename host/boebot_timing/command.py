@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from boebot import missing, resources
-from boebot.cli import options, output, quantity, streams
+from boebot.cli import options, output, streams
 from boebot.errors import BoebotError, TimingError
 
 if TYPE_CHECKING:
@@ -55,14 +55,7 @@ def timing(
     measure: Annotated[
         bool, typer.Option("--measure/--no-measure", help="Run the image in the emulator too, where there is one.")
     ] = True,
-    seconds: Annotated[
-        float,
-        typer.Option(
-            metavar="TIME",
-            parser=quantity.parser("s"),
-            help="Of the board's time, for each that is measured: 0.1 to 3600.",
-        ),
-    ] = 1.0,
+    seconds: Annotated[float, options.time("Of the board's time, for each that is measured: 0.1 to 3600.")] = 1.0,
     seed: Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the scenarios, 0 or more.")] = 1,
     port: Annotated[
         str | None,
@@ -70,21 +63,8 @@ def timing(
             "--port", metavar="P", help="Board whose own maxima are read: a port, or avr. It must run this image."
         ),
     ] = None,
-    brain: Annotated[
-        str | None,
-        typer.Option(
-            "--brain",
-            metavar="B",
-            autocompletion=options.complete_brains,
-            help="Measure the steps of this brain in a simulated run.",
-        ),
-    ] = None,
-    step: Annotated[
-        float | None,
-        typer.Option(
-            "--step", metavar="TIME", parser=quantity.parser("s"), help="What a step of the brain takes, as in 4ms."
-        ),
-    ] = None,
+    brain: Annotated[str | None, options.brain("Measure the steps of this brain in a simulated run.")] = None,
+    step: Annotated[float | None, options.time("What a step of the brain takes, as in 4ms.")] = None,
     period: options.Period = None,
     baud: Annotated[
         int | None, typer.Option("--baud", metavar="RATE", help="Of the line (bit/s). Else as the robot says.")

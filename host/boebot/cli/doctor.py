@@ -18,7 +18,7 @@ from serial.tools import list_ports
 import boebot
 from boebot import resources
 from boebot.boards import BoardRequest, board_kinds, is_live
-from boebot.cli import options, output, quantity
+from boebot.cli import options, output
 from boebot.cli.board_link import board_link, show_identity, watch_link
 from boebot.description.board_parameters import configure
 from boebot.description.equipment import Equipment
@@ -67,10 +67,7 @@ def doctor(
             "--watch", help="Watch the link until Ctrl-C: counters of both ends, round trips, the board's clock."
         ),
     ] = False,
-    seconds: Annotated[
-        float | None,
-        typer.Option(metavar="TIME", parser=quantity.parser("s", least=0), help="With --watch: end after this time."),
-    ] = None,
+    seconds: Annotated[float | None, options.time("With --watch: end after this time.", least=0)] = None,
     json: Annotated[
         bool, typer.Option("--json", help="Print JSON in place of the table; with --watch an object every second.")
     ] = False,

@@ -51,6 +51,29 @@ complete_brains = one_of(lambda: import_module("boebot.brains").bundled(), ".py"
 
 # ---- options ---------------------------------------------------------------------------------------------------------
 
+# Those of one kind, each named as its parameter; `says` is its help.
+
+
+def time(says: str, least: float = -math.inf) -> Any:
+    """A time (s), as a number or with a unit."""
+    return typer.Option(metavar="TIME", parser=quantity.parser("s", least), help=says)
+
+
+def port(says: str, least: int = 0) -> Any:
+    """A TCP port."""
+    return typer.Option(metavar="PORT", min=least, max=65535, help=says)
+
+
+def robot(says: str) -> Any:
+    """A robot's name or file."""
+    return typer.Option(metavar="R", autocompletion=complete_robots, help=says)
+
+
+def brain(says: str) -> Any:
+    """A brain's name or file."""
+    return typer.Option(metavar="BRAIN", autocompletion=complete_brains, help=says)
+
+
 _PORTS = ", ".join(["/dev/ttyACM0", "serial:PORT", "socket://HOST:PORT", *(f"{name}:..." for name in guests(PORTS))])
 
 On = Annotated[
@@ -69,28 +92,13 @@ RunOn = Annotated[
         help=f"avr, native, or a port: {_PORTS}; direct for a robot without a board. Else native, or direct.",
     ),
 ]
-RobotName = Annotated[
-    str, typer.Option("--robot", metavar="R", autocompletion=complete_robots, help="Bundled robot or .toml file.")
-]
+RobotName = Annotated[str, robot("Bundled robot or .toml file.")]
 ArenaName = Annotated[
     str | None,
-    typer.Option(
-        "--arena",
-        metavar="A",
-        autocompletion=complete_arenas,
-        help="Bundled arena or .toml file (simulated runs).",
-    ),
+    typer.Option(metavar="A", autocompletion=complete_arenas, help="Bundled arena or .toml file (simulated runs)."),
 ]
 Seed = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the brain's chance and of the world's noise.")]
-Period = Annotated[
-    float | None,
-    typer.Option(
-        "--period",
-        metavar="TIME",
-        parser=quantity.parser("s"),
-        help="From step to step, as in 0.05 or 50ms; a multiple of the 10 ms tick.",
-    ),
-]
+Period = Annotated[float | None, time("From step to step, as in 0.05 or 50ms; a multiple of the 10 ms tick.")]
 Without = Annotated[
     str | None,
     typer.Option(
@@ -131,13 +139,10 @@ View = Annotated[
 ]
 Gdb = Annotated[
     int | None,
-    typer.Option(
-        "--gdb",
-        metavar="PORT",
-        min=1,
-        max=65535,
-        help="Let avr-gdb in at this TCP port of this computer; board and world stand still where it stops them. "
+    port(
+        "Let avr-gdb in at this TCP port of this computer; board and world stand still where it stops them. "
         "Emulated ATmega328P only.",
+        least=1,
     ),
 ]
 ServedView = Annotated[bool, typer.Option("--view", help="Show the robot in the browser meanwhile.")]
@@ -150,12 +155,7 @@ Speed = Annotated[
         help="With --view: how many times as fast as real time a simulated run goes at first, or max. Else 1.",
     ),
 ]
-ViewPort = Annotated[
-    int | None,
-    typer.Option(
-        "--view-port", metavar="PORT", min=0, max=65535, help="With --view: port of the page, on loopback. Else any."
-    ),
-]
+ViewPort = Annotated[int | None, port("With --view: port of the page, on loopback. Else any.")]
 
 
 def magnitudes(given: list[str] | None) -> dict[str, float]:

@@ -34,24 +34,10 @@ def replay(
         Path,
         typer.Argument(metavar="DIR|FILE", help=f"Folder of a run, or a record of other programs' ({_SUFFIXES})."),
     ],
-    brain: Annotated[
-        str | None,
-        typer.Option(
-            "--brain",
-            metavar="BRAIN",
-            autocompletion=options.complete_brains,
-            help="Bundled brain, or a Python or TOML file, as of boebot run.",
-        ),
-    ] = None,
+    brain: Annotated[str | None, options.brain("Bundled brain, or a Python or TOML file, as of boebot run.")] = None,
     robot: options.RobotNumber = None,
     kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind",
-            metavar="R",
-            autocompletion=options.complete_robots,
-            help="Of a FILE: bundled robot or .toml file; else the one that its board names.",
-        ),
+        str | None, options.robot("Of a FILE: bundled robot or .toml file; else the one that its board names.")
     ] = None,
     node: Annotated[
         str | None, typer.Option("--node", metavar="[BUS:]N", help="Of a FILE: which board, if several.")

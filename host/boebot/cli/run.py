@@ -62,11 +62,8 @@ def run(
     on: options.RunOn = None,
     robot: Annotated[
         list[str] | None,
-        typer.Option(
-            "--robot",
-            metavar="R",
-            autocompletion=options.complete_robots,
-            help="Bundled robot or .toml file; again for each further robot. Else the brain's ROBOT, or shieldbot.",
+        options.robot(
+            "Bundled robot or .toml file; again for each further robot. Else the brain's ROBOT, or shieldbot."
         ),
     ] = None,
     robots: Annotated[
@@ -82,9 +79,7 @@ def run(
         ),
     ] = None,
     arena: options.ArenaName = None,
-    seconds: Annotated[
-        float, typer.Option(metavar="TIME", parser=quantity.parser("s"), help="Length of the run by the board's clock.")
-    ] = SECONDS,
+    seconds: Annotated[float, options.time("Length of the run by the board's clock.")] = SECONDS,
     seed: options.Seed = 1,
     period: options.Period = None,
     without: options.Without = None,
@@ -101,11 +96,9 @@ def run(
     realtime: Annotated[bool, typer.Option("--realtime", help="Slow a simulated run down to the wall clock.")] = False,
     step_timeout: Annotated[
         float | None,
-        typer.Option(
-            metavar="TIME",
-            parser=quantity.parser("s"),
-            help="Wall time after which a step of the brain that has not ended is an error. Else 10 s; in real time "
-            "the time after which the board's dead-man stops the motors.",
+        options.time(
+            "Wall time after which a step of the brain that has not ended is an error. Else 10 s; in real time the "
+            "time after which the board's dead-man stops the motors."
         ),
     ] = None,
     force_timing: Annotated[

@@ -33,10 +33,7 @@ def _unread() -> Iterator[None]:
 def serve(
     on: Annotated[str, typer.Option("--on", metavar="BOARD", help="avr or native.")] = "avr",
     pty: Annotated[bool, typer.Option("--pty", help="On a new pseudo-terminal, like a serial port.")] = False,
-    tcp: Annotated[
-        int | None,
-        typer.Option("--tcp", metavar="PORT", min=0, max=65535, help="On this TCP port of loopback; 0: any."),
-    ] = None,
+    tcp: Annotated[int | None, options.port("On this TCP port of loopback; 0: any.")] = None,
     bootloader: Annotated[
         bool,
         typer.Option(

@@ -16,7 +16,7 @@ from typing import Annotated, TextIO
 import typer
 
 from boebot import system
-from boebot.cli import options, output, quantity
+from boebot.cli import options, output
 from boebot.cli.ending import detail, end
 from boebot.errors import BoebotError
 from boebot.record import run_folder
@@ -104,9 +104,7 @@ def teleop(
     seed: options.Seed = 1,
     without: options.Without = None,
     imperfection: options.Imperfections = None,
-    seconds: Annotated[
-        float, typer.Option(metavar="TIME", parser=quantity.parser("s"), help="End by itself after this time.")
-    ] = float("inf"),
+    seconds: Annotated[float, options.time("End by itself after this time.")] = float("inf"),
     view: options.View = False,
     view_port: options.ViewPort = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where to write the record.")] = None,
