@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from boebot.arenas.floor_plan import FloorPlan
 from boebot.view import scene, style
-from boebot.view.painter import draw_arena, draw_robot, frame
-from boebot_course.experiment import Floats
+from boebot_course.experiment import Axes, Floats
 from boebot_course.trials import Trial
 
 
 def floor(axes: Axes, plan: FloorPlan, *places: Floats) -> None:
     """Draws an arena, wide enough for its walls or, in the open, for those places (m, shape (n, 2))."""
+    from boebot.view.painter import draw_arena, frame
+
     if plan.outlines:
         low, high = scene.plan_bounds(plan, [])
     else:
@@ -28,6 +28,8 @@ def floor(axes: Axes, plan: FloorPlan, *places: Floats) -> None:
 
 def draw_paths(axes: Axes, trials: Sequence[Trial]) -> None:
     """All paths, each up to its first contact, which a cross marks; the robot stands where the first one begins."""
+    from boebot.view.painter import draw_robot
+
     floor(axes, trials[0].plan)
     for number, trial in enumerate(trials, 1):
         last = np.searchsorted(trial.time, trial.first_contact) if trial.has_collided else len(trial.time) - 1

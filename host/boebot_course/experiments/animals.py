@@ -17,12 +17,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.brain import Utility
 from boebot.brain.utility import Utilities
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, exactly, experiment
 
 USE = 0.02  # 1/s, of each
 INTAKE = 0.10  # 1/s at cue 1, of what it takes in, times its cue

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import RunAndTumble
@@ -20,7 +18,7 @@ from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
 from boebot.devices.motor import RegulatedMotor
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import Alone, trial_seeds
 from boebot_course.variants import varied
 

@@ -20,11 +20,10 @@ from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import boebot
 from boebot.robot import Robot
-from boebot_course.experiment import Measured, Outcome, exactly, experiment
+from boebot_course.experiment import Figure, Measured, Outcome, exactly, experiment
 
 ALLOWED = (
     "builtins",

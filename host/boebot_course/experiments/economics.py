@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors import Avoid, ChargeBattery, Wander, Withdraw
@@ -24,7 +23,7 @@ from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import Trial, decisions
 
 SECONDS = 300.0

@@ -16,13 +16,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.brain import Utility
 from boebot.brain.utility import Utilities
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, about, exactly, experiment
 
 PATROL = Utility(b=0.5)
 DRAIN, CHARGE = 0.02, 0.1  # 1/s

@@ -11,15 +11,11 @@ import operator
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
 
 from boebot.navigation import Scan
 from boebot.navigation.exploration_graph import ExplorationGraph, Placement
 from boebot.view import style
-from boebot.view.painter import HATCH, frame
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, about, exactly, experiment
 
 Point = tuple[float, float]
 
@@ -160,6 +156,9 @@ def moving_on(seed: int) -> Outcome:
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
+    from matplotlib.patches import Circle, Rectangle
+
+    from boebot.view.painter import HATCH, frame
 
     low, high = np.array(ROOM)
     frame(axes, low - 0.1, high + 0.1)
@@ -243,6 +242,10 @@ def placed(seed: int) -> Outcome:
 
 def _draw_scan(axes: Axes, angles: Floats, distances: Floats, *, faint: bool = False) -> None:
     """Seen from above, the robot heading up."""
+    from matplotlib.patches import Circle, Polygon
+
+    from boebot.view.painter import frame
+
     frame(axes, np.array((-2.1, -0.3)), np.array((2.1, 1.9)))
     corners = np.column_stack((-distances * np.sin(angles), distances * np.cos(angles)))
     inside, edge = ("#f3f5f9", style.FAINT) if faint else ("#cfe0ee", "#0072b2")
@@ -255,6 +258,7 @@ def _draw_scan(axes: Axes, angles: Floats, distances: Floats, *, faint: bool = F
 
 
 def _draw_nodes(axes: Axes, scan: Scan) -> None:
+    from matplotlib.patches import Wedge
 
     for begin, end in PLACEMENT.intervals(scan):
         if end - begin > PLACEMENT.least_angle:

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.navigation import Explore, Lattice, LineMap, Placement
 from boebot_course.coverage import Coverage
-from boebot_course.experiment import Floats, Measured, Outcome, exactly, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Log, Trial, trial_seeds, try_once
 from boebot_course.variants import arena_file, exact_roller, poses_on

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot import run
@@ -21,7 +20,7 @@ from boebot.brain import Action, Brain, FixedActionPattern
 from boebot.description.robots import load_robot
 from boebot.result import RunResult
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Variant, about, exactly, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.trials import decisions, true_pose
 from boebot_course.variants import arena_file
 

@@ -14,20 +14,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 
 from boebot.navigation import Found, Lattice, LineMap, search, tightened
 from boebot.navigation.lattice import Cell
 from boebot.navigation.search import Method
 from boebot.navigation.tighten import length
-from boebot.view.painter import frame
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, about, exactly, experiment
 
 Point = tuple[float, float]
 START, TARGET = (5, 3), (6, 17)  # row, column
@@ -91,6 +84,8 @@ EXPANDED, PATH, WALL, FROM = "#bfe3c6", "#0b6b3a", "#39415a", "#f0e442"
 
 def _draw_search(axes: Axes, free: NDArray[np.bool_], found: Found[Cell]) -> None:
     """As Figs. 6.8 and 6.10: checked cells light green, the path dark green."""
+    from matplotlib.colors import to_rgb
+
     rows, columns = free.shape
     picture = np.ones((rows, columns, 3))
     picture[~free] = to_rgb(WALL)
@@ -109,6 +104,9 @@ def _draw_search(axes: Axes, free: NDArray[np.bool_], found: Found[Cell]) -> Non
 
 
 def _legend(figure: Figure, *, with_wall: bool) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
     figure.legend(
         handles=[
             Patch(fc=FROM, ec="0.6", label="start"),
@@ -402,6 +400,7 @@ def representations(seed: int) -> Outcome:
 
 
 def _draw_nodes(axes: Axes, nodes: Nodes, path: Sequence[int]) -> None:
+    from matplotlib.collections import LineCollection
 
     ends = [(nodes.places[a], nodes.places[b]) for a, others in nodes.edges.items() for b in others if a < b]
     axes.add_collection(LineCollection(ends, colors="#b8bfcd", linewidths=0.6))
@@ -528,6 +527,11 @@ def tightening(seed: int) -> Outcome:
 
 
 def _draw_grid(axes: Axes, plan: LineMap, lattice: Lattice, cells: list[Box]) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import Rectangle
+
+    from boebot.view.painter import frame
+
     low, high = plan.bounds
     frame(axes, low, high)
     reach = (lattice.x, lattice.x + lattice.columns * CELL, lattice.y, lattice.y + lattice.rows * CELL)

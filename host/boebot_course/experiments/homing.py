@@ -10,8 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import Homing, Wander
@@ -20,7 +18,7 @@ from boebot.cognition import Odometry, PathIntegration
 from boebot.description.robots import RobotDescription
 from boebot.devices.compass import TESLA_PER_COUNT
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Variant, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, Variant, experiment
 from boebot_course.trials import PER_SEED, Log, decisions, true_pose
 from boebot_course.variants import varied
 

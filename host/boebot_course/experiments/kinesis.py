@@ -8,13 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import Kinesis
 from boebot.brain import Brain
 from boebot.devices.motor import RegulatedMotor
-from boebot_course.experiment import Floats, Measured, Outcome, about, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, experiment
 from boebot_course.trials import Log
 from boebot_course.variants import varied
 

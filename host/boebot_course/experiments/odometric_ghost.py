@@ -13,13 +13,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.cognition import Odometry
 from boebot.view import scene, style
-from boebot.view.painter import draw_robot, paint
-from boebot_course.experiment import Measured, Outcome, Variant, about, exactly, experiment
+from boebot_course.experiment import Figure, Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.experiments.straight_line import HOLD, LEAST, Straight, columns, drive, runner
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
@@ -57,6 +55,8 @@ def error(trial: Straight) -> float:
 
 def _draw(figure: Figure, trials: Sequence[Straight]) -> None:
     """Ways of robots and ghosts from above, with robot and ghost where the first ones end."""
+    from boebot.view.painter import draw_robot, paint
+
     axes = figure.subplots()
     first = trials[0]
     reach = first.result.robot.body.radius_m

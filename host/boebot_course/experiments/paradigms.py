@@ -16,7 +16,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import boebot
@@ -28,7 +27,7 @@ from boebot.record.columns import VehicleColumns
 from boebot.record.truth import touch_indices
 from boebot.result import RunResult
 from boebot.robot import Command, Robot
-from boebot_course.experiment import Floats, Measured, Outcome, exactly, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.variants import narrow_arsim
 

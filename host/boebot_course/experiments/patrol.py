@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from boebot.brain import Brain, CognitiveProcess, Utility
 from boebot.cognition import Odometry
 from boebot.navigation import Estimator, FollowPath, LineMap, Localization, RandomSearch
 from boebot.navigation.frames import Pose, composed
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Variant, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, Variant, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, true_pose, try_once
 

@@ -12,9 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 from boebot.brain import Brain, CognitiveProcess
 from boebot.cognition import Odometry
@@ -23,8 +20,7 @@ from boebot.navigation import FollowField, Lattice, LineMap, LockDetector, Poten
 from boebot.navigation.potential_field import waypoints
 from boebot.robot import Robot
 from boebot.view import style
-from boebot.view.painter import draw_robot
-from boebot_course.experiment import Floats, Measured, Outcome, Variant, about, exactly, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Trial, trial_seeds, try_once
 from boebot_course.variants import exact_roller, scaled_arena
@@ -185,12 +181,14 @@ def _draw_field(axes: Axes, field: PotentialField, trial: Trial, low: float, hig
 
 
 def _draw_goal(axes: Axes, behavior: FollowField) -> None:
+    from matplotlib.patches import Circle
 
     place = behavior.goal.x, behavior.goal.y
     axes.add_patch(Circle(place, behavior.arrival, facecolor="#f0e442", edgecolor="#39415a", lw=1.0, zorder=5))
 
 
 def _draw_way(axes: Axes, trial: Trial, number: int, line: str = "-", width: float = 1.6) -> None:
+    from boebot.view.painter import draw_robot
 
     axes.plot(*trial.path.T, line, color=style.colour(number), lw=width, zorder=6)
     draw_robot(axes, trial.result.robot, trial.start, style.colour(number))

@@ -11,9 +11,8 @@ import math
 from functools import partial
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from boebot_course.experiment import Floats, Measured, Outcome, about, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, experiment
 from boebot_course.experiments.chemotaxis import (
     SIZE,
     SPEED,

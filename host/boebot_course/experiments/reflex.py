@@ -9,11 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors.withdraw import ReflexIntensity
-from boebot_course.experiment import Floats, Measured, Outcome, about, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, experiment
 
 STEP = 0.01  # s
 

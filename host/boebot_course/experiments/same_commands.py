@@ -17,7 +17,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import boebot
 from boebot.behaviors import Avoid, Wander, Withdraw
@@ -29,7 +28,7 @@ from boebot.record.columns import BoardColumns
 from boebot.result import RunResult
 from boebot.robot import Command
 from boebot.running.replayed import replayed
-from boebot_course.experiment import Measured, Outcome, exactly, experiment
+from boebot_course.experiment import Figure, Measured, Outcome, exactly, experiment
 from boebot_course.experiments import wall
 
 SECONDS = 20.0

@@ -15,9 +15,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.arenas import load_arena
@@ -26,7 +23,7 @@ from boebot.navigation import Lattice, LineMap, Scan, TurretScan, laser_scan
 from boebot.navigation.frames import Pose
 from boebot.navigation.match import Match, search_pose
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, Variant, about, experiment
+from boebot_course.experiment import Axes, Figure, Floats, Measured, Outcome, Variant, about, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import poses_on
@@ -181,6 +178,8 @@ def _draw_scan(
     axes: Axes, scan: Scan, at: Pose, colour: str, *, rays: bool = True, dotted: bool = False, label: str = "scan"
 ) -> None:
     """Its ends, and a few of its rays, as they lie when the range finder is there."""
+    from matplotlib.collections import LineCollection
+
     x, y, heading = at
     angles = heading + np.linspace(*scan.bearings, len(scan.distances))
     ends = np.column_stack((x + scan.distances * np.cos(angles), y + scan.distances * np.sin(angles)))[scan.known]

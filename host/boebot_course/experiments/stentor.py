@@ -17,11 +17,10 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors.escalate import LeakyChain
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, exactly, experiment
 
 DECAYS = np.array((8.5, 4.3, 1.6, 0.75))  # a_2..a_5 (1/s)
 GAINS = np.array((12.0, 6.6, 2.75, 1.45))  # b_2..b_5 (1/s)

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot.behaviors import StraightRun
 from boebot.brain import Brain
 from boebot.cognition import Odometry
 from boebot.description.robots import RobotDescription
-from boebot_course.experiment import Measured, Outcome, Variant, about, exactly, experiment
+from boebot_course.experiment import Figure, Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.trials import Trial, trial_seeds, try_once
 
 AT_REST_S = 0.5  # without moving, at the end of a run

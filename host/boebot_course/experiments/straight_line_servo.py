@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import msgspec
-from matplotlib.figure import Figure
 
 from boebot.behaviors import StraightRun
 from boebot.description.equipment import Equipment
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.link import messages
 from boebot.robot import Observation, Robot
-from boebot_course.experiment import Measured, Outcome, Variant, exactly, experiment
+from boebot_course.experiment import Figure, Measured, Outcome, Variant, exactly, experiment
 from boebot_course.experiments.straight_line import Straight, drive, runner
 from boebot_course.trials import trial_seeds
 from boebot_course.variants import varied

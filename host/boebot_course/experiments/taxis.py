@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 from boebot import rates
 from boebot.behaviors import Phototaxis
@@ -21,8 +19,7 @@ from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
 from boebot.devices.light import Phototransistor
 from boebot.view import style
-from boebot.view.painter import draw_robot
-from boebot_course.experiment import Measured, Outcome, Variant, about, experiment
+from boebot_course.experiment import Figure, Measured, Outcome, Variant, about, experiment
 from boebot_course.paths import floor
 from boebot_course.trials import Steady, Trial, trial_seeds, try_once
 from boebot_course.variants import SMALL_RADIUS, arena_file, at_angle, small_arsim, varied
@@ -108,6 +105,10 @@ def judge(setting: Setting, times: Sequence[float], straight: float) -> list[Mea
 
 def _draw(figure: Figure, done: Sequence[Trial], times: Sequence[float], straight: float) -> None:
     """Ways up to the lamp, and the times that they took."""
+    from matplotlib.patches import Circle
+
+    from boebot.view.painter import draw_robot
+
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     floor(left, done[0].plan, np.array([(-AWAY_M, -AWAY_M), (AWAY_M, AWAY_M)]))
     for trial, time in zip(done, times, strict=True):

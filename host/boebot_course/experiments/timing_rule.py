@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import msgspec
-from matplotlib.figure import Figure
 
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import NotRealisableError
 from boebot.running.runner import run
-from boebot_course.experiment import Outcome, about, exactly, experiment
+from boebot_course.experiment import Figure, Outcome, about, exactly, experiment
 from boebot_timing.diagram import step
 from boebot_timing.realisable import judge
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import boebot
 from boebot.brain import Brain, CognitiveProcess, StateVariable, Utility
 from boebot.brain.utility import Utilities
 from boebot.robot import Robot
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import Log, Steady, decisions
 
 

@@ -6,12 +6,11 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import boebot
 from boebot.behaviors import Stop
 from boebot.brain import Brain, StateVariable, Utility
-from boebot_course.experiment import Floats, Measured, Outcome, about, exactly, experiment
+from boebot_course.experiment import Figure, Floats, Measured, Outcome, about, exactly, experiment
 from boebot_course.trials import Steady, decisions
 
 TERMS = 100  # of the sum in (7.3): those beyond are below 1e-25

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from boebot import run
 from boebot.behaviors import FollowWall
 from boebot.brain import Brain
 from boebot.description.robots import RobotDescription
 from boebot.result import RunResult
-from boebot_course.experiment import Measured, Outcome, Variant, experiment
+from boebot_course.experiment import Figure, Measured, Outcome, Variant, experiment
 from boebot_course.paths import floor
 from boebot_course.variants import SMALL_SPEED, arena_file, small_arsim, varied
 

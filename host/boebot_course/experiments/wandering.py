@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from boebot import rates
@@ -17,8 +15,7 @@ from boebot.brain import Brain, Utility
 from boebot.cognition import near
 from boebot.description.robots import RobotDescription
 from boebot.view import style
-from boebot.view.painter import draw_robot
-from boebot_course.experiment import Measured, Outcome, Variant, about, exactly, experiment
+from boebot_course.experiment import Axes, Figure, Measured, Outcome, Variant, about, exactly, experiment
 from boebot_course.paths import draw_paths, floor
 from boebot_course.trials import Alone, Trial, trial_seeds, try_once
 from boebot_course.variants import narrow_arsim, scaled_arena
@@ -283,6 +280,8 @@ def avoiding(setting: Setting, seed: int) -> Outcome:
 
 def _draw_activity(axes: Axes, trial: Trial) -> None:
     """One path, with the behavior that drove."""
+    from boebot.view.painter import draw_robot
+
     floor(axes, trial.plan)
     avoids: NDArray[np.bool_] = trial.when_active("avoid")
     for name, active, colour in (("wander", ~avoids, style.END), ("avoid", avoids, style.ESTIMATE)):

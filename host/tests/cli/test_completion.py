@@ -29,6 +29,26 @@ def test_list_of_commands_needs_none_of_them() -> None:
         assert f"'{heavy}'" not in done.stderr, heavy
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "list",
+        "experiment nonesuch",
+        "run wander --seconds 0.1",
+        "faults",
+        "timing --no-measure",
+        "show arena room --json",
+    ],
+)
+def test_a_command_that_draws_nothing_does_without_matplotlib(words: str) -> None:
+    script = (
+        f"import sys; sys.argv = ['boebot', *{words.split()}]; sys.modules['matplotlib'] = None\n"
+        "from boebot import cli; cli.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    assert "matplotlib" not in done.stderr and done.returncode == (2 if "nonesuch" in words else 0), done.stderr
+
+
 @pytest.mark.parametrize("name", app.all_commands())
 def test_command_says_of_itself_what_the_list_says(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = boebot(capsys, name, "--help")
