@@ -77,7 +77,6 @@ def python_module(spec: schema.Schema) -> str:
 
 def python_message(message: schema.Message) -> list[str]:
     """The class of one message."""
-    code = "<" + "".join(field.struct_code for field in message.fields)
     name = class_name(message.name)
     lines = ["", "", f"class _{name}Fields(NamedTuple):"]
     for field in message.fields:
@@ -100,7 +99,7 @@ def python_message(message: schema.Message) -> list[str]:
         f'    NAME: ClassVar[str] = "{message.name}"',
         f'    DELIVERY: ClassVar[str] = "{message.delivery}"',
         f"    LENGTH: ClassVar[int] = {message.length}",
-        f'    STRUCT: ClassVar[struct.Struct] = struct.Struct("{code}")',
+        f'    STRUCT: ClassVar[struct.Struct] = struct.Struct("{message.format}")',
         "",
         "    def pack(self) -> bytes:",
         '        """The payload."""',

@@ -112,11 +112,6 @@ class Field:
         return self.text_length or INTEGERS[self.type][0]
 
     @property
-    def struct_code(self) -> str:
-        """The field's letter in Python's struct notation."""
-        return f"{self.text_length}s" if self.text_length else INTEGERS[self.type][2]
-
-    @property
     def least(self) -> int:
         """Smallest count allowed."""
         return self.min if self.min is not None else INTEGERS[self.type][3]
@@ -146,6 +141,13 @@ class Message:
     def length(self) -> int:
         """Payload bytes."""
         return sum(field.size for field in self.fields)
+
+    @property
+    def format(self) -> str:
+        """Of the payload, in Python's struct notation."""
+        return "<" + "".join(
+            f"{field.text_length}s" if field.text_length else INTEGERS[field.type][2] for field in self.fields
+        )
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import struct
 
 import reference_frame
 import schema
@@ -13,27 +14,16 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
     draw = random.Random(20120321)
     out: list[dict[str, object]] = []
     for message in spec.message:
-        rows: list[list[object]] = [[0 if not f.text_length else b"" for f in message.fields]]
-        rows.append([f.greatest if not f.text_length else b"x" * f.text_length for f in message.fields])
-        rows.append([f.least if not f.text_length else b"a" for f in message.fields])
-        for _ in range(3):
-            rows.append(
-                [
-                    draw.randint(f.least, f.greatest)
-                    if not f.text_length
-                    else bytes(draw.randrange(97, 123) for _ in range(draw.randrange(f.text_length + 1)))
-                    for f in message.fields
-                ]
-            )
+        rows: list[list[object]] = [
+            [b"" if f.text_length else 0 for f in message.fields],
+            [b"x" * f.text_length if f.text_length else f.greatest for f in message.fields],
+            [b"a" if f.text_length else f.least for f in message.fields],
+            *([_drawn(f, draw) for f in message.fields] for _ in range(3)),
+        ]
         for row in rows if message.fields else rows[:1]:
             sequence = draw.randrange(256)
             seed = reference_frame.SEED if message.delivery == "handshake" else draw.randrange(1 << 21)
-            payload = b"".join(
-                value.ljust(f.text_length, b"\0")
-                if isinstance(value, bytes)
-                else int(str(value)).to_bytes(f.size, "little", signed=f.type.startswith("i"))
-                for f, value in zip(message.fields, row, strict=True)
-            )
+            payload = struct.pack(message.format, *row)
             out.append(
                 {
                     "message": message.name,
@@ -49,6 +39,12 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
                 }
             )
     return out
+
+
+def _drawn(field: schema.Field, draw: random.Random) -> int | bytes:
+    if field.text_length:
+        return bytes(draw.randrange(97, 123) for _ in range(draw.randrange(field.text_length + 1)))
+    return draw.randint(field.least, field.greatest)
 
 
 def vectors_header(rows: list[dict[str, object]]) -> str:

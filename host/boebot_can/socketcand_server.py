@@ -70,14 +70,9 @@ class SocketcandBus:
         Raises:
             BoardError: the port is taken.
         """
-        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            if os.name == "posix":
-                self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._listener.bind(("127.0.0.1", port))
-            self._listener.listen(MOST_CLIENTS)
+            self._listener = socket.create_server(("127.0.0.1", port), backlog=MOST_CLIENTS)
         except OSError as error:
-            self._listener.close()
             why = os.strerror(error.errno or 0).lower()
             raise BoardError(f"a CAN bus cannot be served on TCP port {port}: {why}") from None
         self._listener.setblocking(False)

@@ -115,20 +115,12 @@ static bool load(native_board *self, char *error, size_t error_size) {
   return true;
 }
 
-static uint8_t cause_on_the_wire(board_reset_cause cause) {
-  switch (cause) {
-    case BOARD_RESET_POWER:
-      return RESET_CAUSE_POWER;
-    case BOARD_RESET_EXTERNAL:
-      return RESET_CAUSE_EXTERNAL;
-    case BOARD_RESET_BROWN_OUT:
-      return RESET_CAUSE_BROWN_OUT;
-    case BOARD_RESET_WATCHDOG:
-      return RESET_CAUSE_WATCHDOG;
-    default:
-      return RESET_CAUSE_UNKNOWN;
-  }
-}
+static const uint8_t CAUSES_ON_THE_WIRE[] = {
+    [BOARD_RESET_POWER] = RESET_CAUSE_POWER,
+    [BOARD_RESET_EXTERNAL] = RESET_CAUSE_EXTERNAL,
+    [BOARD_RESET_BROWN_OUT] = RESET_CAUSE_BROWN_OUT,
+    [BOARD_RESET_WATCHDOG] = RESET_CAUSE_WATCHDOG,
+};
 
 /* Takes bytes off the end of the line that have not wholly left by now. */
 static void cut_outgoing(native_board *self) {
@@ -182,20 +174,18 @@ static bool restart(native_board *self) {
   if (self->reset_cause == BOARD_RESET_POWER || self->reset_cause == BOARD_RESET_BROWN_OUT) {
     lose_power(self);
   }
-  if (!self->started) {
-    self->started = true;
-    self->api->start(&self->machine, cause_on_the_wire(self->reset_cause));
-    return true;
+  if (self->started) {
+    self->resets++;
+    cut_outgoing(self);
+    cut_incoming(self);
+    library_unload(&self->library);
+    if (!load(self, error, sizeof error)) {
+      keep_fault(self, error);
+      return false;
+    }
   }
-  self->resets++;
-  cut_outgoing(self);
-  cut_incoming(self);
-  library_unload(&self->library);
-  if (!load(self, error, sizeof error)) {
-    keep_fault(self, error);
-    return false;
-  }
-  self->api->start(&self->machine, cause_on_the_wire(self->reset_cause));
+  self->started = true;
+  self->api->start(&self->machine, CAUSES_ON_THE_WIRE[self->reset_cause]);
   return true;
 }
 

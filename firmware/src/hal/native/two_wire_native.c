@@ -80,48 +80,35 @@ static void done(uint8_t with) {
 
 /* A start: both lines high, the data line falls, then the clock. It waits until the bus is free. */
 static void step_start(void) {
-  switch (half) {
-    case 0:
-      data_line(false);
-      half++;
-      break;
-    case 1:
-      clock_line(false);
-      half++;
-      break;
-    case 2:
-      if (native_level(PIN_COMPASS_SDA) && native_level(PIN_COMPASS_SCL)) {
-        data_line(true);
-        half++;
-      }
-      break;
-    default: {
-      const uint8_t with = owns_bus ? HAL_TWO_WIRE_STARTED_AGAIN : HAL_TWO_WIRE_STARTED;
-      clock_line(true);
-      owns_bus = true;
-      done(with);
-      break;
-    }
+  const uint8_t step = half++;
+  if (step == 0) {
+    data_line(false);
+  } else if (step == 1) {
+    clock_line(false);
+  } else if (step > 2) {
+    const uint8_t with = owns_bus ? HAL_TWO_WIRE_STARTED_AGAIN : HAL_TWO_WIRE_STARTED;
+    clock_line(true);
+    owns_bus = true;
+    done(with);
+  } else if (native_level(PIN_COMPASS_SDA) && native_level(PIN_COMPASS_SCL)) {
+    data_line(true);
+  } else {
+    half = step;
   }
 }
 
 static void step_stop(void) {
-  switch (half) {
-    case 0:
-      data_line(true);
-      half++;
-      break;
-    case 1:
-      clock_line(false);
-      half++;
-      break;
-    default:
-      if (native_level(PIN_COMPASS_SCL)) {
-        data_line(false);
-        owns_bus = false;
-        rest();
-      }
-      break;
+  const uint8_t step = half++;
+  if (step == 0) {
+    data_line(true);
+  } else if (step == 1) {
+    clock_line(false);
+  } else if (native_level(PIN_COMPASS_SCL)) {
+    data_line(false);
+    owns_bus = false;
+    rest();
+  } else {
+    half = step;
   }
 }
 
