@@ -13,8 +13,8 @@ PIP := $(PYTHON_VENV) -m pip install --quiet --no-compile --disable-pip-version-
 	--constraint requirements.lock
 
 # Made by protocol/generate.py. Of the headers in firmware/src/generated one is named here; it makes them all.
-GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host/boebot_can/layout.py host/boebot/devices/attributes.pyi
-GENERATED_FROM := $(wildcard protocol/*.py host/*/generator/*.py protocol/*.toml protocol/robots/*.toml host/boebot/devices/*.py) firmware/src/tasks.def
+GENERATED := firmware/src/generated/messages.h host/boebot/link/messages.py host/boebot_can/layout.py host/boebot/devices/attributes.pyi sim_bridge/world/generated/noise_layers.h
+GENERATED_FROM := $(wildcard protocol/*.py host/*/generator/*.py sim_bridge/world/generator/*.py protocol/*.toml protocol/robots/*.toml host/boebot/devices/*.py) firmware/src/tasks.def
 FIRMWARE_SOURCES := $(sort $(firstword $(GENERATED)) $(shell find firmware/src -name '*.[ch]' -o -name '*.def'))
 CORE_SOURCES := $(shell find host sim_bridge -name '[!_]*.[ch]' -o -name '*.def' -o -name 'build_*.py')
 ARENA_SCHEMA := host/boebot/arenas/bundled/schema.json

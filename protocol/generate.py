@@ -7,8 +7,8 @@
 Built: the C headers in firmware/src/generated, the Python module host/boebot/link/messages.py, and the stub
 host/boebot/devices/attributes.pyi. `make`, setup.py, PlatformIO and pytest begin with it; a file that would be the same
 is left alone. In git: the golden vectors protocol/vectors/frames.json, and the tables of PROTOCOL.md. Each kind of file
-has a module beside this one. Packages beside the core join by host/<package>/generator/<any>_files.py, which has the
-same two functions, `built` and `pages`, and `parts` of PROTOCOL.md.
+has a module beside this one. Packages beside the core, and the simulated world, join by a folder generator/ with a file
+<any>_files.py, which has the same two functions, `built` and `pages`, and `parts` of PROTOCOL.md.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-GUESTS = sorted((ROOT / "host").glob("*/generator/*_files.py"))
+GUESTS = sorted(ROOT.glob("*/*/generator/*_files.py"))
 sys.path[:0] = [str(HERE), *(str(path.parent) for path in GUESTS)]
 
 import attributes_stub  # noqa: E402

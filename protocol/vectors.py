@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
+from typing import Any
 
 import reference_frame
 import schema
@@ -14,7 +15,7 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
     draw = random.Random(20120321)
     out: list[dict[str, object]] = []
     for message in spec.message:
-        rows: list[list[object]] = [
+        rows: list[list[Any]] = [
             [b"" if f.text_length else 0 for f in message.fields],
             [b"x" * f.text_length if f.text_length else f.greatest for f in message.fields],
             [b"a" if f.text_length else f.least for f in message.fields],
@@ -41,7 +42,7 @@ def vectors(spec: schema.Schema) -> list[dict[str, object]]:
     return out
 
 
-def _drawn(field: schema.Field, draw: random.Random) -> int | bytes:
+def _drawn(field: schema.Field, draw: random.Random) -> Any:
     if field.text_length:
         return bytes(draw.randrange(97, 123) for _ in range(draw.randrange(field.text_length + 1)))
     return draw.randint(field.least, field.greatest)

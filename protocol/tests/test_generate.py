@@ -50,7 +50,13 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def clone(tmp_path: Path) -> Path:
     """What git holds of the generator and of what it reads."""
     made = shutil.ignore_patterns("generated", "messages.py", "attributes.pyi", "__pycache__", "*.so")
-    for folder in ("protocol", "firmware/src", "host/boebot/devices", "host/boebot_can/generator"):
+    for folder in (
+        "protocol",
+        "firmware/src",
+        "host/boebot/devices",
+        "host/boebot_can/generator",
+        "sim_bridge/world/generator",
+    ):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=made)
     (tmp_path / "host" / "boebot" / "link").mkdir()
     return tmp_path

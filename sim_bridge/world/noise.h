@@ -13,8 +13,6 @@
 
 #include "geometry/hash.h"
 
-#define NOISE_LAYERS 256
-
 /* python: begin */
 /* 64 well-mixed bits. */
 uint64_t noise_bits(uint64_t seed, uint32_t robot, uint32_t device, uint64_t step);
@@ -26,8 +24,10 @@ double noise_normal(uint64_t seed, uint32_t robot, uint32_t device, uint64_t ste
  * `what` of unit `serial` of a kind of device; 0 for serial 0, the nominal unit. */
 double unit_normal(uint64_t serial, uint32_t kind, uint32_t what);
 
-/* Layer i of the bell is as wide as edge i, [0, 256]; edge 256 is 0. */
-double noise_layer_edge(int i);
+enum { NOISE_LAYERS = 256 };
+
+/* Layer i of the bell is as wide as edge i; edge 256 is 0. */
+extern const double noise_layer_edges[NOISE_LAYERS + 1];
 
 /* A device's own sequence: each draw takes the next step. */
 typedef struct {
@@ -40,9 +40,6 @@ typedef struct {
   uint8_t on; /* 0: uniform gives 0.5 and normal gives 0, always */
 } noise_source;
 /* python: end */
-
-/* Right edges of the layers, the widest first. */
-extern const double noise_layer_edges[NOISE_LAYERS + 1];
 
 /* What the steps of one device are mixed with. */
 static inline uint64_t noise_key(uint64_t seed, uint32_t robot, uint32_t device) {
