@@ -55,7 +55,6 @@ from boebot.link.messages import Infrared as Bits
 SWEEP_TICKS = 5  # of a whole sweep: one frequency in each
 _PERIOD_TICKS = 5  # where no schedule is given
 _SHADE, _LIT = 0.22, 0.5
-_SIGN = ("detected", "charger")
 
 
 class Infrared(NamedTuple):
@@ -74,7 +73,27 @@ class Infrared(NamedTuple):
     """Without a board: 0 (nothing within range) to 1 (close by)."""
 
 
-class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
+class InfraredBeam:
+    """What both kinds have in common, beside `Device`."""
+
+    __slots__ = ()
+
+    position_m: Point
+    heading_rad: float
+    beam_rad: float
+    range_m: float
+
+    READING: ClassVar[type | None] = Infrared
+    GROUP: ClassVar[str] = "infrared"
+    SIGN: ClassVar[tuple[str, str] | None] = ("detected", "charger")
+
+    def drawing(self, name: str) -> list[Item]:
+        """Its beam: faint, and in its colour while something is detected."""
+        seen = cone(self.position_m, self.heading_rad, self.beam_rad, self.range_m, _SHADE)
+        return [seen, seen._replace(fill="charger", alpha=_LIT, when=name)]
+
+
+class InfraredPair(InfraredBeam, Device, tag="infrared_pair", frozen=True, kw_only=True):
     """An infra-red LED and a 38 kHz receiver that looks the same way."""
 
     led_pin: int | str
@@ -84,9 +103,6 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
     beam_rad: Positive  # full opening
     range_m: Positive  # at 38 kHz, light surfaces
 
-    READING: ClassVar = Infrared
-    GROUP: ClassVar[str] = "infrared"
-    SIGN: ClassVar = _SIGN
     NAMES: ClassVar[tuple[str, ...]] = ("infrared_left", "infrared_right")
     PINS: ClassVar[dict[str, str]] = {"led_pin": "led", "receiver_pin": "receiver"}
     HEARS: ClassVar[frozenset[str]] = frozenset({"led_pin"})
@@ -155,10 +171,6 @@ class InfraredPair(Device, tag="infrared_pair", frozen=True, kw_only=True):
             return None
         return Readout(place.name, "of 5", 0, columns["zone"].values, columns["age"].values)
 
-    def drawing(self, name: str) -> list[Item]:
-        """Its beam."""
-        return _beam(self, name)
-
 
 class InfraredSchedule(Device, tag="infrared_schedule", frozen=True, kw_only=True):
     """How often the IR pairs are read."""
@@ -182,7 +194,7 @@ def _zone_field(place: Place) -> int:
     return DevicesTelemetry._fields.index(place.name.replace("infrared_", "infrared_zone_"))
 
 
-class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=True):
+class InfraredProximity(InfraredBeam, Sensor, tag="infrared_proximity", frozen=True, kw_only=True):
     """The notes' IR proximity sensor (3.9) to (3.14): a reading from 0 to 1."""
 
     position_m: Point
@@ -196,9 +208,6 @@ class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=T
     height_m: NotNegative = 0.06
     threshold: Share = 0.3  # a reading from here on is a thing detected
 
-    READING: ClassVar = Infrared
-    GROUP: ClassVar[str] = "infrared"
-    SIGN: ClassVar = _SIGN
     SHOWN: ClassVar = ("reading", "", 1.0, 2)
 
     def reading(self, values: Sequence[float], age: float) -> Infrared:
@@ -209,13 +218,3 @@ class InfraredProximity(Sensor, tag="infrared_proximity", frozen=True, kw_only=T
         """Detected or not, and the reading."""
         values = run.values(place.name)[:, 0]
         return [Column("detected", "", values >= self.threshold, None), Column("reading", "", values, 5)]
-
-    def drawing(self, name: str) -> list[Item]:
-        """Its beam."""
-        return _beam(self, name)
-
-
-def _beam(sensor: InfraredPair | InfraredProximity, name: str) -> list[Item]:
-    """Faint, and in its colour while something is detected."""
-    seen = cone(sensor.position_m, sensor.heading_rad, sensor.beam_rad, sensor.range_m, _SHADE)
-    return [seen, seen._replace(fill=_SIGN[1], alpha=_LIT, when=name)]

@@ -21,8 +21,8 @@ Its signal is on pin 8, the timer's capture input.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, ClassVar, Final, NamedTuple, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 import numpy as np
@@ -54,51 +54,52 @@ TEMPERATURE_C = 20.0
 SPEED_OF_SOUND = 331.5 + 0.6 * TEMPERATURE_C  # m/s, in air
 METRES_PER_US = SPEED_OF_SOUND / 2 * 1e-6
 _SHADE, _ECHO = 0.10, 0.14
-SHOWN: Final = ("distance", "m", 1.0, 2)
-FAULTS: Final = {
-    "missing": FaultKind("no echo pulse comes"),
-    "late": FaultKind("the echo pulse begins later by this", "s", default=0.01, most=1.0, harmless=0.0),
-    "doubled": FaultKind("so long after its end the echo pulse comes again", "s", default=0.001, least=1e-6, most=1.0),
-}
-"""Of every range finder at a board."""
 
 
-class RangeFinder(Protocol):
-    """What range finders have in common."""
+class RangeFinder:
+    """What range finders have in common, beside `Device`."""
 
-    @property
-    def position_m(self) -> Point: ...
-    @property
-    def heading_rad(self) -> float: ...
-    @property
-    def beam_rad(self) -> float: ...
-    @property
-    def range_min_m(self) -> float: ...
-    @property
-    def range_max_m(self) -> float: ...
+    __slots__ = ()
 
+    position_m: Point
+    heading_rad: float
+    beam_rad: float
+    range_min_m: float
+    range_max_m: float
 
-def shown_columns(place: Place, run: Run) -> list[Column]:
-    """Of a range finder at a board that a program drives: distance (NaN: nothing near) and age."""
-    distance, age = run.values(place.name).T
-    return [
-        Column("distance", "m", np.where(distance >= 0, distance, np.nan), 4),
-        Column("age", "s", np.where(age >= 0, age, np.nan), 3),
-    ]
+    SHOWN: ClassVar[tuple[str, str, float, int] | None] = ("distance", "m", 1.0, 2)
 
+    def fault(self) -> tuple[str, str] | None:
+        """See `Device`."""
+        if self.range_min_m < self.range_max_m:
+            return None
+        return "range_min_m", f" is {self.range_min_m:g}; expected less than range_max_m, {self.range_max_m:g}"
 
-def range_fault(device: RangeFinder) -> tuple[str, str] | None:
-    """See `Device.fault`."""
-    if device.range_min_m < device.range_max_m:
-        return None
-    return "range_min_m", f" is {device.range_min_m:g}; expected less than range_max_m, {device.range_max_m:g}"
+    def drawing(self, name: str) -> list[Item]:
+        """Its beam; and as far as an echo comes from."""
+        seen = cone(self.position_m, self.heading_rad, self.beam_rad, self.range_max_m, _SHADE)
+        there = [self.position_m, *arc(self.position_m, self.heading_rad, self.beam_rad, 1.0)]
+        return [seen, seen._replace(points=there, ink="robot", width=0.6, alpha=_ECHO, reach_by=name)]
 
 
-def beam(device: RangeFinder, name: str) -> list[Item]:
-    """Its beam; and as far as an echo comes from. `name`: of the device."""
-    seen = cone(device.position_m, device.heading_rad, device.beam_rad, device.range_max_m, _SHADE)
-    there = [device.position_m, *arc(device.position_m, device.heading_rad, device.beam_rad, 1.0)]
-    return [seen, seen._replace(points=there, ink="robot", width=0.6, alpha=_ECHO, reach_by=name)]
+class EchoPulse(RangeFinder):
+    """And those at a board."""
+
+    __slots__ = ()
+
+    FAULTS: ClassVar[Mapping[str, FaultKind]] = {
+        "missing": FaultKind("no echo pulse comes"),
+        "late": FaultKind("the echo pulse begins later by this", "s", default=0.01, most=1.0, harmless=0.0),
+        "doubled": FaultKind("so long after its end the echo pulse comes again", "s", 0.001, least=1e-6, most=1.0),
+    }
+
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Where a program drives it: distance (NaN: nothing near) and age."""
+        distance, age = run.values(place.name).T
+        return [
+            Column("distance", "m", np.where(distance >= 0, distance, np.nan), 4),
+            Column("age", "s", np.where(age >= 0, age, np.nan), 3),
+        ]
 
 
 class Ping(NamedTuple):
@@ -125,7 +126,7 @@ class Ping(NamedTuple):
         return self.status == PingStatus.ABSENT
 
 
-class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
+class PingSensor(EchoPulse, Device, tag="ping", frozen=True, kw_only=True):
     """Parallax Ping))): an ultrasonic range finder on one pin. It sits on the turret of a robot that has one."""
 
     pin: int | str
@@ -137,13 +138,11 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
     period_ticks: Annotated[int, msgspec.Meta(ge=4, le=250)]
 
     READING: ClassVar = Ping
-    SHOWN: ClassVar = SHOWN
     NAMES: ClassVar[tuple[str, ...]] = ("ping",)
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     WIRES: ClassVar[tuple[Wire, ...]] = (Wire("pin", "SIG"), Wire(FIVE_VOLTS, "5 V"), Wire(GROUND, "GND"))
     NEEDS: ClassVar[dict[str, str]] = {"Timer1 input capture": ""}
     ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8,)}
-    FAULTS: ClassVar = FAULTS
 
     def _echo_range_us(self) -> tuple[float, float]:
         """The range's ends on the wire. A Ping that hears nothing ends its pulse after 18.5 ms, as if at 3.18 m."""
@@ -183,7 +182,7 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Distance (NaN: no echo), age and status; that only by the kit's firmware."""
         if "ping_echo" not in (run.raw.dtype.names or ()):
-            return shown_columns(place, run)
+            return super().columns(place, run)
         least_us, greatest_us = self._echo_range_us()
         echo_us, age = run.raw["ping_echo"], run.raw["ping_age"]
         echoed = (least_us <= echo_us) & (echo_us <= greatest_us) & (age < NEVER)
@@ -195,10 +194,10 @@ class PingSensor(Device, tag="ping", frozen=True, kw_only=True):
 
     def drawing(self, name: str) -> list[Item]:
         """Its beam, which turns with the turret; and as far as an echo comes from."""
-        return [item._replace(turns=True) for item in beam(self, name)]
+        return [item._replace(turns=True) for item in super().drawing(name)]
 
 
-class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
+class Sonar(RangeFinder, Sensor, tag="sonar", frozen=True, kw_only=True):
     """The notes' sonar (section 1.6): a distance, or nothing heard."""
 
     position_m: Point
@@ -212,11 +211,6 @@ class Sonar(Sensor, tag="sonar", frozen=True, kw_only=True):
     height_m: NotNegative = 0.08
 
     READING: ClassVar = Ping
-    SHOWN: ClassVar = SHOWN
-
-    def fault(self) -> tuple[str, str] | None:
-        """See `Device`."""
-        return range_fault(self)
 
     def reading(self, values: Sequence[float], age: float) -> Ping:
         """See `VehicleDevice`."""

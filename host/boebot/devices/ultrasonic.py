@@ -15,12 +15,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from boebot.devices.device import FIVE_VOLTS, GROUND, Angle, Column, Device, Opening, Place, Point, Positive, Run, Wire
-from boebot.devices.drawing import Item
-from boebot.devices.ping import FAULTS, SHOWN, beam, range_fault, shown_columns
+from boebot.devices.device import FIVE_VOLTS, GROUND, Angle, Device, Opening, Point, Positive, Wire
+from boebot.devices.ping import EchoPulse
 
 
-class UltrasonicSensor(Device, tag="ultrasonic", frozen=True, kw_only=True):
+class UltrasonicSensor(EchoPulse, Device, tag="ultrasonic", frozen=True, kw_only=True):
     """HC-SR04."""
 
     trigger_pin: int | str
@@ -39,17 +38,3 @@ class UltrasonicSensor(Device, tag="ultrasonic", frozen=True, kw_only=True):
         Wire(FIVE_VOLTS, "VCC"),
         Wire(GROUND, "GND"),
     )
-    SHOWN: ClassVar = SHOWN
-    FAULTS: ClassVar = FAULTS
-
-    def fault(self) -> tuple[str, str] | None:
-        """See `Device`."""
-        return range_fault(self)
-
-    def columns(self, place: Place, run: Run) -> list[Column]:
-        """Distance (NaN: nothing near) and age."""
-        return shown_columns(place, run)
-
-    def drawing(self, name: str) -> list[Item]:
-        """Its beam; and as far as an echo comes from."""
-        return beam(self, name)

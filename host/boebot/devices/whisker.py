@@ -47,21 +47,35 @@ class Whisker(NamedTuple):
     """Whether the value may be trusted."""
 
 
-_SIGN = ("pressed", "touch")
 _PRESSED: Final = Whisker(True, 0.0, True)
 _FREE: Final = Whisker(False, 0.0, True)
 
 
-class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
+class BentWire:
+    """What both kinds have in common, beside `Device`."""
+
+    __slots__ = ()
+
+    root_m: Point
+    tip_m: Point
+
+    READING: ClassVar[type | None] = Whisker
+    GROUP: ClassVar[str] = "whiskers"
+    SIGN: ClassVar[tuple[str, str] | None] = ("pressed", "touch")
+
+    def drawing(self, name: str) -> list[Item]:
+        """Thicker and in its colour while it is pressed."""
+        free = Item([self.root_m, self.tip_m], ink="ink", width=1.1, layer=PARTS)
+        return [free, free._replace(ink="touch", width=3.0, when=name)]
+
+
+class WhiskerSwitch(BentWire, Device, tag="whisker", frozen=True, kw_only=True):
     """A wire that closes a switch to ground when it is bent."""
 
     pin: int | str
     root_m: Point
     tip_m: Point
 
-    READING: ClassVar = Whisker
-    GROUP: ClassVar[str] = "whiskers"
-    SIGN: ClassVar = _SIGN
     NAMES: ClassVar[tuple[str, ...]] = ("whisker_left", "whisker_right")
     PINS: ClassVar[dict[str, str]] = {"pin": ""}
     WIRES: ClassVar[tuple[Wire, ...]] = (
@@ -94,24 +108,16 @@ class WhiskerSwitch(Device, tag="whisker", frozen=True, kw_only=True):
             return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
         return [Column("pressed", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
 
-    def drawing(self, name: str) -> list[Item]:
-        """See `Device`."""
-        return _wire(self, name)
-
 
 def _bit(place: Place) -> int:
     return int(Whiskers[place.name.removeprefix("whisker_").upper()])
 
 
-class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True):
+class TouchWhisker(BentWire, VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True):
     """A whisker without a switch: a segment that touches something or not."""
 
     root_m: Point
     tip_m: Point
-
-    READING: ClassVar = Whisker
-    GROUP: ClassVar[str] = "whiskers"
-    SIGN: ClassVar = _SIGN
 
     def fault(self) -> tuple[str, str] | None:
         """See `Device`."""
@@ -126,13 +132,3 @@ class TouchWhisker(VehicleDevice, tag="touch_whisker", frozen=True, kw_only=True
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Pressed or not."""
         return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
-
-    def drawing(self, name: str) -> list[Item]:
-        """See `Device`."""
-        return _wire(self, name)
-
-
-def _wire(whisker: WhiskerSwitch | TouchWhisker, name: str) -> list[Item]:
-    """Thicker and in its colour while it is pressed."""
-    free = Item([whisker.root_m, whisker.tip_m], ink="ink", width=1.1, layer=PARTS)
-    return [free, free._replace(ink=_SIGN[1], width=3.0, when=name)]

@@ -88,6 +88,14 @@ def variant(folder: Path, text: str) -> Path:
     return path
 
 
+def test_the_range_of_a_ping_has_two_ends(tmp_path: Path) -> None:
+    path = tmp_path / "near.toml"
+    path.write_text('extends = "shieldbot"\n[device.ping]\nrange_min_m = 3.0\n')
+    sentence = r"near\.toml:3: device\.ping\.range_min_m is 3; expected less than range_max_m, 3$"
+    with pytest.raises(RobotError, match=sentence):
+        load_robot(path)
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
