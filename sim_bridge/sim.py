@@ -49,7 +49,6 @@ TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "co
 TONE = ("time", "duration", "frequency")
 _WAIT = struct.Struct("<dd")
 _SHIFT = struct.Struct("<dddd")
-LOOK = ("time", "kind", "x", "y", "heading", "beam", "reach", "distance")
 
 BAUD_MAXIMUM = 4_000_000
 ROOM = 1024  # bytes that are fetched at a time
@@ -734,12 +733,12 @@ class SimRobot:
 
     def drain(self, *, to_now: bool = False) -> Group:
         """The stream "truth" of a record since it was last drained: rows of doubles, columns `TRUTH` without the time.
-        What is kept of looks and tones is forgotten, too. Empty without recording. `to_now`: as `truth_to_now`."""
+        What is kept of tones is forgotten, too. Empty without recording. `to_now`: as `truth_to_now`."""
         if not self.sim.is_recorded:
             return {}
         time, *columns = (self.truth_to_now() if to_now else self.truth()).values()
         robot = self.handle
-        robot.truth.count = robot.looks.count = robot.tones.count = 0
+        robot.truth.count = robot.tones.count = 0
         if not len(time):
             return {}
         data = np.column_stack(columns)
@@ -749,7 +748,3 @@ class SimRobot:
         """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
         turret = lib.robot_turret(self.handle, checked_pin("turret_angle", pin))
         return float(turret.motor.angle) if turret else 0.0
-
-    def looks(self) -> dict[str, Floats]:
-        """Columns `LOOK`, one row per IR burst (kind 0) and Ping (kind 1); empty without recording."""
-        return _columns(self.handle.looks, LOOK)

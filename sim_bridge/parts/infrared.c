@@ -39,11 +39,7 @@ static double frequency_of(uint32_t period) { return (double)BOARD_CLOCK_HZ / (d
 
 static void look(infrared *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
-  const infrared_look seen = infrared_pair_look(&self->pair, &from, frequency_of(self->period), &self->part.noise);
-  self->reach = seen.reach;
-  self->distance = seen.distance;
-  self->seen = (uint8_t)seen.seen;
-  part_log_look(&self->part, cycle, LOOK_INFRARED, &from, &self->mount, self->reach, self->distance);
+  self->seen = (uint8_t)infrared_pair_look(&self->pair, &from, frequency_of(self->period), &self->part.noise).seen;
 }
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
@@ -108,10 +104,8 @@ void infrared_see_burst(infrared *self, const infrared_burst *burst, const infra
 
 static int init(part *base, const part_place *place, const uint8_t *pins, const void *parameters) {
   infrared *self = (infrared *)base;
-  const infrared_pair_parameters *p = parameters;
-  if (pins[1] == PART_NO_PIN || infrared_pair_init(&self->pair, p) != 0) return -1;
+  if (pins[1] == PART_NO_PIN || infrared_pair_init(&self->pair, parameters) != 0) return -1;
   part_join(base, &OPERATIONS, place, (part_pin[]){{pins[0], PART_HEARS}, {pins[1], PART_DRIVES | PART_PULLED_UP}}, 2);
-  self->mount = p->beam;
   part_drive(base, 0, pins[1], BOARD_HIGH);
   return 0;
 }

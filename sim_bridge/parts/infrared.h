@@ -23,15 +23,12 @@ typedef struct {
 
 typedef struct {
   part part;
-  beam_parameters mount;
   infrared_pair pair;
   uint64_t last_rise;
   uint64_t rises[INFRARED_CYCLES_TO_HEAR];  /* the last ones, by carrier_cycles modulo their number */
   uint32_t period;                          /* of the carrier, cycles */
   uint32_t carrier_cycles;                  /* in a row */
   uint8_t seen;                             /* in this burst */
-  double distance;                          /* at the last burst, m; -1: nothing in the beam */
-  double reach;                             /* of the last burst, m */
   uint64_t lit_until;                       /* by the own burst: the output is low until then */
   infrared_light foreign[INFRARED_FOREIGN]; /* by increasing time */
   int foreign_count;

@@ -142,19 +142,3 @@ viewpoint part_view(const part *self, uint64_t cycle) {
   if (turret != NULL) turn_view(&from, turret, turret->before + share * (turret->angle - turret->before));
   return from;
 }
-
-void part_log_look(const part *self, uint64_t cycle, int kind, const viewpoint *from, const beam_parameters *mount,
-                   double reach, double distance) {
-  if (!self->chassis->recording) return;
-  const sim_look look = {
-      .time = (double)cycle / BOARD_CLOCK_HZ,
-      .kind = kind,
-      .x = from->x + mount->x * from->cosine - mount->y * from->sine,
-      .y = from->y + mount->x * from->sine + mount->y * from->cosine,
-      .heading = from->heading + mount->heading,
-      .beam = mount->opening,
-      .reach = reach,
-      .distance = distance,
-  };
-  buffer_append(self->chassis->looks, &look, sizeof look);
-}

@@ -67,13 +67,8 @@ typedef struct {
   int at_charger;                  /* 1: the body stands at a charging station */
   fault *faults[3];                /* of the left wheel, the right one, the robot */
   uint8_t driven[BOARD_PIN_COUNT]; /* what was driven last, by pin */
-  int recording;                   /* 1: looks are logged */
   buffer *tones;                   /* sim_tone */
-  buffer *looks;                   /* sim_look */
 } chassis;
-
-/* Kinds of looks in the log. */
-enum { LOOK_INFRARED = 0, LOOK_PING = 1 };
 
 typedef struct part part;
 
@@ -209,9 +204,5 @@ static inline uint64_t part_step_end(const part *self) { return self->chassis->s
 /* Where the body is at that cycle, by linear interpolation within the step under way, and what is around it; for a part
  * on a turret, where a body would be that carries the part turned so. */
 viewpoint part_view(const part *self, uint64_t cycle);
-
-/* Logs what a range sensor of that kind saw: `mount` as its parameters have it. */
-void part_log_look(const part *self, uint64_t cycle, int kind, const viewpoint *from, const beam_parameters *mount,
-                   double reach, double distance);
 
 #endif

@@ -24,7 +24,6 @@ static uint64_t pulse(ping *self, uint64_t start, uint64_t length) {
 static void answer(ping *self, uint64_t cycle) {
   const viewpoint from = part_view(&self->part, cycle);
   const uint64_t length = echo(self, &from);
-  part_log_look(&self->part, cycle, LOOK_PING, &from, &self->mount, self->sonar.range_maximum, self->distance);
   if (part_fires(&self->part, FAULT_MISSING, cycle) != NULL) return;
   const fault *late = part_fires(&self->part, FAULT_LATE, cycle);
   const fault *doubled = part_fires(&self->part, FAULT_DOUBLED, cycle);
@@ -58,7 +57,6 @@ static int init(ping *self, const part_place *place, const part_pin *pins, int c
   if (sonar_init(&self->sonar, p) != 0) return -1;
   part_join(&self->part, &OPERATIONS, place, pins, count);
   self->echo_pin = pins[count - 1].pin;
-  self->mount = p->beam;
   self->distance = -1.0;
   return 0;
 }

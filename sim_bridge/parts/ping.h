@@ -19,7 +19,6 @@
 
 typedef struct {
   part part;
-  beam_parameters mount;
   sonar sonar;
   part_pulse pulse;
   uint8_t echo_pin, idle_level;              /* what it does to that pin between two echoes */

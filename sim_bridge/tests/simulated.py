@@ -51,6 +51,15 @@ def square(x: float, y: float, side: float) -> list[tuple[float, float]]:
     return [(x - h, y - h), (x + h, y - h), (x + h, y + h), (x - h, y + h)]
 
 
+def shortest_ray(half: float, x: float, y: float, heading: float, opening: float = 0.7, rays: int = 7) -> float:
+    """To the walls of a square room about the origin, of the rays of a beam (m)."""
+    ways = []
+    for angle in heading + np.linspace(-opening / 2, opening / 2, rays):
+        places = ((x, math.cos(angle)), (y, math.sin(angle)))
+        ways.append(min((math.copysign(half, way) - at) / way for at, way in places if way != 0.0))
+    return min(ways)
+
+
 def arena_of(
     *obstacles: list[tuple[float, float]],
     outline: list[tuple[float, float]] | None = None,

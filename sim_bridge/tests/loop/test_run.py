@@ -220,21 +220,7 @@ def test_nothing_is_recorded_unless_asked_for() -> None:
     robot = add_scripted(sim)
     robot.run(1.0)
     assert len(robot.robot.truth()["time"]) == 0
-    assert len(robot.robot.looks()["time"]) == 0
     sim.close()
-
-
-def test_looks_tell_where_the_sensors_looked() -> None:
-    robot = scripted(arena_of([(1.06, -3), (1.2, -3), (1.2, 3), (1.06, 3)]))
-    robot.edge(1 * MS, 8, 1)
-    robot.edge(1 * MS + 80, 8, 2)
-    robot.burst(2 * MS, 9)
-    robot.run(0.1)
-    looks = robot.robot.looks()
-    assert looks["kind"].tolist() == [1, 0]
-    assert looks["distance"] == pytest.approx([1.0, -1.0])
-    assert looks["x"] == pytest.approx([0.06, 0.05])
-    assert looks["reach"] == pytest.approx([3.0, 0.2], rel=1e-3)
 
 
 def test_pin_log_has_every_edge_in_order() -> None:

@@ -20,7 +20,7 @@ from sim_bridge.devices import light as light_model
 from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots import imperfections
 from sim_bridge.robots.wiring import add_part
-from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, scripts, square
+from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, scripts, shortest_ray, square
 
 LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8
 LIGHT_SENSOR = LightSensor(pin=LIGHT, position_m=(0.0, 0.0), heading_rad=0.0)
@@ -168,12 +168,13 @@ def with_turret(arena: Arena, width_us: float, seconds: float = 1.0) -> Scripted
     return robot
 
 
-def ping_look(robot: Scripted) -> dict[str, float]:
+def pinged(robot: Scripted) -> float:
+    """The distance that it then has (m; -1: none)."""
     at = robot.sim.cycle + 1 * MS
     robot.edge(at, PING, 1)
     robot.edge(at + 5 * US, PING, RELEASED)
     robot.run(0.03)
-    return {name: float(column[-1]) for name, column in robot.robot.looks().items()}
+    return robot.robot.readings()[robot.robot.layout["ping"]][0]
 
 
 @pytest.mark.parametrize("degrees", [-60, -30, 0, 30, 45, 90])
@@ -182,17 +183,15 @@ def test_the_mounts_heading_follows_the_turret(degrees: float) -> None:
     robot = with_turret(arena_of(outline=square(0, 0, 4)), 1500 + 500 * degrees / 45)
     angle = robot.robot.turret_angle(TURRET)
     assert angle == pytest.approx(math.radians(degrees), abs=0.0064)  # its dead band, 4 us
-    look = ping_look(robot)
-    assert look["heading"] == pytest.approx(angle)
-    assert look["x"] == pytest.approx(0.045 + 0.015 * math.cos(angle))
-    assert look["y"] == pytest.approx(0.015 * math.sin(angle), abs=1e-9)
+    x, y = 0.045 + 0.015 * math.cos(angle), 0.015 * math.sin(angle)
+    assert pinged(robot) == pytest.approx(shortest_ray(2.0, x, y, angle), rel=1e-9)
 
 
 def test_a_turned_ping_measures_elsewhere() -> None:
     arena = arena_of(square(0.045, 1.0, 0.4), outline=square(0, 0, 8))
-    ahead, left = ping_look(with_turret(arena, 1500)), ping_look(with_turret(arena, 2500))
-    assert left["distance"] == pytest.approx(0.8 - 0.015, abs=0.01)
-    assert ahead["distance"] == -1
+    ahead, left = pinged(with_turret(arena, 1500)), pinged(with_turret(arena, 2500))
+    assert left == pytest.approx(0.8 - 0.015, abs=0.01)
+    assert ahead == -1
 
 
 def test_turret_turns_at_its_speed() -> None:

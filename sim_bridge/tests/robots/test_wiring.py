@@ -23,7 +23,7 @@ from boebot.errors import ArenaError, BoardError, RobotError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim
-from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, scripts, square
+from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, scripts, shortest_ray, square
 
 DEVICES: dict[str, robots.AnyDevice] = {
     "turret": PositionServo(pin=11, position_m=(0.045, 0.0)),
@@ -53,8 +53,11 @@ def test_each_device_sits_at_its_pins() -> None:
     robot.edge(800 * MS, 8, 1)
     robot.edge(800 * MS + 5 * US, 8, 2)
     robot.run(1.0)
-    assert robot.robot.turret_angle(11) == pytest.approx(500 / 573.0, abs=0.008)
-    assert robot.robot.looks()["heading"][-1] == robot.robot.turret_angle(11)  # the Ping is on it
+    angle = robot.robot.turret_angle(11)
+    assert angle == pytest.approx(500 / 573.0, abs=0.008)
+    x, y = 0.045 + 0.015 * math.cos(angle), 0.015 * math.sin(angle)  # the Ping is on it
+    distance = robot.robot.readings()[robot.robot.layout["ping"]][0]
+    assert distance == pytest.approx(shortest_ray(1.0, x, y, angle), rel=1e-9)
     lows = [cycle for cycle, level in robot.inputs(6) if level == 0]
     assert lows[-1] - 501 * MS == pytest.approx(1500 * US, abs=2)
     assert robot.robot.tones()["frequency"] == pytest.approx([1000.0])
