@@ -55,7 +55,7 @@ struct robot {
   battery *battery;
   double held_supply;
   int part_count;
-  buffer received, received_at, truth, tones;
+  buffer received, received_at, truth;
   bool is_stamped;
   double sampled[...], held[...];
   edge_log edges;

@@ -46,7 +46,6 @@ BODY_PLACES = {
 """In the place of a part's number."""
 
 TRUTH = ("time", "x", "y", "heading", "speed", "turn_rate", "left", "right", "contact")
-TONE = ("time", "duration", "frequency")
 _WAIT = struct.Struct("<dd")
 _SHIFT = struct.Struct("<dddd")
 
@@ -727,18 +726,13 @@ class SimRobot:
         row = dict(zip(TRUTH, (*now, float(body.touching != 0)), strict=True))
         return {name: np.append(values, row[name]) for name, values in columns.items()}
 
-    def tones(self) -> dict[str, Floats]:
-        """Columns `TONE`, one row per tone that a buzzer has sounded."""
-        return _columns(self.handle.tones, TONE)
-
     def drain(self, *, to_now: bool = False) -> Group:
         """The stream "truth" of a record since it was last drained: rows of doubles, columns `TRUTH` without the time.
-        What is kept of tones is forgotten, too. Empty without recording. `to_now`: as `truth_to_now`."""
+        Empty without recording. `to_now`: as `truth_to_now`."""
         if not self.sim.is_recorded:
             return {}
         time, *columns = (self.truth_to_now() if to_now else self.truth()).values()
-        robot = self.handle
-        robot.truth.count = robot.tones.count = 0
+        self.handle.truth.count = 0
         if not len(time):
             return {}
         data = np.column_stack(columns)

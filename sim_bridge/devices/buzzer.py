@@ -1,4 +1,4 @@
-"""The buzzer: its tones are logged."""
+"""The buzzer: it is there, and its pin says what it sounds."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from sim_bridge.devices.catalogue import At, Part, joined
 
 @joined(PiezoBuzzer)
 def part(device: PiezoBuzzer, at: At) -> Part:
-    """Its tones."""
+    """Its pin."""
     return Part("buzzer_kind", at.number, [device.pin], ffi.NULL)

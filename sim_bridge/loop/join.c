@@ -36,7 +36,6 @@ static void destroy_robot(robot *r) {
   buffer_free(&r->received);
   buffer_free(&r->received_at);
   buffer_free(&r->truth);
-  buffer_free(&r->tones);
   edge_log_free(&r->edges);
   free(r);
 }
@@ -104,7 +103,6 @@ void sim_insert(sim *self, robot *r, double x, double y, double heading) {
       .supply = 1.0,
       .servo_supply = 1.0,
       .pack_v = BOARD_NOMINAL_VOLTS,
-      .tones = &r->tones,
   };
   memset(r->chassis.driven, BOARD_RELEASED, sizeof r->chassis.driven);
   insert(self, r);

@@ -48,7 +48,6 @@ struct robot {
   uint64_t idle;        /* cycles without a byte after which the line is idle: two bytes' time */
   uint64_t reset_at;    /* cycle of the last reset from outside */
   buffer truth;
-  buffer tones;
   edge_log edges;
   uint64_t next_row; /* least cycle of the truth's next row */
   int touched;       /* since its last row */

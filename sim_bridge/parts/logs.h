@@ -11,13 +11,6 @@
 #include "../boards/board.h"
 
 /* python: begin */
-/* What a buzzer sounded: edges of one frequency in a row. */
-typedef struct {
-  double time;      /* s, of the first edge */
-  double duration;  /* s */
-  double frequency; /* Hz */
-} sim_tone;
-
 /* The clock of a moving shape's path runs at another rate from `time` on: slower than the world's while it waits. Between
  * two rows of a shape, and from the last one to now, `waited` goes evenly. */
 typedef struct {

@@ -67,7 +67,6 @@ typedef struct {
   int at_charger;                  /* 1: the body stands at a charging station */
   fault *faults[3];                /* of the left wheel, the right one, the robot */
   uint8_t driven[BOARD_PIN_COUNT]; /* what was driven last, by pin */
-  buffer *tones;                   /* sim_tone */
 } chassis;
 
 typedef struct part part;

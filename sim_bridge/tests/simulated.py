@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from cffi import FFI
+from numpy.typing import NDArray
 
 from boebot.arenas import Arena, ArenaDescription, Polygon, Start
 from boebot.arenas.floor_plan import floor_plan
@@ -58,6 +59,19 @@ def shortest_ray(half: float, x: float, y: float, heading: float, opening: float
         places = ((x, math.cos(angle)), (y, math.sin(angle)))
         ways.append(min((math.copysign(half, way) - at) / way for at, way in places if way != 0.0))
     return min(ways)
+
+
+def tones(log: NDArray[Any], pin: int) -> NDArray[np.float64]:
+    """What a buzzer at a pin has sounded, by the board's edges: a row for each tone, time (s), duration (s), frequency
+    (Hz). Between two of them there is silence for 50 ms."""
+    found = []
+    edges = log[log["pin"] == pin]
+    high = edges["level"] == 1
+    rises, falls = (edges["cycle"][which].astype(np.int64) / CLOCK_HZ for which in (high, ~high))
+    for tone in np.split(rises, np.flatnonzero(np.diff(rises) > 0.05) + 1) if len(rises) else ():
+        end = falls[np.searchsorted(falls, tone[-1])]
+        found.append((tone[0], end - tone[0], (len(tone) - 1) / (tone[-1] - tone[0])))
+    return np.array(found).reshape(-1, 3)
 
 
 def arena_of(

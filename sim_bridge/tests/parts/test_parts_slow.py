@@ -1,10 +1,9 @@
-"""Light sensor, analog infrared, turret, buzzer, and what encoders get wrong, at the pins of a scripted board."""
+"""Light sensor, analog infrared, turret, and what encoders get wrong, at the pins of a scripted board."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ from sim_bridge.robots import imperfections
 from sim_bridge.robots.wiring import add_part
 from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, scripts, shortest_ray, square
 
-LIGHT, BUZZER, TURRET, PING = 6, 4, 11, 8
+LIGHT, TURRET, PING = 6, 11, 8
 LIGHT_SENSOR = LightSensor(pin=LIGHT, position_m=(0.0, 0.0), heading_rad=0.0)
 SHARP = SharpSensor(pin="A2", position_m=(0.06, 0.0), heading_rad=0.0)
 RELEASED = 2
@@ -212,74 +211,6 @@ def test_only_what_is_there_can_be_mounted() -> None:
     robot = scripted()
     assert lib.robot_mount(robot.robot.handle, TURRET, PING) == lib.SIM_BAD_ARGUMENT
     assert robot.robot.turret_angle(TURRET) == 0
-
-
-# ---- buzzer ----------------------------------------------------------------------------------------------
-
-
-def sound(robot: Scripted, start: float, frequency: float, seconds: float) -> None:
-    half = round(CLOCK_HZ / frequency / 2)
-    at = round(start * CLOCK_HZ)
-    for _ in range(round(seconds * frequency)):
-        robot.edge(at, BUZZER, 1)
-        robot.edge(at + half, BUZZER, 0)
-        at += 2 * half
-
-
-def buzzing() -> Scripted:
-    robot = scripted()
-    assert add_part(robot.robot.handle, Part("buzzer_kind", 0, [BUZZER], ffi.NULL)) == 0
-    return robot
-
-
-@pytest.mark.parametrize("frequency", [30, 440, 1000, 4000, 20_000])
-def test_a_tone_has_its_frequency_and_duration(frequency: float) -> None:
-    robot = buzzing()
-    sound(robot, 0.1, frequency, 0.5)
-    robot.run(1.0)
-    tones = robot.robot.tones()
-    assert tones["time"] == pytest.approx([0.1])
-    assert tones["duration"] == pytest.approx([0.5], abs=1.01 / frequency)
-    assert tones["frequency"] == pytest.approx([frequency], rel=1e-3)
-
-
-def test_a_melody_is_one_row_for_each_note() -> None:
-    robot = buzzing()
-    notes = [(0.10, 523.25, 0.2), (0.30, 659.25, 0.1), (0.45, 659.25, 0.1), (0.60, 784.0, 0.2)]
-    for note in notes:
-        sound(robot, *note)
-    robot.run(1.0)
-    tones = robot.robot.tones()
-    assert tones["frequency"] == pytest.approx([frequency for _, frequency, _ in notes], rel=2e-3)
-    assert tones["time"] == pytest.approx([start for start, _, _ in notes], abs=0.004)
-
-
-def test_jitter_makes_no_new_tone_and_clicks_are_none() -> None:
-    robot = buzzing()
-    at = 1 * MS
-    for i in range(200):
-        robot.edge(at, BUZZER, 1)
-        robot.edge(at + 8000, BUZZER, 0)
-        at += 16_000 + (100 if i % 3 else -200)
-    at += CLOCK_HZ // 10
-    for _ in range(5):  # 10 Hz
-        robot.edge(at, BUZZER, 1)
-        robot.edge(at + 1000, BUZZER, 0)
-        at += CLOCK_HZ // 10
-    robot.run(1.5)
-    assert robot.robot.tones()["frequency"] == pytest.approx([1000.0], rel=1e-3)
-
-
-def test_log_of_tones_does_not_depend_on_cuts() -> None:
-    def tones(cuts: list[float]) -> Any:
-        robot = buzzing()
-        sound(robot, 0.01, 440, 0.1)
-        sound(robot, 0.15, 880, 0.1)
-        for cut in cuts:
-            robot.run(cut)
-        return [column.tobytes() for column in robot.robot.tones().values()]
-
-    assert tones([0.5]) == tones([0.0123] * 40 + [0.008])
 
 
 # ---- encoders that err -----------------------------------------------------------------------------------
