@@ -23,6 +23,12 @@ SERVO := build/cache/libraries/Servo/Servo.h
 # The firmware for each pin map, and the boot loader.
 ENVIRONMENTS := $(shell sed -n 's/^default_envs = //p' platformio.ini | tr -d ,) bootloader
 IMAGES := $(ENVIRONMENTS:%=build/images/%.elf)
+# What setup.py compiles. Where some of it is not there, it is made anew.
+COMPILED := sim_bridge/_core sim_bridge/boards/avr/_avr host/boebot/arenas/_arena host/boebot/link/_codec
+COMPILED += $(patsubst %,sim_bridge/images/firmware-%,$(filter-out bootloader,$(ENVIRONMENTS)))
+ifneq ($(strip $(foreach one,$(COMPILED),$(if $(wildcard $(one).*so),,$(one)))),)
+$(shell rm -f build/.done-core)
+endif
 # The one that `make run` runs; the others are built when something needs them all.
 SHOWN := build/images/shieldbot.elf
 BUILD_SHOWN := tools/pio run --silent -e shieldbot
@@ -146,8 +152,7 @@ firmware: ready-firmware
 
 wheel:
 	@$(SIDE_BY_SIDE) ready-kit
-	@rm -rf build/bdist.*
-	@find build/lib.* -type f -not -name '*.so' -delete # the wheel links the same objects as the checkout
+	@rm -rf build/bdist.* build/lib.* # the wheel links the same objects as the checkout
 	@$(PYTHON_VENV) -m pip wheel --quiet --no-index --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 

@@ -21,7 +21,7 @@ from boebot import arguments
 from boebot.arenas import Arena
 from boebot.brains import LoadedBrain
 from boebot.errors import BrainError, RobotError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.vehicle import VehicleModel
 from sim_bridge.vehicles import worlds
 from sim_bridge.vehicles.brains import Brains

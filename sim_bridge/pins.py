@@ -15,7 +15,6 @@ from boebot.devices.device import ANALOG_PINS
 from boebot.errors import BoardError
 from boebot.record.blocks import Block, Group
 from boebot.record.record import LINE_FRAME
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import (
     CLOCK_HZ,
     EDGE,
@@ -26,6 +25,7 @@ from sim_bridge.boards.board import (
     ResetCause,
     checked_pin,
 )
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.sim import CYCLES_MAXIMUM, SimRobot
 
 SUPPLY_MAXIMUM_V = 30.0

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from boebot.arguments import shown, whole
 from boebot.errors import RobotError
 from boebot.files import regular
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.vehicles.checked_structs import number
 
 COLUMNS: Final = ("distance_m", "angle_rad", "reading")

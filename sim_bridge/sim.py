@@ -24,8 +24,8 @@ from boebot.devices.display import letters_of
 from boebot.devices.faults import BODY_FAULTS
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.record.blocks import Block, Group, group_of
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard, checked_pin
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.robots.imperfections import Draw, applied, body_parameters, collision_outline
 from sim_bridge.robots.wiring import done, join
 from sim_bridge.vehicles import ENDS

@@ -14,7 +14,7 @@ from typing import Any, Final
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import BrainError, RobotError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.vehicles import ENDS, worlds
 from sim_bridge.vehicles.model import VehicleModel as VehicleModel
 from sim_bridge.vehicles.model import beam as beam

@@ -77,6 +77,8 @@ class Guest(NamedTuple):
         module, _, attribute = self.place.partition(":")
         try:
             return getattr(import_module(module), attribute)
+        except BoebotError:
+            raise
         except Exception as error:  # whatever a package does as it is imported
             raise BoebotError(
                 f"{self.name!r} of an installed package cannot be loaded: {self.place}: {type(error).__name__}: {error}"

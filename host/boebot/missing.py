@@ -1,12 +1,14 @@
 """What is not installed here, each in a sentence with the command to type: a package of one of the kit's extras, a
-program of the operating system, a file that only a checkout can build."""
+program of the operating system, a file that only a checkout can build, a library of the kit's own C."""
 
 from __future__ import annotations
 
-import re
 import shutil
+import struct
 import sys
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from sysconfig import get_platform
 from typing import Any
 
@@ -48,12 +50,46 @@ def installer(**packages: str) -> str:
     return next((f"{_INSTALL[one]} {named[one]}" for one in here), "")
 
 
-def in_c(error: ImportError) -> str:
-    """Of a module of the kit's that is written in C and cannot be loaded; "": the error is about something else."""
-    if not re.match(r"(boebot|sim_bridge)\..*\b_\w+$", error.name or ""):
+def compiled(module: str) -> tuple[Any, Any]:
+    """The `ffi` and `lib` of a module of the kit's that is written in C.
+
+    Raises:
+        BoebotError: its file is not there, or cannot be loaded.
+    """
+    found = find_spec(module)
+    if found is None or found.origin is None:
+        place = Path(*module.split("."))
+        raise BoebotError(f"{place}, a library of boebot for {get_platform()}, is not there; {again()}")
+    file = Path(found.origin)
+    try:
+        if not (wrong := unloadable(file)):
+            loaded = import_module(module)
+            return loaded.ffi, loaded.lib
+    except ImportError as error:
+        wrong = str(error).removeprefix(f"{file}: ")
+    raise BoebotError(f"{file} cannot be loaded on {get_platform()}: {wrong}; {again(file)}")
+
+
+def unloadable(library: Path) -> str:
+    """Why a library cannot be loaded, as far as Linux's loader would crash or not say it; else "". By the header of
+    its format, ELF: its last part, the table of sections, is behind the file's end, or it is unlike cffi's own."""
+    import _cffi_backend  # here, as cffi may be what is missing
+
+    with library.open("rb") as file, Path(_cffi_backend.__file__).open("rb") as ours:
+        head, like = file.read(64), ours.read(64)
+    if len(head) < 64 or not head.startswith(b"\x7fELF\2"):
         return ""
-    way = "pip install --force-reinstall boebot" if resources.checkout() is None else "make setup"
-    return f"this copy of boebot is of another system, or not compiled: {error}; for {get_platform()}: {way}"
+    begin, size, count = struct.unpack_from("<40xQ10xHH", head)
+    if begin + size * count > library.stat().st_size:
+        return "it is cut short"
+    return "" if head[18:20] == like[18:20] else "it is for another processor"
+
+
+def again(library: Path | None = None) -> str:
+    """How to get what was compiled anew, in place of that file if there is one."""
+    if resources.checkout() is None:
+        return "type `pip install --force-reinstall boebot`"
+    return f"{'' if library is None else 'delete it, then '}type `make setup`"
 
 
 def built(target: str) -> str:

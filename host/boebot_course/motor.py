@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from boebot.errors import RobotError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, number, struct, values_of
 from sim_bridge.vehicles.drives import dc_parameters, regulated_parameters, servo_parameters
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from boebot.arenas._arena import ffi, lib
+from boebot.arenas.compiled import ffi, lib
 from boebot.errors import ArenaError
 
 Point = tuple[float, float]

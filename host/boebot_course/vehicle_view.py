@@ -20,7 +20,7 @@ from boebot.view import style
 from boebot.view.painter import draw_arena, frame
 from boebot.view.picture import NotebookFigure
 from boebot.view.scene import moving_item, plan_bounds
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.vehicle import Vehicle
 
 BODY, GHOST, RAY = style.END, style.ESTIMATE, "#aa4499"

@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING, Any
 from boebot.arguments import shown, whole
 from boebot.devices.device import pin_number
 from boebot.errors import CallError
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import EmulatedBoard, Level
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots.wiring import add_part, done
 

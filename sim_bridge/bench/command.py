@@ -64,6 +64,7 @@ def run_suite(boards: Sequence[str], arguments: Sequence[str], *, motors: bool =
     from boebot.sketch import cache
     from boebot.sketch.build import ended
 
+    missing.compiled("sim_bridge._core")  # where it cannot be loaded, each test would say so
     own = [f"--rootdir={Path(found.origin).parent}", f"--uno-keep={Path('.uno').absolute()}"]
     own += [*(f"--uno-on={board}" for board in boards), *["--uno-motors"] * motors]
     if find_spec("xdist") is not None and not any(map(is_live, boards)):

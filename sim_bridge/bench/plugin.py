@@ -107,10 +107,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def uno(request: pytest.FixtureRequest) -> Iterator[Uno]:
     """An Uno with the program that the test's mark `uno` names, just powered on."""
     from boebot.errors import BoebotError
-    from sim_bridge.bench.uno import open_uno
 
     board = getattr(request, "param", None) or boards(request.config)[0]
     try:
+        from sim_bridge.bench.uno import open_uno
+
         flash, motors = (request.config.getoption(name) for name in ("--uno-flash", "--uno-motors"))
         opened = open_uno(board, _wanted(request.node), flash=flash, motors=motors)
     except BoebotError as error:

@@ -105,8 +105,8 @@ class EmulatedBoard:
     def __init__(
         self, extension: Any, board: Any, description: str, *, elf: Path | None = None, assumed: str = ""
     ) -> None:
-        """`board`: a C `board *` of that extension."""
-        self.ffi, self.lib = extension.ffi, extension.lib
+        """`board`: a C `board *` of that extension (`ffi`, `lib`)."""
+        self.ffi, self.lib = extension
         self._board = board
         self.description, self.elf, self.assumed = description, elf, assumed
         self._free = weakref.finalize(self, board.op.destroy, board)

@@ -7,9 +7,10 @@ from pathlib import Path
 from boebot import missing, resources
 from boebot.errors import BoardError
 from boebot.files import regular
-from sim_bridge import _core
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import EmulatedBoard
+from sim_bridge.compiled import ffi, lib
+
+LIBRARIES = Path(__file__).resolve().parents[1] / "images"
 
 
 def native_library(pin_map: str) -> Path:
@@ -18,9 +19,8 @@ def native_library(pin_map: str) -> Path:
     Raises:
         BoardError: it was not built.
     """
-    folder = Path(__file__).resolve().parents[1] / "images"
     for suffix in (".so", ".dll", ".dylib"):
-        path = folder / f"firmware-{pin_map}{suffix}"
+        path = LIBRARIES / f"firmware-{pin_map}{suffix}"
         if path.is_file():
             return path
     raise BoardError(f"there is no firmware for this computer for pin map {pin_map!r}; {missing.built('setup')}")
@@ -37,10 +37,13 @@ def native_board(library: Path) -> EmulatedBoard:
         image = regular(library).read_bytes()
     except OSError as refused:
         raise BoardError(f"the firmware library {library} cannot be read: {refused.strerror}") from None
-    board = lib.native_board_create(image, len(image), error, 512)
+    wrong = missing.unloadable(library)
+    board = ffi.NULL if wrong else lib.native_board_create(image, len(image), error, 512)
     if board == ffi.NULL:
-        raise BoardError(f"{library.name}: {ffi.string(error).decode(errors='replace')}")
-    return EmulatedBoard(_core, board, "emulated native board")
+        wrong = wrong or ffi.string(error).decode(errors="replace")
+        way = missing.again(library) if library.parent == LIBRARIES else "expected one for this computer"
+        raise BoardError(f"the firmware library {library} cannot be loaded: {wrong}; {way}")
+    return EmulatedBoard((ffi, lib), board, "emulated native board")
 
 
 def avr_image(pin_map: str) -> Path:

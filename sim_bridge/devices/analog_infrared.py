@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.analog_infrared import SharpSensor
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Part, SensorKind, beam_of, joined
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE

@@ -7,7 +7,7 @@ from typing import Any
 
 from boebot.description.robots import Supply
 from boebot.devices.battery import Energy
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import Model, SensorKind, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from boebot.devices.encoder import QuadratureEncoder, SingleEncoder
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Part, joined
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boebot.devices.input import Button, Contact, Potentiometer, SlideSwitch
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Part, joined
 
 

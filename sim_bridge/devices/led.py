@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boebot.devices.led import Led
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Part, joined
 
 FORWARD_V = {"red": 2.0, "yellow": 2.1, "green": 2.2, "blue": 3.2, "white": 3.2}  # data: typical at 20 mA, 5 mm

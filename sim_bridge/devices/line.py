@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from boebot.devices.line import LineModule, LineSensor, ReflectanceSensor
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from boebot.devices.odometer import Odometer
-from sim_bridge._core import lib
+from sim_bridge.compiled import lib
 from sim_bridge.devices.catalogue import Model, SensorKind, modelled
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, Range
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.ping import PingSensor, RangeFinder, Sonar
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, beam_of, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, SWITCH, Range

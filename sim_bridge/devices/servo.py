@@ -10,7 +10,7 @@ from typing import Any
 
 from boebot.description.robots import Body
 from boebot.devices.servo import ContinuousServo
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Part, joined
 from sim_bridge.robots.imperfections import Draw
 

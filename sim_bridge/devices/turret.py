@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from boebot.devices.turret import PositionServo
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.catalogue import At, Part, joined
 from sim_bridge.robots.imperfections import Draw
 

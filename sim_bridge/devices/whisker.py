@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.whisker import TouchWhisker, WhiskerSwitch
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
 

@@ -17,7 +17,7 @@ from boebot.description.outlines import polygon_fault
 from boebot.description.robots import idle
 from boebot.errors import BoardError, RobotError
 from boebot.imperfections import checked, imperfections, switched_off
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 
 _DRAW = 1000  # the draws that make a robot have other device numbers
 

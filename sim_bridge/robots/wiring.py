@@ -10,7 +10,7 @@ from boebot.devices.battery import BatteryDivider
 from boebot.devices.device import pin_number
 from boebot.devices.turret import PositionServo
 from boebot.errors import BoardError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.battery import battery_parameters
 from sim_bridge.devices.catalogue import At, Part, part_of
 from sim_bridge.robots import imperfections

@@ -17,10 +17,10 @@ from typing import NamedTuple
 from boebot.arenas import load_arena
 from boebot.boards import BoardRequest
 from boebot.errors import BoardError, CallError
-from sim_bridge._core import lib
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
 from sim_bridge.boards.emulated import avr_image, image_file, native_board, native_library
+from sim_bridge.compiled import lib
 from sim_bridge.sessions.places import places_of
 from sim_bridge.sessions.session import DirectSession, SimSession
 from sim_bridge.sim import NEVER, Sim, SimRobot

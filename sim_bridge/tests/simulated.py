@@ -20,9 +20,8 @@ from boebot.arenas.floor_plan import floor_plan
 from boebot.boards import Truth
 from boebot.description.robots import RobotDescription, Supply, load_robot
 from boebot.record.truth import as_truth
-from sim_bridge import _core
-from sim_bridge._core import ffi
 from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim, SimRobot
 
@@ -141,7 +140,7 @@ def script_board() -> tuple[Any, EmulatedBoard]:
     """A board that plays a script, and its place in a simulation."""
     script = scripts.script_board_new()
     board = ffi.cast("board *", int(scripts.script_board_address(script)))
-    return script, EmulatedBoard(_core, board, "script")
+    return script, EmulatedBoard((ffi, lib), board, "script")
 
 
 def scripted(

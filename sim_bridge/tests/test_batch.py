@@ -20,8 +20,8 @@ from boebot.behaviors import Avoid, Wander
 from boebot.brain import Brain
 from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
 from boebot.robot import Robot
-from sim_bridge._core import ffi, lib
 from sim_bridge.batch import WANDER, Batch, CompiledBrain
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam, vehicle_model
 

@@ -10,7 +10,7 @@ import pytest
 
 from boebot.arenas import Arena, load_arena
 from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, beam

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from sim_bridge._core import lib
+from sim_bridge.compiled import lib
 
 STEP_S: Final = 0.01  # notes, section 3.2.6
 ENDS: Final[dict[int, str]] = {

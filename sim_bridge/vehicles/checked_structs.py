@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from boebot.arguments import real, shown
 from boebot.errors import RobotError
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 
 LIMIT: Final = 1e12  # of any number: products of some of them stay finite
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from boebot import arguments
 from boebot.errors import BrainError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.vehicles.worlds import STATE_BYTES_MAXIMUM
 
 if TYPE_CHECKING:

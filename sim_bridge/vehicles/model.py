@@ -14,7 +14,7 @@ from typing import Any, Final
 from boebot.arguments import shown, switch
 from boebot.description.robots import RobotDescription
 from boebot.errors import RobotError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.catalogue import SensorKind, sensor_kinds
 from sim_bridge.reading_table import ReadingTable
 from sim_bridge.robots.imperfections import collision_outline

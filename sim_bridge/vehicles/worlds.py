@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from boebot import arguments
 from boebot.arenas import Arena
 from boebot.errors import ArenaError, RobotError
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 
 if TYPE_CHECKING:
     from sim_bridge.vehicles.model import VehicleModel

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -32,16 +33,52 @@ def without_network(command: list[str]) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An empty environment with the wheel in it."""
+def wheel() -> Path:
+    """Made anew, beside what an earlier one has left: modules whose sources are gone."""
+    for folder in (PROJECT / "build").glob("lib.*"):
+        (folder / "sim_bridge" / "gone.py").touch()
+        (folder / "sim_bridge" / "_gone.abi3.so").touch()
     subprocess.run(["make", "wheel"], cwd=PROJECT, check=True, stdout=subprocess.DEVNULL)
     (wheel,) = (PROJECT / "dist").glob("boebot-*-linux_*.whl")
+    return wheel
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty environment with the wheel in it."""
     environment = tmp_path_factory.mktemp("wheel") / "environment"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
     pip = [sys.executable, "-m", "pip", "--python", str(environment / "bin" / "python"), "--quiet"]
     offline = ["--no-index", "--no-compile", "--find-links", str(PROJECT / "build" / "wheelhouse")]
     subprocess.run(without_network([*pip, "install", *offline, f"{wheel}[hil]"]), check=True)
     return environment
+
+
+def test_a_wheel_has_what_there_are_sources_of(wheel: Path) -> None:
+    with ZipFile(wheel) as archive:
+        names = archive.namelist()
+    assert "sim_bridge/sim.py" in names and not [name for name in names if "gone" in name]
+    assert sorted(name for name in names if name.rpartition("/")[2].startswith("_") and name.endswith(".so")) == [
+        "boebot/arenas/_arena.abi3.so",
+        "boebot/link/_codec.abi3.so",
+        "sim_bridge/_core.abi3.so",
+        "sim_bridge/boards/avr/_avr.abi3.so",
+    ]
+
+
+def test_an_installed_wheel_names_a_library_that_is_damaged(installed: Path, tmp_path: Path) -> None:
+    for name in ("_core", "_avr", "firmware-shieldbot"):
+        (file,) = installed.glob(f"lib/python*/site-packages/sim_bridge/**/{name}.*so")
+        whole = file.read_bytes()
+        file.unlink()
+        file.write_bytes(whole[: len(whole) // 2])
+        command = [str(installed / "bin" / "boebot"), "run", "wander", "--on", "avr" if name == "_avr" else "native"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        file.unlink()
+        file.write_bytes(whole)
+        assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done.stderr
+        assert f"{file} cannot be loaded" in done.stderr and ": it is cut short; " in done.stderr
+        assert done.stderr.endswith("; type `pip install --force-reinstall boebot`\n")
 
 
 @pytest.mark.parametrize(

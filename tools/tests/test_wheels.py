@@ -321,6 +321,27 @@ def test_errors_are_sentences(system: System, tmp_path: Path) -> None:
     assert "größe.hex" in said and len(said.splitlines()) == 1
 
 
+def test_a_library_of_another_system_is_one_sentence(system: System, wheels: dict[str, Path], tmp_path: Path) -> None:
+    """In place of its own one: another wheel, unpacked over it; or what is left of one that was cut short."""
+    words = ["run", "wander", "--seconds", "0.1", "--on"]
+    place = Path(system.run(tmp_path, "python", "-c", "import sim_bridge; print(sim_bridge.__path__[0])").strip())
+    folder = Path(str(place).removeprefix("Z:").replace("\\", "/"))
+    with ZipFile(wheels["macosx_11_0_arm64" if system.name == "aarch64" else "manylinux_2_17_aarch64"]) as archive:
+        others = {NATIVE.sub("", name): archive.read(name) for name in archive.namelist() if NATIVE.search(name)}
+    for name, board in (("_core", "native"), ("boards/avr/_avr", "avr"), ("images/firmware-shieldbot", "native")):
+        (file,) = (path for path in folder.glob(f"{name}.*") if NATIVE.search(path.name))
+        whole = file.read_bytes()
+        for data in (others[f"sim_bridge/{name}"], whole[: len(whole) // 2]):
+            file.unlink()
+            file.write_bytes(data)
+            said = system.boebot(tmp_path, *words, board, code=1)
+            assert re.search(rf"{file.name} cannot be loaded.*: .+; type `pip install --force-rei", said), said
+            assert len(said.splitlines()) == 1, said
+        file.unlink()
+        file.write_bytes(whole)
+        assert "complete" in system.boebot(tmp_path, *words, board)
+
+
 # ---- what only Windows has -----------------------------------------------------------------------------------------
 
 

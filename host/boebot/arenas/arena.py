@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boebot import arguments
-from boebot.arenas._arena import ffi, lib
+from boebot.arenas.compiled import ffi, lib
 from boebot.arenas.description import (
     ArenaDescription,
     DescriptionError,

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from boebot.arenas._arena import ffi, lib
+from boebot.arenas.compiled import ffi, lib
 
 Point = tuple[float, float]
 

@@ -80,13 +80,6 @@ def _run() -> object:
     except BoebotError as error:
         _say(str(error), error)
         return error.exit_code
-    except ImportError as error:
-        from boebot import missing
-
-        if not (sentence := missing.in_c(error)):
-            raise
-        _say(sentence, error)
-        return EXIT_ERROR
     except typer.Abort:
         raise KeyboardInterrupt from None
     except OSError as error:

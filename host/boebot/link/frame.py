@@ -14,9 +14,10 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+from boebot import missing
 from boebot.link import messages
-from boebot.link._codec import ffi, lib
 
+ffi, lib = missing.compiled("boebot.link._codec")
 SEED = 0x155555  # of the handshake's messages
 NO_SESSION = 0xFFFFFFFF  # seed of a decoder that accepts the handshake's messages only
 FRAME_OVERHEAD = 8  # bytes that a frame adds to its payload, both delimiters counted

@@ -93,9 +93,8 @@ class _Port:
         try:
             self._send(data)
         except (serial.SerialTimeoutException, TimeoutError):
-            if time.monotonic() - begun > _WRITE_S + _STILL_S:
-                return
-            raise BoardError(f"{self.name} takes no bytes: its other side does not read") from None
+            if time.monotonic() - begun <= _WRITE_S + _STILL_S:
+                raise BoardError(f"{self.name} takes no bytes: its other side does not read") from None
         except _FAILURES:
             raise self._gone() from None
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from boebot.arenas._arena import ffi, lib
 from boebot.arenas.arena import Arena, load_arena
+from boebot.arenas.compiled import ffi, lib
 from boebot.arenas.description import ArenaDescription, Start, Wall
 from boebot.errors import ArenaError, BrainError
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -51,17 +50,6 @@ class Watch:
     only_extremes: bool = False
 
 
-def _extension() -> Any:
-    try:
-        return import_module("sim_bridge.boards.avr._avr")
-    except ImportError as error:
-        if any(Path(__file__).parent.glob("_avr.*.so")):
-            raise BoardError(f"the AVR emulator cannot be loaded: {error}") from error
-        raise BoardError(
-            f"there is no AVR emulator; {missing.built('setup')}, or choose the native board (--on native)"
-        ) from error
-
-
 class AvrBoard(EmulatedBoard):
     """An emulated Arduino Uno. `assumed`: a sentence where its program does not say for which chip it is, or ""."""
 
@@ -69,10 +57,10 @@ class AvrBoard(EmulatedBoard):
 
     def __init__(self, program: Program) -> None:
         """Powers on a board with that program in flash."""
-        extension = _extension()
-        flash, eeprom = (extension.ffi.from_buffer("uint8_t[]", part) for part in (program.flash, program.eeprom))
+        ffi, lib = extension = missing.compiled("sim_bridge.boards.avr._avr")
+        flash, eeprom = (ffi.from_buffer("uint8_t[]", part) for part in (program.flash, program.eeprom))
         loaded = (flash, eeprom, program.begin, program.code_end, program.variables_end)
-        board = extension.lib.avr_board_create(extension.ffi.new("avr_program *", loaded))
+        board = lib.avr_board_create(ffi.new("avr_program *", loaded))
         if not board:
             raise MemoryError("emulated board")
         super().__init__(extension, board, "emulated ATmega328P", elf=program.elf, assumed=program.assumed)

@@ -42,7 +42,7 @@ bool library_load(library_copy *library, const unsigned char *bytes, size_t size
   }
   library->handle = (void *)LoadLibraryW(path);
   if (library->handle == NULL) {
-    snprintf(error, error_size, "cannot load the firmware library: error %lu", GetLastError());
+    snprintf(error, error_size, "Windows says error %lu", GetLastError());
     DeleteFileW(path);
     return false;
   }
@@ -80,7 +80,9 @@ bool library_load(library_copy *library, const unsigned char *bytes, size_t size
   if (copy != NULL && fclose(copy) == 0 && written) {
     library->handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (library->handle == NULL) {
-      snprintf(error, error_size, "cannot load the firmware library: %s", dlerror());
+      const char *reason = dlerror(), *after = strstr(reason, ": ");
+      const bool names_copy = after != NULL && strncmp(reason, path, (size_t)(after - reason)) == 0;
+      snprintf(error, error_size, "%s", names_copy ? after + 2 : reason);
     }
   } else {
     snprintf(error, error_size, "cannot write a temporary copy of the firmware library: %s", strerror(errno));

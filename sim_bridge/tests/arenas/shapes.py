@@ -11,7 +11,7 @@ import shapely
 from hypothesis import strategies as st
 
 from boebot.arenas.arena import Floats
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import square
 
 INDEXES = (lib.ARENA_INDEX_NONE, lib.ARENA_INDEX_GRID, lib.ARENA_INDEX_LISTS)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from boebot.arenas import Arena, ArenaDescription, Moving, Polygon, Waypoint, arena_names, load_arena
 from boebot.errors import ArenaError
-from sim_bridge._core import lib
+from sim_bridge.compiled import lib
 from sim_bridge.tests.simulated import arena_of, distance_to_segments, square
 
 coordinates = st.floats(-5, 5).map(lambda v: round(v, 6))

@@ -28,7 +28,7 @@ from boebot.arenas import (
 from boebot.arenas.floor_plan import floor_plan, poses_of
 from boebot.errors import ArenaError
 from boebot.view import arena_picture
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from tools import arena_pages
 
 ROOT = next(folder for folder in Path(__file__).resolve().parents if (folder / "docs" / "reference").is_dir())

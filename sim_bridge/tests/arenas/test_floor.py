@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely import LineString, Point
 
 from boebot.arenas import Arena, ArenaDescription
-from boebot.arenas._arena import lib
+from boebot.arenas.compiled import lib
 from boebot.arenas.description import Line
 
 COORDINATE = st.floats(-2, 2, allow_nan=False).map(lambda value: round(value, 3))

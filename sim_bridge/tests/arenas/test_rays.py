@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.arenas.shapes import INDEXES, Shapes, angles, coordinates, ring_of, scenes
 from sim_bridge.tests.simulated import square
 

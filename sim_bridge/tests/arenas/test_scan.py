@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.arenas.arena import Floats
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.arenas.shapes import Shapes, angles, coordinates, ring_of, scenes
 from sim_bridge.tests.simulated import square
 

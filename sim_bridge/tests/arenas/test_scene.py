@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.arenas import Arena
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of, square
 
 Hit = tuple[float, Any]

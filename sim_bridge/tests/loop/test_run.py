@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 from boebot.boards import BoardRequest
 from boebot.description.robots import load_robot
 from boebot.errors import ArenaError, BoardError
-from sim_bridge import _core
-from sim_bridge._core import ffi
 from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.sessions.session import SimTransport
 from sim_bridge.sessions.world import NATIVE, open_on
 from sim_bridge.sim import Sim
@@ -329,7 +328,7 @@ def test_crash_of_a_board_is_told() -> None:
 def test_board_of_another_version_is_refused() -> None:
     destroy = ffi.callback("void(board *)", lambda _: None)
     operations = ffi.new("board_operations *", {"version": 99, "destroy": destroy})
-    old = EmulatedBoard(_core, ffi.new("board *", {"op": operations}), "old board")
+    old = EmulatedBoard((ffi, lib), ffi.new("board *", {"op": operations}), "old board")
     with pytest.raises(BoardError, match="old board cannot be joined to the simulation: it was built for another"):
         Sim(arena_of()).add(old, load_robot("shieldbot"))
     old.close()

@@ -18,8 +18,8 @@ from boebot.devices.battery import BatteryDivider
 from boebot.devices.infrared import InfraredPair
 from boebot.devices.servo import ContinuousServo
 from boebot.errors import BoardError
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices import battery as battery_model
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from boebot.devices.device import pin_name
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots.wiring import add_part
 from sim_bridge.sim import Sim

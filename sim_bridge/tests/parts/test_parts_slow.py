@@ -11,8 +11,8 @@ import pytest
 from boebot.arenas import Arena
 from boebot.devices.analog_infrared import SharpSensor
 from boebot.devices.light import LightSensor
-from sim_bridge._core import ffi, lib
 from sim_bridge.boards.board import CLOCK_HZ
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices import analog_infrared as analog_infrared_model
 from sim_bridge.devices import encoder as encoder_model
 from sim_bridge.devices import light as light_model

@@ -10,10 +10,10 @@ import pytest
 
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, RobotError
-from sim_bridge._core import lib
 from sim_bridge.boards.avr import create
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
+from sim_bridge.compiled import lib
 from sim_bridge.devices import battery as battery_model
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim, SimRobot

@@ -16,7 +16,7 @@ from boebot.devices.turret import PositionServo
 from boebot.errors import RobotError
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
-from sim_bridge._core import ffi
+from sim_bridge.compiled import ffi
 from sim_bridge.devices import analog_infrared as analog_infrared_model
 from sim_bridge.devices import compass as compass_model
 from sim_bridge.devices import light as light_model

@@ -28,7 +28,7 @@ from boebot.errors import BoebotError, RobotError
 from boebot.imperfections import Imperfection, checked, imperfections
 from boebot.result import RunResult, read_run
 from boebot.running.again import again, recorded
-from sim_bridge._core import lib
+from sim_bridge.compiled import lib
 from sim_bridge.devices.battery import battery_parameters
 from sim_bridge.devices.catalogue import At, part_of
 from sim_bridge.robots.imperfections import Draw, applied, body_parameters

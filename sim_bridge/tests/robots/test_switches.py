@@ -34,7 +34,7 @@ from boebot.errors import BoardError, BoebotError
 from boebot.imperfections import imperfections, switched_off, switches
 from boebot.result import RunResult
 from boebot.robot import Robot
-from sim_bridge._core import lib
+from sim_bridge.compiled import lib
 from sim_bridge.devices import analog_infrared as analog_infrared_model
 from sim_bridge.devices import battery as battery_model
 from sim_bridge.devices import compass as compass_model

@@ -28,8 +28,8 @@ from boebot.arenas import (
 from boebot.arenas.floor_plan import poses_of
 from boebot.errors import ArenaError, BoebotError, BrainError, RobotError
 from boebot_course.rays import ray_segment
-from sim_bridge._core import ffi, lib
 from sim_bridge.batch import WANDER, Batch, CompiledBrain
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim
 

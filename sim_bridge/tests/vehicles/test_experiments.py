@@ -19,8 +19,8 @@ import pytest
 from boebot.arenas import load_arena
 from boebot_course.rays import ray_segment
 from boebot_course.recorder import Recorder
-from sim_bridge._core import ffi, lib
 from sim_bridge.batch import WANDER, Batch
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.vehicle import ARSIM_BODY, STAGES, Vehicle, VehicleModel, arsim, beam
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from boebot.arenas import load_arena
-from sim_bridge._core import ffi
 from sim_bridge.batch import WANDER, Batch
+from sim_bridge.compiled import ffi
 from sim_bridge.vehicle import Vehicle, VehicleModel, arsim, beam
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from boebot.arenas import Arena
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of
 
 Points = Sequence[tuple[float, float]]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from boebot.devices.motor import DcMotor
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.motor import dc_parameters
 from sim_bridge.tests.world.bodies import ARSIM, BOE_BOT, Body, World, constant
 

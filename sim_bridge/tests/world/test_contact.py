@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots.imperfections import AS_BUILT
 from sim_bridge.tests.simulated import arena_of, square

@@ -18,7 +18,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from boebot.arenas import Arena, ArenaDescription, Moving, Waypoint, load_arena
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.tests.world.bodies import ARSIM, CHASSIS, RADIUS, Body, Points, World
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.tests.world.bodies import BOE_BOT, CHASSIS, RADIUS, Body, World, constant
 

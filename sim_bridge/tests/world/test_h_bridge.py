@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 
 OHM, HENRY, GEAR = 7.5, 2e-3, 48.0
 CONSTANT = (6.0 - OHM * 0.16) / (48 * 250 * 2 * math.pi / 60)  # of a TT motor: 6 V, 0.16 A, 250 rpm

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from boebot.description.robots import load_robot
 from boebot.devices.motor import DcMotor
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.devices.motor import dc_parameters
 from sim_bridge.robots import imperfections

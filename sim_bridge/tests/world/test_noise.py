@@ -15,7 +15,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 
 WIDE = np.finfo(np.longdouble).nmant >= 63
 needs_truth = pytest.mark.skipif(not WIDE, reason="this computer's long double is no longer than its double")

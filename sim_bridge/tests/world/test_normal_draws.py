@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-from sim_bridge._core import lib
+from sim_bridge.compiled import lib
 
 Words = NDArray[np.uint64]
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sim_bridge._core import lib
+from sim_bridge.compiled import lib
 from sim_bridge.tests.simulated import arena_of, square
 from sim_bridge.tests.world.bodies import ARSIM, BOE_BOT, Body, constant
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from boebot.description.robots import load_robot
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.world.bodies import BOE_BOT, Body

@@ -38,7 +38,7 @@ def placed(worlds: int, threads: int, edges: int, laser: str | None) -> Batch:
 def wander() -> CompiledBrain:
     """The compiled brain, for whatever the first two readings of the scene's robots are."""
     from sim_bridge import batch
-    from sim_bridge._core import ffi, lib
+    from sim_bridge.compiled import ffi, lib
 
     size = ffi.sizeof("vehicle_wander_state")
     return batch.CompiledBrain(ffi.addressof(lib, "vehicle_wander"), readings=(), state_bytes=size, name="wander")

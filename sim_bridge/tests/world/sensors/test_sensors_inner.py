@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_bridge._core import ffi, lib
+from sim_bridge.compiled import ffi, lib
 from sim_bridge.tests.simulated import arena_of
 from sim_bridge.tests.world.sensors.test_sensors import OUTLINE, View, made, source
 
