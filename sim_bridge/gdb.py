@@ -67,7 +67,7 @@ class Gdb:
         """In the midst of the board's run: an error ends that, and is raised by who lets the board run."""
         if self._is_closed:
             return 0
-        begun = time.monotonic()
+        begun = time.perf_counter()
         try:
             if why == self._board.lib.AVR_LOOKS:
                 self._look()
@@ -81,7 +81,7 @@ class Gdb:
             self.close()
             return 1
         finally:
-            self._board.stood_still_s += time.monotonic() - begun
+            self._board.stood_still_s += time.perf_counter() - begun
         return 0
 
     def _look(self) -> None:

@@ -57,7 +57,7 @@ class BootTime:
 
     def reset(self) -> None:
         """Somebody has reset the board, and may want to write a program."""
-        self._quiet_from, self._until_s = self._session.sim.cycle, time.monotonic() + self.FIRST_S
+        self._quiet_from, self._until_s = self._session.sim.cycle, time.perf_counter() + self.FIRST_S
 
     def went(self) -> None:
         """There is no client any more."""
@@ -67,11 +67,11 @@ class BootTime:
         """Bytes have gone from the client, or an answer of the board's."""
         self._quiet_from = self._session.sim.cycle
         if answer and self._until_s:
-            self._until_s = max(self._until_s, time.monotonic() + self.NEXT_S)
+            self._until_s = max(self._until_s, time.perf_counter() + self.NEXT_S)
 
     def is_loading(self) -> bool:
         """A client may be talking to the boot loader."""
-        return time.monotonic() < self._until_s and self._counter[0] >= BOOT_BEGIN
+        return time.perf_counter() < self._until_s and self._counter[0] >= BOOT_BEGIN
 
     def stands_still(self) -> bool:
         """Whether it does while that is so."""
@@ -193,14 +193,14 @@ def carry(
     while running():
         is_asked, sent = server.turn()
         if is_asked:
-            brisk_until = time.monotonic() + BRISK_FOR_S
+            brisk_until = time.perf_counter() + BRISK_FOR_S
         if look is not None:
             said += sent
-            if time.monotonic() >= look_at:
-                look_at = time.monotonic() + LOOK_S
+            if time.perf_counter() >= look_at:
+                look_at = time.perf_counter() + LOOK_S
                 look(session, bytes(said))
                 said.clear()
-        port.wait(BRISK_S if time.monotonic() < brisk_until else IDLE_S)
+        port.wait(BRISK_S if time.perf_counter() < brisk_until else IDLE_S)
 
 
 def serve(

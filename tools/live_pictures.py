@@ -94,9 +94,9 @@ def opened(browser: Browser, url: str, width: int, height: int, **options: Any) 
 
 def until(page: Page, expression: str) -> None:
     """Waits until it is true on the page."""
-    end = time.monotonic() + LONGEST_S
+    end = time.perf_counter() + LONGEST_S
     while not page.evaluate(expression):
-        if time.monotonic() > end:
+        if time.perf_counter() > end:
             raise SystemExit(f"live_pictures.py: {expression} is not so on the page after {LONGEST_S:g} s")
         page.wait_for_timeout(20)
 
@@ -115,7 +115,7 @@ class Film:
 
     def take(self) -> None:
         """One picture."""
-        self.times.append(time.monotonic())
+        self.times.append(time.perf_counter())
         self.pictures.append(Image.open(io.BytesIO(self.page.screenshot())).convert("RGB"))
 
     def until(self, seconds: float) -> None:
@@ -125,8 +125,8 @@ class Film:
 
     def glide(self, begin: Place, end: Callable[[], Place], seconds: float) -> None:
         """The pointer goes there as a hand would, slowly at first and at last."""
-        begun = time.monotonic()
-        while (part := min(1.0, (time.monotonic() - begun) / seconds)) < 1.0:
+        begun = time.perf_counter()
+        while (part := min(1.0, (time.perf_counter() - begun) / seconds)) < 1.0:
             eased = part * part * (3 - 2 * part)
             self.page.mouse.move(*(a + eased * (b - a) for a, b in zip(begin, end(), strict=True)))
             self.take()

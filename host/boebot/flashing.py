@@ -113,9 +113,9 @@ def _listen(
     for a pipe for a while only."""
     parts: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(os.dup(stream.fileno()), parts.put), daemon=True).start()
-    said, begun = b"", time.monotonic()
+    said, begun = b"", time.perf_counter()
     heard, marks = begun, 0
-    while (now := time.monotonic()) < min(begun + limit_s, heard + silence_s):
+    while (now := time.perf_counter()) < min(begun + limit_s, heard + silence_s):
         try:
             data = parts.get(timeout=min(1.0, heard + silence_s - now))
         except queue.Empty:

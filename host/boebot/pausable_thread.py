@@ -99,10 +99,10 @@ class PausableThread:
         was_running, self._running = self._running, True
         if not was_running:
             self._go.put(None)
-        until = asked = time.monotonic()
+        until = asked = time.perf_counter()
         until += within_s
         asked += 0.0 if was_running else _ASK_S  # one that paused is given time to clear up
-        while not self.is_done and (now := time.monotonic()) < until:
+        while not self.is_done and (now := time.perf_counter()) < until:
             if now >= asked:
                 asked = now + _ASK_S
                 throw(self._thread.ident, EndedError)

@@ -72,7 +72,7 @@ class _Fields(NamedTuple):
     board_time: float = 0.0
     """Seconds since the board was reset, by its clock: the start of the tick."""
     host_time: float = 0.0
-    """The same instant on the host's clock, `time.monotonic()` (s; for a simulated board its own simulated clock)."""
+    """The same instant on the host's clock, `time.perf_counter()` (s; of a simulated board its simulated clock)."""
     host_time_error: float = float("inf")
     """Error bound of `host_time` (s): the true instant lies within it, whatever the line's delays are, as long as the
     board's clock keeps its rate."""

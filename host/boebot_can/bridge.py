@@ -58,8 +58,8 @@ class Bridge:
         Raises:
             BoardError: there is one, or the bus has gone.
         """
-        end_s = time.monotonic() + _LISTEN_S
-        while (left_s := end_s - time.monotonic()) > 0:
+        end_s = time.perf_counter() + _LISTEN_S
+        while (left_s := end_s - time.perf_counter()) > 0:
             for frame in self.bus.receive(left_s):
                 self._take(frame)
 

@@ -139,12 +139,12 @@ class PythonCanBus:
         # python-can's client of socketcand takes the end of the connection for silence
         self._socket: socket.socket | None = getattr(self._bus, "_SocketCanDaemonBus__socket", None)
         self._closed = False
-        self._emptied_s = time.monotonic()
+        self._emptied_s = time.perf_counter()
 
     @property
     def is_behind(self) -> bool:
         """See `Bus`."""
-        return time.monotonic() > self._emptied_s + BEHIND_S
+        return time.perf_counter() > self._emptied_s + BEHIND_S
 
     def send(self, frames: Iterable[CanFrame], stamp_s: float) -> None:
         """See `Bus`."""
@@ -168,7 +168,7 @@ class PythonCanBus:
             for _ in range(_AT_ONCE):
                 message = self._bus.recv(wait_s)
                 if message is None:
-                    self._emptied_s = time.monotonic()
+                    self._emptied_s = time.perf_counter()
                     break
                 wait_s = 0.0
                 frame = self._frame(message)
@@ -223,11 +223,11 @@ def _has_ended(connection: socket.socket) -> bool:
 def _take_leave(connection: socket.socket) -> None:
     """Says that no more will come, and reads until the other side closes, too: a connection that is closed with unread
     frames is reset, and the last ones sent may be lost."""
-    until_s = time.monotonic() + _LEAVE_S
+    until_s = time.perf_counter() + _LEAVE_S
     with contextlib.suppress(OSError, ValueError):  # it may have gone
         connection.shutdown(socket.SHUT_WR)
         connection.settimeout(_LEAVE_S)
-        while connection.recv(_READ_BYTES) and time.monotonic() < until_s:
+        while connection.recv(_READ_BYTES) and time.perf_counter() < until_s:
             pass
 
 

@@ -102,7 +102,7 @@ class SocketcandBus:
 
     def receive(self, wait_s: float) -> list[CanFrame]:
         """The frames of clients; those with identifiers of 29 bits go to the other clients alone."""
-        now = time.monotonic()
+        now = time.perf_counter()
         for key, events in self._selector.select(wait_s):
             if key.fileobj is self._listener:
                 self._accept()
@@ -148,7 +148,7 @@ class SocketcandBus:
         client.received += data
         *lines, rest = bytes(client.received).split(b">")
         client.received = bytearray(rest)
-        client.paid_until_s = max(client.paid_until_s, time.monotonic()) + len(lines) / _FRAMES_HZ
+        client.paid_until_s = max(client.paid_until_s, time.perf_counter()) + len(lines) / _FRAMES_HZ
         for line in lines:
             self._obey(client, line.partition(b"<")[2].strip())
         if len(rest) > _LINE_BYTES:

@@ -81,8 +81,8 @@ class CanTransport:
         self._send(self._end.fresh(frames) if self._bus.is_behind else frames)
 
     def now(self) -> float:
-        """The monotonic clock (s)."""
-        return time.monotonic()
+        """The finest clock that never goes back (s), `time.perf_counter()`."""
+        return time.perf_counter()
 
     def close(self) -> None:
         """Leaves the bus."""

@@ -759,7 +759,7 @@ class Pty:
 
     def __init__(self, peer: Peer) -> None:
         self.peer = peer
-        peer.now = time.monotonic
+        peer.now = time.perf_counter
         peer.reset()
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
@@ -777,13 +777,13 @@ class Pty:
             os.close(self._slave)
 
     def _serve(self) -> None:
-        next_tick = time.monotonic()
+        next_tick = time.perf_counter()
         while self._running:
-            wait = next_tick - time.monotonic()
+            wait = next_tick - time.perf_counter()
             if wait > 0 and select.select([self._master], [], [], wait)[0]:
                 self.peer.receive(os.read(self._master, 4096))
                 self._write()
-            if time.monotonic() >= next_tick:
+            if time.perf_counter() >= next_tick:
                 self.peer.tick()
                 self._write()
                 next_tick += TICK_S

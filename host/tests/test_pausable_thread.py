@@ -152,7 +152,7 @@ def test_one_that_does_not_end_is_left_to_itself_in_time() -> None:
 
     thread = PausableThread(work, "test")
     thread.resume()
-    begun = time.monotonic()
+    begun = time.perf_counter()
     thread.end(within_s=0.2)
-    assert 0.15 < time.monotonic() - begun < 60 and not thread.is_done
+    assert 0.15 < time.perf_counter() - begun < 60 and not thread.is_done
     release.set()

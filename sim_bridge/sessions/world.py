@@ -40,7 +40,7 @@ class Pace:
         self._start = self._now() - sim.cycle / CLOCK_HZ
 
     def _now(self) -> float:
-        return time.monotonic() - self._sim.stood_still_s
+        return time.perf_counter() - self._sim.stood_still_s
 
     def due(self) -> int:
         """Cycles that the wall clock is ahead of the simulation."""

@@ -29,8 +29,8 @@ def tcp() -> Iterator[tuple[TcpPort, socket.socket]]:
 
 def heard(port: Port, count: int) -> list[str]:
     """What has happened, as soon as it is that much."""
-    found, end = [visit.what for visit in port.look()], time.monotonic() + 5
-    while len(found) < count and time.monotonic() < end:
+    found, end = [visit.what for visit in port.look()], time.perf_counter() + 5
+    while len(found) < count and time.perf_counter() < end:
         port.wait(0.01)
         found += [visit.what for visit in port.look()]
     return found

@@ -153,14 +153,14 @@ def ended(command: str, tree: Path, seconds: float) -> tuple[int | None, str]:
 
 def tested(room: Room, tree: Path, module: str, limit: float) -> tuple[str, str]:
     """Builds and tests a room. Returns the result, and the command that repeats what failed."""
-    end = time.monotonic() + limit
+    end = time.perf_counter() + limit
     named = re.compile(rf"\b{re.escape(module)}\b")
     files = sorted({path for pattern in room.tests.split() for path in tree.glob(pattern)})
     files.sort(key=lambda path: -len(named.findall(path.read_text(encoding="utf-8"))))
     tests = " ".join(path.relative_to(tree).as_posix() for path in files)
     stages = [(UNITS, "a unit test")] if room.units else []
     for command, what in [*stages, ("make setup", "the build"), (f"{PYTEST} {tests}", "a test")]:
-        code, output = ended(command, tree, end - time.monotonic())
+        code, output = ended(command, tree, end - time.perf_counter())
         if code is None:
             return f"no end of {what} within {limit:.0f} s", ""
         if code and (failed := FAILED.search(output)):
@@ -181,9 +181,9 @@ def run(when: str, tree: Path, rooms: list[str], only: list[str], limit: float, 
         waiting = [one for one in mutants if one["id"] in only]
     else:
         waiting = [one for one in mutants if one["results"].get(when, "moved") == "moved"]
-    begin = time.monotonic()
+    begin = time.perf_counter()
     for number, mutant in enumerate(waiting):
-        start = time.monotonic()
+        start = time.perf_counter()
         if found := place(mutant, tree):
             path, text = found
             original = path.read_text(encoding="utf-8")
@@ -192,7 +192,7 @@ def run(when: str, tree: Path, rooms: list[str], only: list[str], limit: float, 
                 result, again = tested(ROOMS[mutant["room"]], tree, path.stem, limit)
             finally:
                 path.write_text(original, encoding="utf-8")
-            seconds = round(time.monotonic() - start)
+            seconds = round(time.perf_counter() - start)
             if again and ended(f"make setup && {again}", tree, limit)[0]:
                 sys.exit(f"{mutant['id']}: {result}; without the mutant, too; expected that it passes")
         else:
@@ -200,7 +200,7 @@ def run(when: str, tree: Path, rooms: list[str], only: list[str], limit: float, 
         with kept() as content:
             one = next(one for one in content["mutants"] if one["id"] == mutant["id"])
             one["results"][when], one["seconds"][when], one["commits"][when] = result, seconds, commit
-        left = (time.monotonic() - begin) / (number + 1) * (len(waiting) - number - 1)
+        left = (time.perf_counter() - begin) / (number + 1) * (len(waiting) - number - 1)
         print(f"{number + 1}/{len(waiting)}, {left / 60:.0f} min left: {mutant['id']} {result}", flush=True)
 
 

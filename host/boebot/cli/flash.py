@@ -117,9 +117,9 @@ def _shake_hands(port: str, robot: RobotDescription, program: Program) -> None:
 
 
 def _show_first_line(port: str, baud: int) -> None:
-    said, end = b"", time.monotonic() + FIRST_LINE_S
+    said, end = b"", time.perf_counter() + FIRST_LINE_S
     with contextlib.closing(open_port(port, baud)) as line:
-        while b"\n" not in said.lstrip() and time.monotonic() < end:
+        while b"\n" not in said.lstrip() and time.perf_counter() < end:
             said += line.read(0.1)
     first = said.strip().partition(b"\n")[0].strip()
     words = first.decode("utf-8", "replace")[:200]

@@ -36,7 +36,7 @@ _TELEMETRY_S = 1.0  # how long to wait for the first telemetry
 def _link(on: str, robot: str, *, changes: bool = False) -> Iterator[Link]:
     """A session with the board, for as long as the block lasts. Nothing moves. Where parameters are to be changed, a
     reset by the opening is reported: it forgets those that were set before and not saved."""
-    begun_s = time.monotonic()
+    begun_s = time.perf_counter()
     with board_link(on, BoardRequest(robot=load_robot(robot), record=False)) as (link, _):
         if changes and is_live(on) and _was_reset_since(link, begun_s):
             output.say(
@@ -47,7 +47,7 @@ def _link(on: str, robot: str, *, changes: bool = False) -> Iterator[Link]:
 
 
 def _was_reset_since(link: Link, begun_s: float) -> bool:
-    """Whether a live board's ticks began after that instant of the monotonic clock; False if it sends none."""
+    """Whether a live board's ticks began after that instant of `time.perf_counter()`; False if it sends none."""
     end_s = link.transport.now() + _TELEMETRY_S
     while link.telemetry.latest is None and link.transport.now() < end_s:
         link.poll(_TELEMETRY_S / 20)

@@ -51,14 +51,14 @@ class Keyboard:
                 raise KeyboardInterrupt
             if key in _MOVES:
                 self._move = _MOVES[key]
-                self._until = time.monotonic() + HOLD_S
+                self._until = time.perf_counter() + HOLD_S
                 robot.arm()
             elif key == " ":
                 self._until = 0.0
                 robot.emergency_stop()
             elif key in "123456789":
                 self._speed = int(key) / 9
-        if time.monotonic() < self._until:
+        if time.perf_counter() < self._until:
             left, right = self._move
             robot.drive(left * self._speed, right * self._speed)
         else:

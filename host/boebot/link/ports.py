@@ -78,9 +78,9 @@ class _Port:
     def read(self, wait_s: float, quiet_s: float = 0.0) -> bytes:
         """What arrived, as soon as there is something, at the latest after `wait_s`."""
         del quiet_s  # bytes wait in the operating system's buffer anyway
-        until = time.monotonic() + wait_s
+        until = time.perf_counter() + wait_s
         try:
-            while not (data := self._receive(until - time.monotonic())) and time.monotonic() < until:
+            while not (data := self._receive(until - time.perf_counter())) and time.perf_counter() < until:
                 pass
         except _FAILURES:
             raise self._gone() from None
@@ -89,18 +89,18 @@ class _Port:
     def write(self, data: bytes) -> None:
         """Sends bytes; gives up when the other side takes none for a second. Not so where that second was much longer:
         then this program stood still, as when a computer sleeps, and a loss of bytes shows in the frames."""
-        begun = time.monotonic()
+        begun = time.perf_counter()
         try:
             self._send(data)
         except (serial.SerialTimeoutException, TimeoutError):
-            if time.monotonic() - begun <= _WRITE_S + _STILL_S:
+            if time.perf_counter() - begun <= _WRITE_S + _STILL_S:
                 raise BoardError(f"{self.name} takes no bytes: its other side does not read") from None
         except _FAILURES:
             raise self._gone() from None
 
     def now(self) -> float:
-        """The monotonic clock (s)."""
-        return time.monotonic()
+        """The finest clock that never goes back (s), `time.perf_counter()`."""
+        return time.perf_counter()
 
     def close(self) -> None:
         """Closes the port."""

@@ -152,8 +152,8 @@ class Audience:
 
     def close(self) -> None:
         """Nothing is shown any more; what pages wait for still gets to them."""
-        deadline = time.monotonic() + BYE_S
-        while time.monotonic() < deadline and any(page.is_waiting for page in list(self._pages.values())):
+        deadline = time.perf_counter() + BYE_S
+        while time.perf_counter() < deadline and any(page.is_waiting for page in list(self._pages.values())):
             time.sleep(0.01)
         self._server.close()
 

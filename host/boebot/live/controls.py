@@ -124,7 +124,7 @@ class Controls:
             speed = self.pace.speed
             if speed is None or speed > REAL_TIME:
                 self.pace.set_speed(REAL_TIME)
-        self._wheels[robot] = Wheel(page, hand, time.monotonic())
+        self._wheels[robot] = Wheel(page, hand, time.perf_counter())
 
     # ---- to the run ------------------------------------------------------------------------------------------------
 
@@ -136,7 +136,7 @@ class Controls:
             wheel = self._wheels[robot]
             if wheel is None:
                 return deeds
-            is_silent = time.monotonic() - wheel.heard_s > SILENT_S
+            is_silent = time.perf_counter() - wheel.heard_s > SILENT_S
             is_gone = wheel.page not in self._pages()
             hand = Hand(0.0, 0.0) if is_silent or is_gone else wheel.hand
             return deeds if hand == held else [*deeds, hand]

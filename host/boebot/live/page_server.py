@@ -174,9 +174,9 @@ class PageServer:
             return
 
     async def _receive(self, connection: ServerConnection, page: Outbox) -> None:
-        allowed, since = float(MESSAGES_AT_ONCE), time.monotonic()
+        allowed, since = float(MESSAGES_AT_ONCE), time.perf_counter()
         async for data in connection:
-            now = time.monotonic()
+            now = time.perf_counter()
             allowed = min(float(MESSAGES_AT_ONCE), allowed + (now - since) * MESSAGES_PER_S) - 1.0
             since = now
             why = f"more than {MESSAGES_PER_S} messages in a second" if allowed < 0 else "expected a text"

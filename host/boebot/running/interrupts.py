@@ -38,10 +38,10 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     """
     global first, _first_s
     if first is None:
-        first, _first_s = number, time.monotonic()
+        first, _first_s = number, time.perf_counter()
         if not _held:
             raise KeyboardInterrupt
-    elif time.monotonic() - _first_s >= AGAIN_S:
+    elif time.perf_counter() - _first_s >= AGAIN_S:
         os.write(2, _SENTENCE)
         os._exit(exit_code())
 

@@ -242,7 +242,7 @@ class _PlatformIO:
         mapped = [f"{one}={users}" for one, users in (folders or {}).items() if one not in (Path(), users)]
         own = {"LC_ALL": "C", "BOEBOT_FOLDERS": json.dumps(mapped)}
         environment = {f"PLATFORMIO_{name}": str(value) for name, value in settings.items()} | own
-        log, begin_s = self.work / "build.log", time.monotonic()
+        log, begin_s = self.work / "build.log", time.perf_counter()
         heard_s, size = begin_s, 0
         with (
             log.open("wb") as words,
@@ -260,7 +260,7 @@ class _PlatformIO:
         ):
             while process.poll() is None:
                 time.sleep(0.02)
-                now_s = time.monotonic()
+                now_s = time.perf_counter()
                 if size != (size := log.stat().st_size):
                     heard_s = now_s
                 if now_s - heard_s > SILENCE_S:

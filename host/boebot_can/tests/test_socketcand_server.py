@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.wall_clock, pytest.mark.unsanitized]
 @pytest.fixture
 def bus() -> Iterator[SocketcandBus]:
     """It works whenever the test calls `receive`."""
-    made = SocketcandBus(0, time.monotonic)
+    made = SocketcandBus(0, time.perf_counter)
     yield made
     made.close()
 
@@ -152,11 +152,11 @@ def test_client_that_fetches_nothing_loses_frames_and_they_are_counted(bus: Sock
     with contextlib.closing(joined(bus)) as slow:
         sent = 0
         frame = CanFrame(0x321, bytes(8))
-        began = time.monotonic()
+        began = time.perf_counter()
         while bus.dropped < 1000:
             bus.send([frame] * 1000, 1.0)
             sent += 1000
-        assert time.monotonic() - began < 10, "it held nobody up"
+        assert time.perf_counter() - began < 10, "it held nobody up"
         received = b""
         with working(bus):
             while data := told(slow):
@@ -176,15 +176,15 @@ def test_client_that_leaves_with_a_full_queue_harms_nobody(bus: SocketcandBus) -
 def test_flood_delays_itself_and_nobody_else(bus: SocketcandBus) -> None:
     with contextlib.closing(joined(bus)) as flooding, contextlib.closing(joined(bus)) as quiet:
         flooding.sendall(b"< send 123 8 1 2 3 4 5 6 7 8 >" * 2000)
-        began, taken = time.monotonic(), 0
-        while time.monotonic() < began + 0.1:
+        began, taken = time.perf_counter(), 0
+        while time.perf_counter() < began + 0.1:
             taken += len(bus.receive(0.0))
-        assert 0 < taken < 500 + 5000 * (time.monotonic() - began), "no more than 5,000 a second for long"
+        assert 0 < taken < 500 + 5000 * (time.perf_counter() - began), "no more than 5,000 a second for long"
         quiet.sendall(b"< send 7 0 >")
         while CanFrame(7, b"") not in (now := bus.receive(0.0)):
             taken += len(now)
             assert taken < 2000, "before the flood has passed"
-        while taken + len(now) - 1 < 2000 and time.monotonic() < began + 30.0:
+        while taken + len(now) - 1 < 2000 and time.perf_counter() < began + 30.0:
             now += bus.receive(0.001)
         assert taken + len(now) - 1 == 2000, "none is lost"
 
@@ -204,5 +204,5 @@ def test_as_many_clients_as_it_takes_and_no_more(bus: SocketcandBus) -> None:
 
 def test_port_that_is_taken_is_one_sentence(bus: SocketcandBus) -> None:
     with pytest.raises(BoardError) as refused:
-        SocketcandBus(bus.port, time.monotonic)
+        SocketcandBus(bus.port, time.perf_counter)
     assert str(refused.value) == f"a CAN bus cannot be served on TCP port {bus.port}: address already in use"

@@ -49,9 +49,9 @@ _FOCUS = """() => { const it = document.activeElement, style = getComputedStyle(
 
 def wait_for(page: Page, expression: str, seconds: float = 30.0) -> None:
     """Until it is true on the page. (Playwright's own way evaluates texts on the page, which its policy forbids.)"""
-    end = time.monotonic() + seconds
+    end = time.perf_counter() + seconds
     while not page.evaluate(expression):
-        assert time.monotonic() < end, f"{expression} is not so after {seconds} s"
+        assert time.perf_counter() < end, f"{expression} is not so after {seconds} s"
         page.wait_for_timeout(20)
 
 
@@ -65,9 +65,9 @@ def overflow(page: Page) -> tuple[int, int]:
 
 def faint_texts(page: Page) -> list[Any]:
     """Texts with too little contrast, each with it, once the page has been drawn with its present colours."""
-    end = time.monotonic() + DRAWN_S
+    end = time.perf_counter() + DRAWN_S
     while found := page.evaluate(_FAINT_TEXTS, CONTRAST):
-        if time.monotonic() > end:
+        if time.perf_counter() > end:
             break
         page.wait_for_timeout(50)
     return list(found)

@@ -322,8 +322,8 @@ def test_interrupt_stops_the_motors_and_keeps_the_record(number: signal.Signals,
             text=True,
             preexec_fn=heed_signals,
         )
-        until = time.monotonic() + 20
-        while served.peer.command == (0.0, 0.0) and time.monotonic() < until:
+        until = time.perf_counter() + 20
+        while served.peer.command == (0.0, 0.0) and time.perf_counter() < until:
             time.sleep(0.02)
         time.sleep(0.3)
         process.send_signal(number)
@@ -733,7 +733,7 @@ def test_keys_are_distinguished() -> None:
 
 def test_keyboard_drives_while_keys_are_held(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
-    monkeypatch.setattr("boebot.cli.teleop.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("boebot.cli.teleop.time.perf_counter", lambda: clock[0])
     typed = iter(["w", "", "9w", "d", " ", "w", "", "q"])
     shown: list[str] = []
     commands: list[tuple[float, float]] = []
@@ -770,8 +770,8 @@ def teleop_at(served: Pty, *arguments: str) -> Iterator[tuple[int, subprocess.Po
             text=True,
             preexec_fn=heed_signals,
         )
-        until = time.monotonic() + 20
-        while served.peer.command != (0.5, 0.5) and time.monotonic() < until:
+        until = time.perf_counter() + 20
+        while served.peer.command != (0.5, 0.5) and time.perf_counter() < until:
             os.write(keyboard, b"\x1b[A")
             time.sleep(0.05)
         assert served.peer.command == (0.5, 0.5)

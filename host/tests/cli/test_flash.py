@@ -104,10 +104,10 @@ def spoilt(deed: Callable[[SimSession], None], at: int) -> str:
 
         thread = threading.Thread(target=watch)
         thread.start()
-        begun = time.monotonic()
+        begun = time.perf_counter()
         with pytest.raises(BoardError) as caught:
             flashed(port, LARGE)
-        assert time.monotonic() - begun < 30
+        assert time.perf_counter() - begun < 30
         thread.join()
         flashed(port)
     return str(caught.value)
@@ -132,12 +132,12 @@ def test_the_cable_is_pulled_out(mark: int) -> None:
         if not mark:
             server.send_signal(signal.SIGSTOP)
             threading.Timer(1.0, server.kill).start()
-        begun = time.monotonic()
+        begun = time.perf_counter()
         with pytest.raises(BoardError, match=rf"^the board at {port} (does not|stopped)"):
             flashing.write(
                 LARGE, port, lambda share: server.kill() if share >= mark > 0 else None, silence_s=PATIENCE_S
             )
-        assert time.monotonic() - begun < 15
+        assert time.perf_counter() - begun < 15
     with served() as (port, _):  # plugged in again
         flashed(port)
 

@@ -47,10 +47,10 @@ def board() -> Iterator[Line]:
 @contextlib.contextmanager
 def refused(sentence: str, within_s: float = 10.0) -> Iterator[None]:
     """The block fails with a BoardError of one such sentence, in time."""
-    begun = time.monotonic()
+    begun = time.perf_counter()
     with pytest.raises(BoardError, match=sentence) as caught:
         yield
-    assert time.monotonic() - begun < within_s
+    assert time.perf_counter() - begun < within_s
     assert "\n" not in str(caught.value) and ". " not in str(caught.value), "one sentence"
 
 
@@ -147,12 +147,12 @@ def test_wait_ends_with_the_first_bytes_or_when_it_is_over(board: Line) -> None:
     """And a stamp is of the reading, as a link sees it: after the arrival of all that it holds."""
     transport = ports.open_serial(board.path, 500_000)
     received = link_line.Line(transport)
-    begun = time.monotonic()
+    begun = time.perf_counter()
     threading.Timer(0.05, board.send, [b"now"]).start()
     [(stamp, data)] = received.read(5.0)
-    assert data == b"now" and begun + 0.05 < stamp < begun + 4.5 and stamp <= time.monotonic()
-    begun = time.monotonic()
-    assert received.read(0.1) == [] and 0.1 <= time.monotonic() - begun < 5.0
+    assert data == b"now" and begun + 0.05 < stamp < begun + 4.5 and stamp <= time.perf_counter()
+    begun = time.perf_counter()
+    assert received.read(0.1) == [] and 0.1 <= time.perf_counter() - begun < 5.0
     transport.close()
 
 
@@ -546,8 +546,8 @@ def test_shared_port_carries_all_bytes_and_its_rate() -> None:
             assert more
             got += more
         assert got == everything
-        begun = time.monotonic()
-        assert transport.read(0.2) == b"" and time.monotonic() - begun > 0.19
+        begun = time.perf_counter()
+        assert transport.read(0.2) == b"" and time.perf_counter() - begun > 0.19
         transport.set_baud(250_000)
         assert server.serial.baudrate == transport.baud == 250_000
         with refused("at 50 baud"):

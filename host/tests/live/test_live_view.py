@@ -85,8 +85,8 @@ class Page:
 
     def until(self, kind: str, *, where: Any = lambda message: True) -> Any:
         """The next message of a kind of which that is true."""
-        deadline = time.monotonic() + LIMIT_S
-        while time.monotonic() < deadline:
+        deadline = time.perf_counter() + LIMIT_S
+        while time.perf_counter() < deadline:
             message = json.loads(self.stream.recv(timeout=LIMIT_S))
             if message["type"] == kind and where(message):
                 return message
@@ -94,8 +94,8 @@ class Page:
 
     def state(self, where: Any = lambda state: True) -> Any:
         """The next state, with a chunk or by itself, of which that is true."""
-        deadline = time.monotonic() + LIMIT_S
-        while time.monotonic() < deadline:
+        deadline = time.perf_counter() + LIMIT_S
+        while time.perf_counter() < deadline:
             message = json.loads(self.stream.recv(timeout=LIMIT_S))
             if "state" in message and where(message["state"]):
                 return message["state"]
@@ -153,9 +153,9 @@ def test_stream_is_refused_to_other_pages_and_without_token(endless: Run) -> Non
 
 def let_go(stream: ClientConnection) -> bool:
     """The server closes it."""
-    deadline = time.monotonic() + LIMIT_S
+    deadline = time.perf_counter() + LIMIT_S
     try:
-        while time.monotonic() < deadline:
+        while time.perf_counter() < deadline:
             stream.recv(timeout=LIMIT_S)
     except ConnectionClosed:
         return True

@@ -21,8 +21,8 @@ def boebot(*arguments: str) -> Done:
 
 
 def wait_for(record: Path, size: int) -> None:
-    until = time.monotonic() + 30
-    while (not record.exists() or record.stat().st_size < size) and time.monotonic() < until:
+    until = time.perf_counter() + 30
+    while (not record.exists() or record.stat().st_size < size) and time.perf_counter() < until:
         time.sleep(0.05)
 
 

@@ -73,10 +73,10 @@ def test_late_brain_skips_steps_and_says_so() -> None:
 def test_silent_port_is_given_up_in_time() -> None:
     with line() as board:
         transport = open_serial(board.path, 500_000)
-        begun = time.monotonic()
+        begun = time.perf_counter()
         with pytest.raises(BoardError, match=r"nothing answers at .* within 4 s: is the robot on and flashed"):
             Link(transport).open()
-        assert time.monotonic() - begun < 10
+        assert time.perf_counter() - begun < 10
         transport.close()
 
 

@@ -71,8 +71,8 @@ def begun(folder: Path, brain: str, *options: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "boebot", "run", "mine.py", "--step-timeout", "inf", "--seconds", "600", *options]
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, cwd=folder, stdout=pipe, stderr=pipe, text=True, preexec_fn=heed_signals)
-    until = time.monotonic() + 60
-    while not (folder / "begun").exists() and process.poll() is None and time.monotonic() < until:
+    until = time.perf_counter() + 60
+    while not (folder / "begun").exists() and process.poll() is None and time.perf_counter() < until:
         time.sleep(0.01)
     return process
 
@@ -231,8 +231,8 @@ def step(robot):
     time.sleep(600)
 """
     end(begun(tmp_path, fork), [signal.SIGKILL])
-    child, until = int((tmp_path / "child").read_text()), time.monotonic() + 10
-    while time.monotonic() < until:
+    child, until = int((tmp_path / "child").read_text()), time.perf_counter() + 10
+    while time.perf_counter() < until:
         try:
             os.kill(child, 0)
         except ProcessLookupError:

@@ -97,11 +97,11 @@ def test_transport_of_a_closed_world_says_so() -> None:
 def test_paced_transport_keeps_to_the_wall_clock() -> None:
     import time
 
-    start = time.monotonic()
+    start = time.perf_counter()
     session = open_on(NATIVE, BoardRequest(robot=load_robot("shieldbot"), arena="empty", realtime=True))
     while session.transport.now() < 0.1:
         session.transport.read(0.01)
-    assert time.monotonic() - start > session.transport.now() - 0.001
+    assert time.perf_counter() - start > session.transport.now() - 0.001
     session.close()
 
 

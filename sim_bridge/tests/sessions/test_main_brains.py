@@ -155,10 +155,10 @@ def test_waits() -> None:
 def test_error_has_its_line_and_ends_the_run(tmp_path: Path, deed: str, sentence: str) -> None:
     path = tmp_path / "mine.py"
     path.write_text(f"import time\ndef main(robot):\n    robot.wait(0.2)\n    {deed}\n")
-    begun = time.monotonic()
+    begun = time.perf_counter()
     result = execute(Request.single(path, seconds=20, step_timeout=0.3))
     assert sentence in str(result.error) and result.run_time == pytest.approx(0.2)
-    assert time.monotonic() - begun < 60
+    assert time.perf_counter() - begun < 60
 
 
 def test_the_end_of_the_run_ends_main_and_its_thread() -> None:
@@ -195,9 +195,9 @@ def test_main_that_catches_everything_does_not_keep_the_run() -> None:
             with contextlib.suppress(BaseException):
                 robot.wait(0.1)
 
-    begun = time.monotonic()
+    begun = time.perf_counter()
     assert boebot.run(main, robot="arsim", seconds=1.0).error is None
-    assert time.monotonic() - begun < 60
+    assert time.perf_counter() - begun < 60
 
 
 def test_among_others_it_ends_for_itself() -> None:
@@ -231,8 +231,8 @@ def test_in_a_batch_as_alone() -> None:
     assert batch.true_poses == pytest.approx(poses, abs=1e-3)
     del batch
     gc.collect()
-    until = time.monotonic() + 5
-    while threading.active_count() > before and time.monotonic() < until:
+    until = time.perf_counter() + 5
+    while threading.active_count() > before and time.perf_counter() < until:
         time.sleep(0.01)
     assert threading.active_count() <= before
 
