@@ -19,7 +19,6 @@ from collections.abc import Callable
 
 from boebot.boards import BoardRequest, BoardSession, Visit
 from boebot.errors import BoardError
-from boebot.image.program import BOOT_BEGIN
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.pins import RXEN0
 from sim_bridge.served_ports import Port, PtyPort, TcpPort
@@ -51,7 +50,8 @@ class BootTime:
 
     def __init__(self, session: SimSession) -> None:
         self._session = session
-        self._counter = session.robot.board.extension("program counter", "uint32_t")
+        board = session.robot.board
+        self._begin, self._counter = board.begin, board.extension("program counter", "uint32_t")
         self._quiet_from = 0
         self._until_s = 0.0
 
@@ -71,7 +71,7 @@ class BootTime:
 
     def is_loading(self) -> bool:
         """A client may be talking to the boot loader."""
-        return time.perf_counter() < self._until_s and self._counter[0] >= BOOT_BEGIN
+        return time.perf_counter() < self._until_s and self._counter[0] >= self._begin
 
     def stands_still(self) -> bool:
         """Whether it does while that is so."""

@@ -21,7 +21,7 @@ from boebot.image.program import BOOT_SECTIONS
 from boebot.link.ports import holder_of
 
 UPLOAD_BAUD = 115_200  # of the Uno's boot loader
-ROOM = BOOT_SECTIONS[0]  # bytes of flash before the boot loader
+ROOM = max(BOOT_SECTIONS)  # bytes of flash before the boot loader
 BARS = 100  # marks that avrdude prints while it writes and reads back
 LIFE = re.compile(rb"#|\navrdude: ")  # what it prints of what went well
 SILENCE_S = 15.0  # of avrdude, which tries for minutes where a byte was lost

@@ -91,6 +91,7 @@ class EmulatedBoard:
     Attributes:
         ffi, lib: of the extension that made it.
         description: what kind of board it is.
+        begin: where a reset leads in its flash (bytes).
         elf: the file that says where in the source an address comes from.
         assumed: what that file does not say and was assumed.
         is_in_use: whether a simulation runs it.
@@ -101,6 +102,8 @@ class EmulatedBoard:
         is_strict: what a bench does not show of a program ends its run.
         stood_still_s: how long the program has stood still in a debugger, by the wall clock.
     """
+
+    begin = 0
 
     def __init__(
         self, extension: Any, board: Any, description: str, *, elf: Path | None = None, assumed: str = ""

@@ -83,12 +83,13 @@ static void write_register(avr_board *b, uint16_t address, uint8_t value, uint64
   interrupts_changed(b);
 }
 
-/* SPM: r1:r0 into flash at Z, at once. */
+/* SPM: r1:r0 into flash at Z, at once; the first one may also say that code begins elsewhere. */
 static void store_program(avr_board *b) {
   avr_core *core = &b->core;
   const uint32_t address = (core->data[30] | (uint32_t)core->data[31] << 8) % AVR_FLASH_SIZE & ~1u;
   memcpy(core->flash + address, core->data, 2);
   avr_core_flash_changed(core, address, 2);
+  if (!b->programs && core->data[0] % 2u) avr_core_set_code(core, core->data[1], core->code_end);
   b->programs = true;
 }
 
@@ -123,19 +124,16 @@ static void renew(avr_core *core) {
   if (!core->flash) CHECK(avr_core_create(core));
   uint8_t *const flash = core->flash;
   avr_instruction *const code = core->code;
-  const uint32_t end = core->code_end;
+  const uint32_t begin = core->code_begin, end = core->code_end;
   memset(core, 0, sizeof *core);
   core->flash = flash;
   core->code = code;
+  core->code_begin = begin;
   core->code_end = end;
   avr_core_reset(core, 0);
 }
 
-static void write_flash(avr_core *core, const uint8_t *image, uint32_t code_end) {
-  if (code_end != core->code_end) {
-    core->code_end = code_end;
-    avr_core_flash_changed(core, 0, AVR_FLASH_SIZE);
-  }
+static void write_flash(avr_core *core, const uint8_t *image) {
   for (uint32_t at = 0; at < AVR_FLASH_SIZE; at += PIECE) {
     if (memcmp(core->flash + at, image + at, PIECE) == 0) continue;
     memcpy(core->flash + at, image + at, PIECE);
@@ -165,13 +163,13 @@ static void load(avr_board *b, const uint8_t *data, size_t size) {
   core->ones = mixed(b, 6, 0);
   core->next_due = 1u + first[4];
   core->stack_floor = (uint16_t)(AVR_RAM_BEGIN + first[5] * 4u);
-  core->code_begin = first[7] & 1u;
   core->enabled = mixed(b, 0, first[7]) & ((1u << VECTOR_COUNT) - 2u);
   memset(image, 0xFF, sizeof image);
   for (uint32_t at = 0; at < PROGRAM && size > sizeof first; at++) {
     image[at] = data[sizeof first + at % (size - sizeof first)];
   }
-  write_flash(core, image, first[6] % 16u == 1u ? PROGRAM - first[6] : AVR_FLASH_SIZE);
+  avr_core_set_code(core, first[7] & 1u, first[6] % 16u == 1u ? PROGRAM - first[6] : AVR_FLASH_SIZE);
+  write_flash(core, image);
 }
 
 static bool enter_interrupt(avr_core *core) {
@@ -198,9 +196,11 @@ static void run_until(avr_board *b, uint64_t until, const avr_stops *stops) {
     const uint64_t before = core->cycle;
     if (core->one_more) horizon = before + 1u;
     core->one_more = false;
+    const bool is_code = core->pc + 2u > core->code_begin && core->pc < core->code_end;
     const uint32_t last = avr_run(core, horizon, stops);
     CHECK(core->pc % 2u == 0 && last % 2u == 0);
     CHECK(core->cycle >= before && (core->cycle > b->halted || b->halted == 0));
+    CHECK(is_code || core->cycle == before);
     if (core->cycle == before) b->ended = true;
   }
 }
@@ -218,7 +218,7 @@ static void check_decoded(const avr_core *core) {
   static avr_core again;
   renew(&again);
   memcpy(again.flash, core->flash, AVR_FLASH_SIZE);
-  again.code_end = core->code_end;
+  avr_core_set_code(&again, core->code_begin, core->code_end);
   avr_core_flash_changed(&again, 0, AVR_FLASH_SIZE);
   CHECK(memcmp(again.code, core->code, AVR_FLASH_SIZE / 2u * sizeof *core->code) == 0);
 }

@@ -1,8 +1,8 @@
 """A program as it lies in the chip's memories, from an ELF file or from one in Intel's HEX format.
 
 Of an ELF file it takes what a loader takes: the segments, whose physical addresses say where their bytes go: flash from
-0, EEPROM from 0x810000; fuses and lock bits from 0x820000 are not needed. A program that begins in the boot section has
-its reset there (ATmega328P data sheet 27.6: the fuse BOOTRST). Segments also say where the code ends, and where the
+0, EEPROM from 0x810000; fuses and lock bits from 0x820000 are not heeded. The fuses are an Uno's; for a program that
+begins in the boot section they are so that a reset leads there. Segments also say where the code ends, and where the
 variables do. A HEX file says only which bytes the flash has.
 
 Every emulated board reads one, so an ELF file needs no library here.
@@ -25,8 +25,11 @@ SEGMENT = struct.Struct("<8I")  # type, offset, virtual and physical address, by
 LOADED, EXECUTABLE = 1, 1  # a segment's type, and one of its flags
 FLASH_SIZE, EEPROM_SIZE = 0x8000, 1024  # bytes
 RAM_BEGIN, RAM_END = 0x100, 0x900
-BOOT_SECTIONS = (0x7E00, 0x7C00, 0x7800, 0x7000)  # where they can begin (table 27-7)
-BOOT_BEGIN = BOOT_SECTIONS[-1]  # of the largest one
+# Where a boot section can begin, and the high fuse byte by which it does and a reset leads there: BOOTSZ and BOOTRST
+# (ATmega328P data sheet, tables 27-13 and 28-8).
+BOOT_SECTIONS = {0x7E00: 0xDE, 0x7C00: 0xDC, 0x7800: 0xDA, 0x7000: 0xD8}
+BOOT_BEGIN = min(BOOT_SECTIONS)
+HIGH_FUSE = 0xDF  # the boot section from 0x7E00 on, a reset leads to 0
 DATA_SPACE, EEPROM_SPACE = 0x800000, 0x810000  # where ELF files have these memories
 OTHER_SPACES = 0x820000  # from here on fuses, lock bits, signature
 SIZE_MAXIMUM = 64 << 20  # bytes of a file
@@ -41,7 +44,7 @@ class Program:
     Attributes:
         flash: from address 0; a byte that the file does not give is 0xFF.
         eeprom: all of it, likewise.
-        begin: where the reset leads: 0, or an address in the boot section.
+        high_fuse: says where the boot section begins, and whether a reset leads there or to 0.
         code_end: behind the last byte that can be an instruction.
         variables_end: the first address of RAM behind the variables; RAM_BEGIN where the file does not say it.
         elf: the file, if it can say more of addresses (boebot.image.elf).
@@ -50,11 +53,16 @@ class Program:
 
     flash: bytes
     eeprom: bytes
-    begin: int
+    high_fuse: int
     code_end: int
     variables_end: int
     elf: Path | None
     assumed: str
+
+    @property
+    def begin(self) -> int:
+        """Where a reset leads, by the fuse: 0, or the begin of the boot section."""
+        return next((section for section, fuse in BOOT_SECTIONS.items() if fuse == self.high_fuse), 0)
 
 
 def read_program(path: Path) -> Program:
@@ -80,15 +88,19 @@ def behind_bootloader(path: Path, program: Program | None) -> Program:
     """
     loader = read_program(path)
     first = FLASH_SIZE - len(loader.flash.lstrip(b"\xff"))
-    begin = next((section for section in BOOT_SECTIONS if section <= first), 0)
-    if not begin:
+    if first < BOOT_BEGIN:
         raise AnalysisError(f"{path} is no boot loader: it begins at 0x{first:04X}; expected 0x7000 at least")
-    erased = b"\xff" * FLASH_SIZE
+    begin, erased = boot_section(first), b"\xff" * FLASH_SIZE
     flash, eeprom = (erased, loader.eeprom) if program is None else (program.flash, program.eeprom)
     if flash[begin:] != erased[begin:]:
         end = len(flash.rstrip(b"\xff"))
         raise AnalysisError(f"the program fills {end} bytes of flash; expected {begin} at most before the boot loader")
-    return Program(flash[:begin] + loader.flash[begin:], eeprom, begin, FLASH_SIZE, RAM_BEGIN, None, "")
+    return Program(flash[:begin] + loader.flash[begin:], eeprom, BOOT_SECTIONS[begin], FLASH_SIZE, RAM_BEGIN, None, "")
+
+
+def boot_section(first: int) -> int:
+    """Where the smallest boot section begins that has code from `first` on."""
+    return next(section for section in BOOT_SECTIONS if section <= first)
 
 
 def elf_program(path: Path, data: bytes) -> Program:
@@ -97,7 +109,7 @@ def elf_program(path: Path, data: bytes) -> Program:
     assumed = assumed_chip(what, data)
     memory = _Memory(what)
     begin, table, size, count = (HEADER.unpack_from(data)[number] for number in (4, 5, 9, 10))
-    code_end, variables_end = 0, RAM_BEGIN
+    code_end, variables_end, boot = 0, RAM_BEGIN, FLASH_SIZE
     for number in range(count):
         at = table + number * size
         if size < SEGMENT.size or at + SEGMENT.size > len(data):
@@ -107,6 +119,7 @@ def elf_program(path: Path, data: bytes) -> Program:
             continue
         if flags & EXECUTABLE and address < FLASH_SIZE:
             code_end = max(code_end, address + length)
+            boot = min(boot, address) if address >= BOOT_BEGIN else boot
         first = place - DATA_SPACE
         if 0 <= first < RAM_END and in_memory < RAM_END - first:  # else they leave no memory for a stack
             variables_end = max(variables_end, first + in_memory)
@@ -114,7 +127,9 @@ def elf_program(path: Path, data: bytes) -> Program:
             raise AnalysisError(f"{what} cannot be loaded: it is cut short")
         if wrong := memory.unfit(address, data[offset : offset + length]):
             raise AnalysisError(f"{what} cannot be loaded: {wrong}")
-    return memory.program(begin if BOOT_BEGIN <= begin < code_end else 0, code_end, variables_end, path, assumed)
+    starts_there = BOOT_BEGIN <= begin < code_end
+    high_fuse = BOOT_SECTIONS[boot_section(min(boot, begin))] if starts_there else HIGH_FUSE
+    return memory.program(high_fuse, code_end, variables_end, path, assumed)
 
 
 def hex_program(path: Path, data: bytes) -> Program:
@@ -160,7 +175,7 @@ def hex_program(path: Path, data: bytes) -> Program:
     if not is_over and memory.flash_end:
         raise AnalysisError(f"{what} is cut short: its last line is not the record that ends it, :00000001FF")
     assumed = f"{what} does not say which chip it is for: it is taken for an {CHIP}"
-    return memory.program(0, memory.flash_end, RAM_BEGIN, None, assumed)
+    return memory.program(HIGH_FUSE, memory.flash_end, RAM_BEGIN, None, assumed)
 
 
 def _bytes_of(record: bytes) -> bytes:
@@ -198,8 +213,8 @@ class _Memory:
             self.flash_end = max(self.flash_end, at + len(data))
         return ""
 
-    def program(self, begin: int, code_end: int, variables_end: int, elf: Path | None, assumed: str) -> Program:
+    def program(self, high_fuse: int, code_end: int, variables_end: int, elf: Path | None, assumed: str) -> Program:
         """All of it."""
         if not code_end or not self.flash_end:
             raise AnalysisError(f"{self._what} cannot be loaded: it holds no program")
-        return Program(bytes(self._flash), bytes(self._eeprom), begin, code_end, variables_end, elf, assumed)
+        return Program(bytes(self._flash), bytes(self._eeprom), high_fuse, code_end, variables_end, elf, assumed)

@@ -59,11 +59,12 @@ class AvrBoard(EmulatedBoard):
         """Powers on a board with that program in flash."""
         ffi, lib = extension = missing.compiled("sim_bridge.boards.avr._avr")
         flash, eeprom = (ffi.from_buffer("uint8_t[]", part) for part in (program.flash, program.eeprom))
-        loaded = (flash, eeprom, program.begin, program.code_end, program.variables_end)
+        loaded = (flash, eeprom, program.high_fuse, program.code_end, program.variables_end)
         board = lib.avr_board_create(ffi.new("avr_program *", loaded))
         if not board:
             raise MemoryError("emulated board")
         super().__init__(extension, board, "emulated ATmega328P", elf=program.elf, assumed=program.assumed)
+        self.begin = program.begin
 
     def no_fast_forward(self) -> None:
         """For tests: from now on each instruction by itself, and sleep cycle by cycle. All is the same."""

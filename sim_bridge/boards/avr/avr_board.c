@@ -136,10 +136,10 @@ static void load(avr_board *b, const avr_program *program) {
   memcpy(b->core.flash, program->flash, AVR_FLASH_SIZE);
   memcpy(b->eeprom.cells, program->eeprom, BOARD_EEPROM_SIZE);
   b->variables_end = program->variables_end;
-  b->reset_address = program->begin;
-  b->core.code_end = program->code_end;
-  if (program->begin == 0) b->code_begin = 1; /* address 0 is for resets: a jump there is noticed */
+  b->high_fuse = program->high_fuse;
+  b->reset_address = AVR_RESET_BEGIN(program->high_fuse);
   avr_core_flash_changed(&b->core, 0, AVR_FLASH_SIZE);
+  flash_code_ends(b, program->code_end);
 }
 
 board *avr_board_create(const avr_program *program) {

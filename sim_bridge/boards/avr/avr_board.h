@@ -14,7 +14,7 @@
 typedef struct {
   const uint8_t *flash;   /* AVR_FLASH_SIZE bytes */
   const uint8_t *eeprom;  /* BOARD_EEPROM_SIZE bytes */
-  uint32_t begin;         /* where the reset leads: 0, or into the boot section */
+  uint8_t high_fuse;      /* says where the boot section begins, and whether a reset leads there (avr_chip.h) */
   uint32_t code_end;      /* behind the last byte that can be an instruction */
   uint16_t variables_end; /* first address of data memory behind the variables */
 } avr_program;

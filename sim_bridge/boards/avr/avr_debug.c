@@ -128,9 +128,8 @@ bool avr_debug_write(board *self, uint32_t address, uint8_t value) {
   note(b, b->core.pc, CHANGED);
   if (address < AVR_FLASH_SIZE) {
     b->core.flash[address] = value;
-    b->core.code_end = AVR_FLASH_SIZE; /* another program, of which nothing is known */
-    avr_core_flash_changed(&b->core, 0, AVR_FLASH_SIZE);
-    b->variables_end = b->core.stack_floor = AVR_RAM_BEGIN;
+    avr_core_flash_changed(&b->core, address, 1);
+    flash_is_another(b);
   } else if (address - DATA_BEGIN < BOARD_DATA_SIZE) {
     poke(b, (uint16_t)(address - DATA_BEGIN), value);
   } else {

@@ -2,7 +2,8 @@
  *
  * A write: EEMPE, within four cycles EEPE; the CPU stands still for two cycles, and 3.4 ms later EEPE clears itself. A
  * read: EERE; the CPU stands still for four cycles, the byte is in EEDR. While a write is under way there is no other
- * write, no read, and EEAR cannot be changed. Erasing makes a cell 0xFF, writing clears bits.
+ * write, no read, and EEAR cannot be changed; while flash is written there is no write. Erasing makes a cell 0xFF, writing
+ * clears bits.
  *
  * A reset does not stop a write as long as there is supply (8.4.2).
  */
@@ -34,17 +35,16 @@ static void start_write(avr_board *b, uint8_t mode, uint64_t cycle) {
   e->mode = mode;
   e->address = e->selected;
   e->value = result_of(mode, e->cells[e->address], e->data);
-  clear_flag(b, VECTOR_EE_READY);
   bool both = mode != MODE_ERASE && mode != MODE_WRITE; /* the fourth is reserved */
   set_due(b, DUE_EEPROM, cycle + (both ? ERASE_AND_WRITE_CYCLES : ONE_OF_BOTH_CYCLES));
   halt_cpu(b, WRITE_HALT_CYCLES);
-  flash_forget_page(b); /* (27.8.2) */
+  flash_gives_way(b);
 }
 
 static void end_write(avr_board *b) {
   b->eeprom.writing = false;
   set_due(b, DUE_EEPROM, NEVER);
-  raise_flag(b, VECTOR_EE_READY);
+  memories_changed(b);
 }
 
 void eeprom_due(avr_board *b, uint64_t cycle) {
@@ -66,7 +66,11 @@ static void write_control(avr_board *b, uint16_t address, uint8_t value, uint64_
   b->core.data[address] = mode | (value & EERIE);
   enable_interrupt(b, VECTOR_EE_READY, value & EERIE);
   if (armed && (value & EEPE) && !e->writing) {
-    start_write(b, mode, end);
+    if (b->programming.busy) {
+      note(b, b->core.pc, "sets", "EEPE", "it is dropped: flash is being written (8.6.3)");
+    } else {
+      start_write(b, mode, end);
+    }
     return;
   }
   if ((value & EEPE) && !e->writing)

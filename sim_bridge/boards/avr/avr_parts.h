@@ -300,8 +300,8 @@ struct avr_board {
   char fault[160];
   uint32_t fault_address; /* of the instruction that crashed the board, or NO_ADDRESS */
   uint16_t variables_end; /* in data memory; the stack's floor is there, or at RAM's begin while it lies among them */
-  uint32_t code_begin;    /* a jump to what is below is a soft reset */
-  uint32_t reset_address; /* where a reset leads: 0, or into the boot section (27.6: the fuse BOOTRST) */
+  uint8_t high_fuse;      /* the fuses' byte that says where the boot section is (avr_chip.h) */
+  uint32_t reset_address; /* where a reset leads: 0, or into the boot section, as that fuse says */
   bool no_fast_forward;   /* each instruction by itself, sleep cycle by cycle */
   struct avr_recorder *recorder; /* NULL: nothing is recorded */
   struct avr_debugging *debug;   /* NULL: no debugger */
@@ -436,7 +436,10 @@ void flash_reset(avr_board *b);
 void flash_due(avr_board *b, uint64_t cycle);
 void flash_store(avr_board *b);                     /* SPM */
 uint8_t flash_load(avr_board *b, uint16_t address); /* LPM while SPMCSR is not 0 */
-void flash_forget_page(avr_board *b);               /* what was loaded for the next page */
+void flash_code_ends(avr_board *b, uint32_t end);
+void flash_is_another(avr_board *b); /* than the image: anything in it may be code, and anything in RAM stack */
+void flash_gives_way(avr_board *b);  /* to a write of the EEPROM: what was loaded or asked for is lost (27.8.2) */
+void memories_changed(avr_board *b); /* after the begin or end of a write of either */
 
 /* avr_spans.c; all but spans_free only while there is a recorder */
 uint32_t run_recorded(avr_board *b, uint64_t until);             /* as avr_run; stops where something is recorded */

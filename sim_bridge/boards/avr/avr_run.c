@@ -154,7 +154,7 @@ static void left_stack(avr_board *b, uint32_t at, uint16_t before) {
   }
 }
 
-/* The board stops if the instruction at `address` has led to where none is. */
+/* The board stops if the instruction at `address`, or an interrupt behind it, has led to where none is. */
 static void check_jump(avr_board *b, uint32_t address) {
   const avr_core *core = &b->core;
   if (b->crashed || avr_is_code(core, core->pc)) return;
@@ -178,10 +178,8 @@ static void check_jump(avr_board *b, uint32_t address) {
   }
 }
 
-/* No program is there: it goes on into the boot section. */
 static void runs_erased(avr_board *b) {
-  if (b->core.pc >= b->reset_address) return;
-  note(b, b->core.pc, "runs through", "erased flash", "no program is there: it goes on into the boot section");
+  note(b, b->core.pc, "runs through", "erased flash", "no program is there: it goes on to what follows");
 }
 
 static void cannot_go_on(avr_board *b, unsigned opcode) {
@@ -218,7 +216,7 @@ static bool enter_interrupt(avr_board *b) {
   const bool elsewhere = avr_stack(core) + 1u < core->stack_floor;
   avr_enter_interrupt(core, vector);
   check_stack(b, interrupted, elsewhere);
-  if (b->programming.blocked) check_jump(b, interrupted);
+  check_jump(b, interrupted);
   core->cycle += INTERRUPT_CYCLES + (core->sleeping ? WAKE_UP_CYCLES : 0);
   if (core->sleeping) {
     core->sleeping = false;

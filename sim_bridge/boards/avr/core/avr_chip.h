@@ -9,9 +9,13 @@
 #define AVR_DATA_SIZE 0x0900u /* registers, I/O registers, RAM */
 #define AVR_IO_BEGIN 0x20u
 #define AVR_RAM_BEGIN 0x100u
-#define AVR_PAGE_SIZE 128u /* of flash, as self-programming writes it (27.8.14) */
-#define AVR_NRWW_BEGIN \
-  0x7000u /* from here on flash can be read while it is written below; also of the largest boot section */
+#define AVR_PAGE_SIZE 128u     /* of flash, as self-programming writes it (27.8.14) */
+#define AVR_NRWW_BEGIN 0x7000u /* from here on flash can be read while it is written below (27.4) */
+
+/* The high fuse byte (28.2): where the boot section begins, in which alone SPM works (BOOTSZ, table 27-13), and whether a
+ * reset leads there (BOOTRST is 0). */
+#define AVR_BOOT_BEGIN(high_fuse) (AVR_FLASH_SIZE - (0x1000u >> ((high_fuse) >> 1 & 3u)))
+#define AVR_RESET_BEGIN(high_fuse) ((high_fuse) % 2u ? 0u : AVR_BOOT_BEGIN(high_fuse))
 
 /* Interrupt vectors (12.4). */
 enum {

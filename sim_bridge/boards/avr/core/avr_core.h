@@ -70,8 +70,10 @@ typedef struct {
   bool one_more;     /* one instruction is executed before an interrupt (7.7.1) */
   bool sleeping;     /* by SLEEP while SE is set */
 
-  uint32_t code_begin, code_end; /* instructions are from here to there: anywhere else it stops */
-  uint16_t stack_floor;          /* a stack that grows below this, or is anywhere but in RAM, is the owner's affair */
+  /* Instructions are from here to there; what lies outside is never executed, however the program gets there: it stops
+   * before it. 1: that at 0 is executed, but a jump to it stops. */
+  uint32_t code_begin, code_end;
+  uint16_t stack_floor; /* a stack that grows below this, or is anywhere but in RAM, is the owner's affair */
 
   avr_register_read *reads[AVR_RAM_BEGIN];   /* by address; NULL: what `data` has */
   avr_register_write *writes[AVR_RAM_BEGIN]; /* NULL: `data` has it */
@@ -99,8 +101,11 @@ typedef struct {
 bool avr_core_create(avr_core *core);
 void avr_core_free(avr_core *core);
 
-/* Decodes anew what flash has from `address` on; after a change of `code_end`: all of it. */
+/* Decodes anew what flash has from `address` on. */
 void avr_core_flash_changed(avr_core *core, uint32_t address, uint32_t bytes);
+
+/* Instructions are from `begin` to `end` from now on. */
+void avr_core_set_code(avr_core *core, uint32_t begin, uint32_t end);
 
 /* As by a reset, from `pc` on: I/O registers are 0, the stack is at the end of RAM. */
 void avr_core_reset(avr_core *core, uint32_t pc);

@@ -148,7 +148,7 @@ static avr_instruction with_operands(uint8_t kind, operands where, unsigned opco
 }
 
 static avr_instruction decode(const avr_core *core, uint32_t address) {
-  if (address >= core->code_end) return (avr_instruction){OUTSIDE, 0, 0};
+  if (address + 2u <= core->code_begin || address >= core->code_end) return (avr_instruction){OUTSIDE, 0, 0};
   const unsigned opcode = word_at(core, address), p = pattern_of[opcode];
   const unsigned next = address + 2u < AVR_FLASH_SIZE ? word_at(core, address + 2u) : 0xFFFFu;
   if (p == NO_PATTERN) return (avr_instruction){INVALID, 0, 0};
@@ -158,7 +158,7 @@ static avr_instruction decode(const avr_core *core, uint32_t address) {
   if (kind == STS && in_ram) kind = STS_RAM;
   avr_instruction i = with_operands(kind, (operands)PATTERNS[p].operands, opcode, next, address / 2u);
   const bool is_branch = PATTERNS[p].operands == FLAG_K7;
-  if (is_branch && i.k * 2u >= core->code_end) i.kind = opcode & 0x0400u ? BRBC : BRBS; /* these look where they go */
+  if (is_branch && !avr_is_code(core, i.k * 2u)) i.kind = opcode & 0x0400u ? BRBC : BRBS; /* these look where they go */
   return i;
 }
 
@@ -167,6 +167,13 @@ void avr_core_flash_changed(avr_core *core, uint32_t address, uint32_t bytes) {
   address &= ~1u;
   if (address >= 2u) address -= 2u; /* that before may have its second word here */
   for (; address < end; address += 2u) core->code[address / 2u] = decode(core, address);
+}
+
+void avr_core_set_code(avr_core *core, uint32_t begin, uint32_t end) {
+  if (begin == core->code_begin && end == core->code_end) return;
+  core->code_begin = begin;
+  core->code_end = end;
+  avr_core_flash_changed(core, 0, AVR_FLASH_SIZE);
 }
 
 bool avr_core_create(avr_core *core) {

@@ -34,7 +34,7 @@ enum { AVR_KINDS(AVR_ENUMERATOR) };
 
 static inline bool avr_has_two_words(unsigned kind) { return kind >= LDS && kind <= CALL; }
 
-/* It stops where it leads to no code; what only runs on does so at the next instruction. */
+/* It stops if it leads to no code. What leads there otherwise, such as running on, stops at the record there, OUTSIDE. */
 static inline bool avr_looks_where_it_goes(unsigned kind) {
   return (kind >= LONG_JUMP && kind <= RETI) || kind == BRBS || kind == BRBC || kind == OUTSIDE;
 }

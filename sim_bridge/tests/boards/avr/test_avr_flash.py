@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from boebot.errors import BoardError
 from sim_bridge.boards.avr import create
 from sim_bridge.tests.boards.access import BoardAccess
 from sim_bridge.tests.boards.avr.avr_program import compiled
-from sim_bridge.tests.boards.symbols import find_symbol
+from sim_bridge.tests.boards.symbols import entry_of, find_symbol
 
 PAGE_CYCLES = 72_000  # 4.5 ms, the longest that a page takes (data sheet, 27.8.12)
 RWWSB, SPMEN = 0x40, 0x01
@@ -62,7 +63,23 @@ int main(void) { TCCR1B = 2; return main_in_boot(); }
 
 
 def board_of(text: str, folder: Path) -> BoardAccess:
-    return BoardAccess(create(compiled(PROGRAM + text, folder / "program.elf", "-Wl,--section-start=.boot=0x7000")))
+    return BoardAccess(create(compiled(PROGRAM + text, folder / "program.elf", "-Wl,--section-start=.boot=0x7E00")))
+
+
+def bare(text: str, folder: Path, begin: int = 0) -> BoardAccess:
+    """A board with a program of assembler alone, at that address; it begins at `main` if that is in a boot section."""
+    lines = " ".join(json.dumps(f"{line}\n") for line in (".global main", *text.splitlines()))
+    source = f"__asm__({lines});"
+    options = ("-nostartfiles", "-Wl,-e,main", f"-Wl,--section-start=.text={begin:#x}")
+    return BoardAccess(create(compiled(source, folder / "program.elf", *options)))
+
+
+def notes(board: BoardAccess) -> list[str]:
+    return [note[2] for note in board.notes()]
+
+
+def register(board: BoardAccess, number: int) -> int:
+    return board.read_memory(number, 1)[0]
 
 
 def read(board: BoardAccess, name: str) -> bytes:
@@ -78,7 +95,7 @@ def test_a_page_takes_its_time_and_cannot_be_read_meanwhile(tmp_path: Path) -> N
     during, after, blocked, enabled, first = read(board, "seen")[:5]
     assert (during & (RWWSB | SPMEN), after, blocked, enabled) == (RWWSB | SPMEN, RWWSB, 0xFF, 0)
     assert first == 0x34
-    assert [note[2] for note in board.notes()] == ["reads flash that is being written"]
+    assert notes(board) == ["fills a word of the page again", "reads flash that is being written"]
 
 
 def test_a_page_has_what_was_filled_and_writing_clears_bits(tmp_path: Path) -> None:
@@ -131,6 +148,7 @@ def test_spm_comes_within_four_cycles(nops: int, erased: bool, tmp_path: Path) -
     board = board_of(text, tmp_path)
     board.run(1000)
     assert read(board, "seen")[0] == (RWWSB | 3 if erased else 0)
+    assert notes(board) == ([] if erased else ["executes SPM"])
 
 
 def test_signature_fuses_and_lock_bits(tmp_path: Path) -> None:
@@ -168,3 +186,148 @@ def test_flash_is_not_programmed_while_the_eeprom_is_written(tmp_path: Path) -> 
     assert [note[2:] for note in board.notes()] == [
         ("writes to SPMCSR", "it is dropped: the EEPROM is being written (27.8.8)")
     ]
+
+
+def test_the_eeprom_is_not_written_while_flash_is(tmp_path: Path) -> None:
+    """8.6.3; nor does its interrupt come."""
+    text = """
+    ISR(EE_READY_vect) { done = 4; }
+    BOOT int main_in_boot(void) {
+      boot_page_erase(PAGE);
+      EECR = 1 << EERIE;
+      sei();
+      EEARL = 1; EEDR = 2; EECR |= 1 << EEMPE; EECR |= 1 << EEPE;
+      seen[0] = EECR;
+      cli();
+      finish();
+      return 0;
+    }
+    int main(void) { return main_in_boot(); }"""
+    board = board_of(text, tmp_path)
+    board.run(2 * PAGE_CYCLES)
+    assert read(board, "done") == b"\1"
+    assert read(board, "seen")[0] & 2 == 0 and board.read_eeprom()[1] == 0xFF  # EEPE
+    assert [note[2:] for note in board.notes()] == [
+        ("sets EEPE", "it is dropped: flash is being written (8.6.3)"),
+    ]
+
+
+# ---- where code is ----
+
+# At 0x6FFC, the end of what cannot be read while it is written; main, at 0x7000, erases a page.
+AT_THE_BORDER = """
+application: inc r3
+rjmp application
+main: clr r3
+ldi r24, 3
+ldi r31, 0x10
+out 0x37, r24
+spm
+"""
+WAYS = {
+    "brne": "tst r24\nwrong: brne application",
+    "brid": "cli\nwrong: brid application",
+    "rjmp": "wrong: rjmp application",
+    "ijmp": "ldi r30, 0xFE\nldi r31, 0x37\nwrong: ijmp",
+    "ret": "ldi r30, 0xFE\nldi r31, 0x37\npush r30\npush r31\nwrong: ret",
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_no_way_leads_into_flash_that_is_being_written(way: str, tmp_path: Path) -> None:
+    board = bare(AT_THE_BORDER + WAYS[way], tmp_path, 0x6FFC)
+    assert board.board.elf is not None
+    wrong = entry_of(board.board.elf, "wrong")
+    with pytest.raises(BoardError, match=rf"goes to 0x6FFC while flash is written there .* at address 0x{wrong:04X} "):
+        board.run(100)
+    assert register(board, 3) == 0
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_way_leads_into_flash_that_was_enabled_again(way: str, tmp_path: Path) -> None:
+    enable = "1: in r25, 0x37\nsbrc r25, 0\nrjmp 1b\nldi r25, 0x11\nout 0x37, r25\nspm\n"
+    board = bare(AT_THE_BORDER + enable + WAYS[way], tmp_path, 0x6FFC)
+    board.run(PAGE_CYCLES + 100)
+    assert register(board, 3) > 0 and board.notes() == []
+
+
+@pytest.mark.parametrize("way", ["rjmp main", "tst r24\nbrne main", "cli\nbrid main", "ijmp"])
+def test_every_jump_to_the_start_is_noted(way: str, tmp_path: Path) -> None:
+    board = bare(f"main: inc r3\nldi r24, 1\nclr r30\nclr r31\n{way}\n1: rjmp 1b", tmp_path)
+    before = register(board, 3)
+    board.run(100)
+    assert (register(board, 3) - before) % 256 > 2
+    assert notes(board) == ["jumps to its start"]
+
+
+def test_what_is_written_behind_the_image_is_code(tmp_path: Path) -> None:
+    """And anything in RAM may be its stack."""
+    text = """
+    volatile uint8_t variables[100];
+    BOOT int main_in_boot(void) {
+      boot_page_fill(0x7F00, 0x9508); /* ret */
+      boot_page_write(0x7F00);
+      SP = (uint16_t)(variables + 50);
+      asm volatile("call 0x7F00");
+      finish();
+      return 0;
+    }
+    int main(void) { variables[1] = 1; return main_in_boot(); }"""
+    board = board_of(text, tmp_path)
+    board.run(2 * PAGE_CYCLES)
+    assert read(board, "done") == b"\1" and board.notes() == []
+
+
+ERASES = """
+main: ldi r24, 3
+ldi r30, 0
+ldi r31, 0x10
+out 0x37, r24
+spm
+in r20, 0x37
+ldi r24, 9
+ldi r30, 3
+clr r31
+out 0x37, r24
+lpm r21, Z
+1: rjmp 1b
+"""
+
+
+@pytest.mark.parametrize(("begin", "fuse"), [(0x7000, 0xD8), (0x7800, 0xDA), (0x7C00, 0xDC), (0x7E00, 0xDE)])
+def test_a_program_that_begins_in_the_boot_section_has_its_fuses(begin: int, fuse: int, tmp_path: Path) -> None:
+    board = bare(ERASES, tmp_path, begin)
+    assert board.board.begin == begin
+    board.run(PAGE_CYCLES // 2)
+    assert register(board, 20) == RWWSB | 3
+    board = bare(ERASES.replace("spm", ""), tmp_path, begin)
+    board.run(100)
+    assert register(board, 21) == fuse and board.notes() == []
+
+
+@pytest.mark.parametrize("at", [0x1000, 0x7000, 0x7DE0])
+def test_spm_does_nothing_outside_of_the_boot_section(at: int, tmp_path: Path) -> None:
+    """Of an Uno it is from 0x7E00 on, unless the image begins in a larger one."""
+    board = bare(f"main: jmp there\n.org {at}" + ERASES.replace("main", "there"), tmp_path)
+    board.run(1000)
+    assert register(board, 20) & RWWSB == 0
+    assert [note[2:] for note in board.notes()] == [
+        (
+            "executes SPM",
+            "it is dropped: it works in the boot section only, which the fuses have from 0x7E00 on (27.3.2)",
+        )
+    ]
+
+
+def test_a_boot_section_that_erases_itself_is_noted(tmp_path: Path) -> None:
+    board = bare(ERASES.replace("ldi r31, 0x10", "ldi r31, 0x7E"), tmp_path, 0x7E00)
+    with pytest.raises(BoardError, match="goes to 0x7E18, but ends at 0x7E18"):
+        board.run(2 * PAGE_CYCLES)
+    assert notes(board) == ["erases the page that it runs in", "runs through erased flash"]
+
+
+def test_running_through_erased_flash_is_noted(tmp_path: Path) -> None:
+    """Without a boot loader, too: between what a program has."""
+    board = bare("main: rjmp hole\nhole: .fill 100, 2, 0xFFFF\nclr r31\n1: rjmp 1b", tmp_path)
+    board.run(1000)
+    assert notes(board) == ["runs through erased flash"] and register(board, 31) == 0
