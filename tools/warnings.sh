@@ -1,7 +1,7 @@
 #!/bin/sh
-# Reads the C parts for this computer with clang, every warning an error. gcc has the same warnings where `make test`
-# builds with sanitizers (setup.py), and for the microcontroller (platformio.ini). The frame code is standard C11, for any
-# computer and for the microcontroller.
+# Reads the C parts for this computer with clang, every warning an error. gcc has the same ones, but for conversions,
+# where `make soak` builds with sanitizers (setup.py), and for the microcontroller (platformio.ini). The frame code is
+# standard C11, for any computer and for the microcontroller.
 set -eu
 cd "$(dirname "$0")/.."
 warnings="-std=gnu11 -O2 -Wall -Wextra -Wno-unused-parameter -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror"
