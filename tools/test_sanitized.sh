@@ -16,7 +16,7 @@ rm -f "$BOEBOT_STATE_FILE"
 $python -m pytest -q sim_bridge/tests/loop/test_run.py -k however_it_was_compiled
 test -s "$BOEBOT_STATE_FILE"
 
-# The tests go beside the libraries that they are to test, or pytest would take those of the checkout; with their compiled
+# The tests go beside the libraries that they are to test, and both are looked for there first; with their compiled
 # modules, as compiling takes long under sanitizers.
 rm -rf build/sanitized/lib/sim_bridge/tests
 cp -Rp sim_bridge/tests build/sanitized/lib/sim_bridge/tests
@@ -32,5 +32,6 @@ echo "Simulator under sanitizers"
 root=$PWD
 cd build/sanitized/lib
 LD_PRELOAD="$asan $ubsan" ASAN_OPTIONS=detect_leaks=0:malloc_context_size=4 BOEBOT_SANITIZED=1 \
-  "$root/$python" -m pytest -q -c "$root/pyproject.toml" --rootdir "$PWD" sim_bridge/tests \
+  "$root/$python" -m pytest -q -c "$root/pyproject.toml" --rootdir "$PWD" \
+  -o pythonpath="$PWD $root $root/host/tests" sim_bridge/tests \
   -m "not unsanitized and not soak and not wall_clock"
