@@ -109,7 +109,7 @@ FUZZ_SECONDS ?= 60
 fuzz:
 	@$(SIDE_BY_SIDE) ready-test
 	@tools/test_sanitized.sh
-	@$(PYTHON_VENV) -m tools.fuzz --seconds $(FUZZ_SECONDS)
+	@$(PYTHON_VENV) -m tools.tests.fuzz --seconds $(FUZZ_SECONDS)
 	@$(PYTHON_VENV) host/fuzz/damaged_records.py
 	@BOEBOT_EXAMPLES=$(EXAMPLES) $(PYTHON_VENV) -m pytest -q -m hypothesis -o faulthandler_timeout=1800
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import fuzz
+from tools.tests import fuzz
 from tools.tests.error_rates.library import frame_source
 
 pytestmark = pytest.mark.soak  # they take long to compile

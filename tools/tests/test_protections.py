@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tools.fuzz import FIRMWARE, TEST, firmware_sources
+from tools.tests.fuzz import FIRMWARE, TEST, firmware_sources
 
 # As the environment `native` of platformio.ini, without warnings: without a protection some names are not used.
 FLAGS = ("-DPIN_MAP_SHIELDBOT", "-w", f"-I{FIRMWARE}", f"-I{TEST}")

@@ -1,7 +1,7 @@
 """Coverage-guided fuzzing of the firmware's and the world's C by libFuzzer with sanitizers: `make fuzz`; for seconds
 in `make soak`, those of the frame in `make test`.
 
-    python -m tools.fuzz [--seconds N] [FUZZER ...]
+    python -m tools.tests.fuzz [--seconds N] [FUZZER ...]
 
 The corpora start from the golden vectors and are kept under build/fuzz. An input that breaks an assertion is left
 there as crash-..., and named.
@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware" / "src"
 ARENAS = ROOT / "host" / "boebot" / "arenas"
 BUILT = ROOT / "build" / "fuzz"
@@ -183,7 +183,7 @@ def run(program: Path, folder: Path, limits: Sequence[str]) -> subprocess.Comple
 
 def main() -> int:
     """Builds the fuzzers and runs them side by side."""
-    parser = argparse.ArgumentParser(prog="python -m tools.fuzz", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m tools.tests.fuzz", description=__doc__.splitlines()[0])
     parser.add_argument("fuzzer", nargs="*", help=f"of {', '.join(FUZZERS)}; default: all")
     parser.add_argument("--seconds", type=int, default=60, help="for each fuzzer")
     options = parser.parse_args()
