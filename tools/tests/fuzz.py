@@ -101,11 +101,11 @@ WORLDS = tuple(
     )
 )
 # Of core_fuzzer.c: choices, registers, a program of each kind: counts and branches; calls; loads and stores; interrupts
-# and sleep; self-programming.
+# and sleep; self-programming, of an instruction of two words, too.
 REGISTERS = (1, 2, 3, 4, 50, 20, 0, 0, *range(26), 0, 2, 0, 3, 0, 4)
 COUNTS, CALLS = "010F12270395E1F73196019F120303FD9894F6CF", "03D00E940400FCCF0F930FB70F910895"
 MEMORY = "0D911993238131830090230100926400C8954591"
-INTERRUPTS, PROGRAMMING = "78940EB900936E001D9A1D9B11E013BF8895F8941895", "F1E0E8E0E89532960994FFFFFFFF"
+INTERRUPTS, PROGRAMMING = "78940EB900936E001D9A1D9B11E013BF8895F8941895", "F1E0E8E0E8953296099400910001FFFF"
 PROGRAMS = tuple((*REGISTERS, *bytes.fromhex(words)) for words in (COUNTS, CALLS, MEMORY, INTERRUPTS, PROGRAMMING))
 
 HERE = ROOT / "firmware" / "fuzz"

@@ -1,23 +1,62 @@
-"""The fuzzers run for a while and find nothing; in a decoder without one of its checks, the fuzzer finds that."""
+"""The fuzzers run for a while and find nothing; in code without one of its checks, the fuzzer finds that."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from tools.tests import fuzz
-from tools.tests.error_rates.library import frame_source
+from tools.tests.error_rates.library import ABLATIONS
+from tools.tests.planted import changed_text
 
 pytestmark = pytest.mark.soak  # they take long to compile
 
-# The protection left out of frame.c, and the assertion that the fuzzer then breaks.
-MISSED = {
-    "checksum": r"memcmp\(again \+ 1",
-    "exact length": r"came->count ==",
-    "stuffing": r"memcmp\(again \+ 1",
-    "delimiter": r"decoder->good \+ decoder->bad|accepted == 1|came->count ==|memcmp",
+
+class Fault(NamedTuple):
+    """What a fuzzer finds.
+
+    Attributes:
+        fuzzer: which one.
+        source: file that has the fault.
+        changes: texts of the file and what replaces them.
+        runs: within how many.
+        broken: pattern of the assertion that breaks.
+    """
+
+    fuzzer: str
+    source: Path
+    changes: dict[str, str]
+    runs: int
+    broken: str
+
+
+def without(protection: str, broken: str) -> Fault:
+    """A frame's decoder without one of its protections."""
+    return Fault("frame-board", fuzz.FRAME, ABLATIONS[protection], 300_000, broken)
+
+
+FAULTS = {
+    "checksum": without("checksum", r"memcmp\(again \+ 1"),
+    "exact length": without("exact length", r"came->count =="),
+    "stuffing": without("stuffing", r"memcmp\(again \+ 1"),
+    "delimiter": without("delimiter", r"decoder->good \+ decoder->bad|accepted == 1|came->count ==|memcmp"),
+    "latch": Fault(
+        "link",
+        fuzz.FIRMWARE / "safety.c",
+        {"own.latch != LATCH_NONE || time_to_live": "time_to_live"},
+        2_000,
+        r"armed \|\| pulses\(bench\) == 0",
+    ),
+    "second word decoded anew": Fault(
+        "core",
+        fuzz.CORE / "avr_decode.c",
+        {"if (address >= 2u) address -= 2u;": ""},
+        20_000,
+        r"memcmp\(again\.code, core->code",
+    ),
 }
 
 
@@ -29,32 +68,12 @@ def test_fuzzer_finds_nothing(name: str, tmp_path: Path) -> None:
     assert runs and int(runs[1]) > len(fuzz.FUZZERS[name].seeds), "it has tried something"
 
 
-@pytest.mark.parametrize("protection", MISSED)
-def test_fuzzer_finds_a_missing_check(protection: str, tmp_path: Path) -> None:
-    mutant = tmp_path / "frame.c"
-    mutant.write_text(frame_source(protection), encoding="utf-8")
-    done = fuzz.run(fuzz.build("frame-board", tmp_path, {fuzz.FRAME: mutant}), tmp_path, ["-seed=1", "-runs=300000"])
+@pytest.mark.parametrize("missing", FAULTS)
+def test_fuzzer_finds_what_is_missing(missing: str, tmp_path: Path) -> None:
+    fault = FAULTS[missing]
+    mutant = tmp_path / fault.source.name
+    mutant.write_text(changed_text(fault.source, fault.changes), encoding="utf-8")
+    program = fuzz.build(fault.fuzzer, tmp_path, {fault.source: mutant})
+    done = fuzz.run(program, tmp_path, ["-seed=1", f"-runs={fault.runs}"])
     assert done.returncode != 0, "the fuzzer did not find it"
-    assert re.search(MISSED[protection], done.stderr), done.stderr[-2000:]
-
-
-def test_fuzzer_of_the_link_finds_a_missing_latch(tmp_path: Path) -> None:
-    source, check = fuzz.FIRMWARE / "safety.c", "own.latch != LATCH_NONE || time_to_live"
-    text = source.read_text(encoding="utf-8")
-    assert text.count(check) == 1
-    mutant = tmp_path / "safety.c"
-    mutant.write_text(text.replace(check, "time_to_live"), encoding="utf-8")
-    done = fuzz.run(fuzz.build("link", tmp_path, {source: mutant}), tmp_path, ["-seed=1", "-runs=2000"])
-    assert done.returncode != 0
-    assert "armed || pulses(bench) == 0" in done.stderr, done.stderr[-2000:]
-
-
-def test_fuzzer_of_the_core_finds_an_instruction_that_is_not_decoded_anew(tmp_path: Path) -> None:
-    source, line = fuzz.CORE / "avr_decode.c", "if (address >= 2u) address -= 2u;"
-    text = source.read_text(encoding="utf-8")
-    assert text.count(line) == 1
-    mutant = tmp_path / "avr_decode.c"
-    mutant.write_text(text.replace(line, ""), encoding="utf-8")
-    done = fuzz.run(fuzz.build("core", tmp_path, {source: mutant}), tmp_path, ["-seed=1", "-runs=20000"])
-    assert done.returncode != 0
-    assert "memcmp(again.code, core->code" in done.stderr, done.stderr[-2000:]
+    assert re.search(fault.broken, done.stderr), done.stderr[-2000:]

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import pytest
 
 from tools.tests.fuzz import FIRMWARE, TEST, firmware_sources
+from tools.tests.planted import changed_text
 
 # As the environment `native` of platformio.ini, without warnings: without a protection some names are not used.
 FLAGS = ("-DPIN_MAP_SHIELDBOT", "-w", f"-I{FIRMWARE}", f"-I{TEST}")
@@ -140,10 +141,7 @@ SUITES = tuple(sorted({row.suite for row in ROWS}))
 
 def without(row: Row) -> str:
     """The text of the row's file without its protection."""
-    text = (FIRMWARE / row.file).read_text(encoding="utf-8")
-    found = text.count(row.text)
-    assert found == 1, f"{row.protection}: {row.file} holds {row.text!r} {found} times, not once; correct ROWS"
-    return text.replace(row.text, row.instead)
+    return changed_text(FIRMWARE / row.file, {row.text: row.instead})
 
 
 class Workshop:

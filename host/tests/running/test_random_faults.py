@@ -6,7 +6,7 @@
    armed (docs/reference/link.md, "A run").
 3. Arming follows PROTOCOL.md, "Fail-safe": only an `arm` that crossed the line in this session, after the last stop,
    and names the `latches` of now unlatches the motors; a new session, a start and a low supply find them latched; no
-   pulse without motors that the board says are enabled.
+   pulse without motors that the board says are enabled, by telemetry or by the event of their dead-man stop.
 
 All times are the board's: pulses are edges at the pins of the servos, bytes are seen below what damages them, at the
 board's end of the line. A schedule that breaks one is made as short as possible, and printed as the command that
@@ -98,6 +98,7 @@ class Tap:
     def __init__(self) -> None:
         self.sent: list[tuple[float, int, messages.Message]] = []
         self.said: list[tuple[float, int, messages.Telemetry]] = []
+        self.events: list[tuple[int, messages.Event]] = []
         self._to_board = {0: Decoder(NO_SESSION, to_board=True)}
         self._to_host: dict[int, Decoder] = {}
 
@@ -121,6 +122,8 @@ class Tap:
                 for number, _, payload in decoder.feed(data):
                     if number == messages.Telemetry.ID:
                         self.said.append((time_s, seed, messages.Telemetry.unpack(payload)))
+                    elif number == messages.Event.ID:
+                        self.events.append((seed, messages.Event.unpack(payload)))
 
 
 @contextlib.contextmanager
@@ -161,6 +164,11 @@ class Seen:
         for time_s, seed, telemetry in tap.said:
             clocks[seed] = min(clocks.get(seed, math.inf), time_s - telemetry.time * 1e-6)
         self.said = [(clocks[seed] + telemetry.time * 1e-6, seed, telemetry) for _, seed, telemetry in tap.said]
+        self.outlived = [  # when set-points in force have outlived themselves
+            clocks[seed] + event.time * 1e-6
+            for seed, event in tap.events
+            if event.kind == messages.EventKind.DEAD_MAN and seed in clocks
+        ]
 
     def cuts(self) -> list[tuple[float, float]]:
         """When telemetry may be missing: spans, in order, none touches another."""
@@ -220,7 +228,7 @@ def telemetry_is_back(seen: Seen) -> None:
 def arming_follows_its_rule(seen: Seen) -> None:
     arms = [(s, seed, message) for s, seed, message in seen.sent if isinstance(message, messages.Arm)]
     stops = [(s, seed) for s, seed, message in seen.sent if isinstance(message, messages.Stop)]
-    enabled = []
+    enabled = list(seen.outlived)  # until then, also where that began and ended between two telemetries
     was_low = False
     for at_s, seed, telemetry in seen.said:
         is_low = bool(telemetry.status & messages.Status.SUPPLY_LOW)

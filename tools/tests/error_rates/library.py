@@ -16,6 +16,8 @@ from typing import Any
 
 import cffi
 
+from tools.tests.planted import changed_text
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 FIRMWARE = ROOT / "firmware" / "src"
@@ -36,20 +38,6 @@ ABLATIONS = {
     "delimiter": {"  decoder->count = 0;\n  decoder->begins": "  decoder->begins"},
     "leading delimiter": {},
 }
-
-
-def frame_source(without: str) -> str:
-    """The text of frame.c, if wanted without one of its protections.
-
-    Raises:
-        ValueError: frame.c does not hold what is to be replaced.
-    """
-    text = (FIRMWARE / "link" / "frame.c").read_text(encoding="utf-8")
-    for before, after in ABLATIONS[without].items() if without else ():
-        if text.count(before) != 1:
-            raise ValueError(f"without {without}: frame.c does not hold {before!r} once; correct ABLATIONS")
-        text = text.replace(before, after)
-    return text
 
 
 @cache
@@ -78,7 +66,8 @@ def library(end: str, without: str = "") -> Any:
     folder = BUILT / "-".join([end, *without.split()])
     folder.mkdir(parents=True, exist_ok=True)
     frame = folder / "frame.c"
-    frame.write_text(frame_source(without), encoding="utf-8")
+    changes = ABLATIONS[without] if without else {}
+    frame.write_text(changed_text(FIRMWARE / "link" / "frame.c", changes), encoding="utf-8")
     leading = ["-DCHANNEL_WITHOUT_LEADING_DELIMITER"] if without == "leading delimiter" else []
     return ffi().dlopen(str(compiled(folder, [*ENDS[end], *leading], frame)))
 
