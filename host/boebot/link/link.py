@@ -315,7 +315,9 @@ class Link:
         """One step: sends all that is due and receives what comes, at the latest until the given time."""
         now = self._now()
         self._service(now)
-        self._receive(max(min(until, self._due) - now, _SHORTEST_S), 0.0)
+        until = min(until, self._due)
+        # NEVER: what was waited for is over
+        self._receive(max(until - now, _SHORTEST_S) if until < NEVER else 0.0, 0.0)
 
     def _service(self, now: float) -> None:
         """Sends all that is due by now, and notes when something is next."""

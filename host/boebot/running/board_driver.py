@@ -286,7 +286,12 @@ class BoardDriver(Driver):
                 )
             now_s, took_s = link.polled_s, 0.0
             if link.counts.sessions != self._session:
-                received = self._in_new_session(received)
+                try:
+                    received = self._in_new_session(received)
+                except BoardError:
+                    if bad is not None and bad.is_killed:  # in the midst of it
+                        break
+                    raise
                 equipment = self.equipment
                 now_s = transport.now()
             awake_s = host_clock()

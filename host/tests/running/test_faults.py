@@ -129,6 +129,15 @@ def test_motors_stop_where_no_host_speaks(fault: str) -> None:
         assert result.sessions_lost == ("slow" not in fault)
 
 
+def test_a_host_may_be_killed_while_it_makes_the_board_ready_again() -> None:
+    """On boebot, whose parameters are then under way."""
+    result = boebot.run(
+        straight, "boebot", on="native", seconds=6.0, faults=["board.reset=external@0.351", "host.killed@0.401"]
+    )
+    assert result.error is None and result.run_time < 0.5
+    assert min(result.faults.values()) > 0 and still_from(result, 1.0)
+
+
 @pytest.mark.parametrize("volts", [2.5, 4.0])
 def test_a_brown_out_that_lasts_fires_as_it_begins(volts: float, tmp_path: Path) -> None:
     program = compiled("int main(void) { for (;;) ; }", tmp_path / "waits.elf")
