@@ -17,7 +17,7 @@ import threading
 import time as wall
 from collections.abc import Callable
 from numbers import Real
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, NamedTuple
 
 from boebot import brains, slips
@@ -160,9 +160,7 @@ class StepWatch:
         self._watcher.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._leave()
         self._ended.set()
         self._watcher.join()
