@@ -28,7 +28,7 @@ from boebot.running.hands import Repeated
 from boebot.running.loop import Progress, execute
 from boebot.running.replayed import EXPECTED
 from boebot.running.sources import arena_file, brain_files, write_copies
-from boebot.running.tasks import Member, Request
+from boebot.running.tasks import AS_ASKED, Member, Request
 
 BEYOND_S = 1.0  # by which the repetition of a record that is cut is longer than it
 _OUTSIDE = ("inputs", "line_in", "line_out")  # streams that records of before do not have
@@ -207,16 +207,9 @@ def _request(run: Recorded, brains: Mapping[str, str], folder: Path) -> Request:
     return Request(
         members=members,
         arena=_arena(run, folder),
-        on=asked["on"],
         seconds=seconds,
-        seed=asked["seed"],
         step_timeout=None if all(result.program for result in run.results) else math.inf,
-        force_timing=asked["force_timing"],
-        pins=asked.get("pins", False),
-        notes=asked.get("notes", False),
-        strict=asked.get("strict", False),
-        expect_text=asked.get("expect_text", ""),
-        fail_text=asked.get("fail_text", ""),
+        **{name: asked[name] for name in AS_ASKED if name in asked},
     )
 
 

@@ -28,6 +28,8 @@ from boebot.running.faults import AT_A_PORT, read
 DEFAULT_ROBOT = "shieldbot"
 DEFAULT_PERIOD = 0.05  # s
 PROGRAM_BOARD = "avr"  # the only emulated one that runs any program
+AS_ASKED = ("on", "seed", "realtime", "force_timing", "pins", "notes", "strict", "expect_text", "fail_text")
+"""Of a request, what its record says as it is"""
 _OF_ONE = {"pose", "period", "without", "parameters", "imperfections"}
 
 
@@ -176,15 +178,8 @@ class Request(_NamesFiles):
         those of its robots."""
         return {
             "arena": None if tasks[0].board.arena is None else Path(tasks[0].board.arena).as_posix(),
-            "on": self.on,
             "seconds": self.seconds if math.isfinite(self.seconds) else None,
-            "seed": self.seed,
-            "realtime": self.realtime,
-            "force_timing": self.force_timing,
-            "pins": self.pins,
-            "expect_text": self.expect_text,
-            "fail_text": self.fail_text,
-            **{name: True for name in ("notes", "strict") if getattr(self, name)},
+            **{name: getattr(self, name) for name in AS_ASKED},
             "members": [
                 {
                     "brain": _brain_file(task.brain),
