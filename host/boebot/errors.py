@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
 LONGEST_NAME = 100  # that is compared with known ones; no name of the kit's is longer
@@ -32,6 +32,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     by_words = {_words(other): other for other in known}
     near = get_close_matches(_words(name), by_words, n=1, cutoff=0.7) if len(name) <= LONGEST_NAME else []
     return f"; did you mean {by_words[near[0]]!r}?" if near else ""
+
+
+def expected_one(name: str, known: Collection[str]) -> str:
+    """The end of a sentence about an unknown name: all known ones, and which of them may be meant."""
+    return f"expected one of {', '.join(known)}{did_you_mean(name, known)}"
 
 
 def _words(name: str) -> str:

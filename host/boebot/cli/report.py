@@ -10,7 +10,7 @@ import typer
 
 from boebot.cli import ending, options, output
 from boebot.cli.ending import detail
-from boebot.errors import did_you_mean
+from boebot.errors import expected_one
 from boebot.guests import FORMATS, guests
 from boebot.record.reading import CutError, mend
 from boebot.record.run import Run
@@ -63,8 +63,7 @@ def report(
     """
     for name in formats or []:
         if name not in _KINDS:
-            expected = f"one of {', '.join(_KINDS)}"
-            raise typer.BadParameter(f"there is no format {name!r}; expected {expected}{did_you_mean(name, _KINDS)}")
+            raise typer.BadParameter(f"there is no format {name!r}; {expected_one(name, _KINDS)}")
     if not plot and (columns or robot is not None or out is not None):
         raise typer.BadParameter("COLUMN, --robot and --out go with --plot")
     wanted = detail(json=json, verbose=verbose, quiet=quiet)

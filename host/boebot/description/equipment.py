@@ -12,7 +12,7 @@ from boebot.devices.device import Place, Reader, kinds
 from boebot.devices.latest import MESSAGE_TICKS
 from boebot.devices.led import BOARD_LED_PIN, Led
 from boebot.devices.readings import Layout
-from boebot.errors import BoebotError, BrainError, did_you_mean
+from boebot.errors import BoebotError, BrainError, did_you_mean, expected_one
 
 if TYPE_CHECKING:
     from boebot.description.robots import RobotDescription
@@ -78,8 +78,7 @@ class Equipment:
                 continue
             if need not in groups() and need not in usual_names():
                 known = list(dict.fromkeys((*groups(), *usual_names(), *self.readers)))
-                expected = f"expected one of {', '.join(known)}{did_you_mean(need, known)}"
-                raise BrainError(f"a brain cannot need {need!r}; {expected}")
+                raise BrainError(f"a brain cannot need {need!r}; {expected_one(need, known)}")
             lacking += [name for name in groups().get(need, (need,)) if name not in self.readers]
         return lacking
 
@@ -118,7 +117,7 @@ def check_setting(robot: RobotDescription, name: str, value: float) -> None:
     """Raises BoebotError where no person can work that device of the robot so: see `Device.CONTROL`."""
     there = [other for other, device in robot.device.items() if device.on and device.CONTROL]
     if name not in there:
-        expected = f"expected one of {', '.join(there)}{did_you_mean(name, there)}" if there else "it has none"
+        expected = expected_one(name, there) if there else "it has none"
         raise BoebotError(f"{name} of robot {robot.name!r} is no button, switch or knob; {expected}")
     is_slider = robot.device[name].CONTROL == "slider"
     if not (0 <= value <= 1 if is_slider else value in (0, 1)):

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 import msgspec
 
 from boebot import resources
-from boebot.errors import BoebotError, did_you_mean, printable
+from boebot.errors import BoebotError, did_you_mean, expected_one, printable
 
 _T = TypeVar("_T")
 
@@ -271,8 +271,7 @@ def _fault(value: Any, kind: Any, key: str) -> Fault | None:
     choices = _choices(kind)
     if choices and value not in choices:
         known = [str(choice) for choice in choices]
-        hint = did_you_mean(str(value), known)
-        return Fault(key, f"{key} is {reprlib.repr(value)}; expected one of {', '.join(known)}{hint}")
+        return Fault(key, f"{key} is {reprlib.repr(value)}; {expected_one(str(value), known)}")
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError as cause:

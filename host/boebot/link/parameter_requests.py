@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from boebot.errors import BoebotError, did_you_mean
+from boebot.errors import BoebotError, expected_one
 from boebot.link import finding, messages
 from boebot.link.delivery import REQUEST_LIMIT_S, SAVE_LIMIT_S, RequestKind, check
 from boebot.link.line import Line
@@ -22,10 +22,7 @@ def parameter_spec(name: str) -> messages.ParameterSpec:
     """
     spec = messages.PARAMETERS.get(name)
     if spec is None:
-        raise BoebotError(
-            f"there is no parameter {name!r}; expected one of {', '.join(messages.PARAMETERS)}"
-            + did_you_mean(name, messages.PARAMETERS)
-        )
+        raise BoebotError(f"there is no parameter {name!r}; {expected_one(name, messages.PARAMETERS)}")
     return spec
 
 
