@@ -88,6 +88,9 @@ def read(what: str | Fault, robot: RobotDescription) -> Fault:
     try:
         if not sign:
             raise BoebotError("it says no time")
+        takes_none = kind.default is None and not kind.words
+        if equals and (takes_none or not value):
+            raise BoebotError(f"{name} takes no value" if takes_none else "there is no value behind its =")
         given = None if not equals else value if kind.words else parse(value, kind.unit)
         fault = Fault(name, given, parse(start, "s"), parse(end, "s") if dots else None)
     except BoebotError as error:

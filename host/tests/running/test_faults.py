@@ -62,6 +62,8 @@ def test_read(text: str, fault: Fault) -> None:
         ("serial.dropped=nan@3", "its value is nan; expected 0 to 1"),
         ("serial.delayed=3V@3", "'3V' is no time"),
         ("cable.out=1@3", "cable.out takes no value"),
+        ("cable.out=@3", "cable.out takes no value"),
+        ("serial.delayed=@3", "there is no value behind its ="),
         ("board.reset=power@3", "'power' is none of external, watchdog"),
         ("board.reset@3..4", "board.reset happens at one time; expected no END"),
         ("cable.out@3..2", "ends at 2 s; expected a finite time later than its begin"),
