@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any, Final, Literal
@@ -22,7 +22,7 @@ from boebot.brains import LoadedBrain
 from boebot.errors import BrainError, RobotError
 from sim_bridge.compiled import ffi, lib
 from sim_bridge.vehicle import VehicleModel
-from sim_bridge.vehicles import worlds
+from sim_bridge.vehicles import ENDS, worlds
 from sim_bridge.vehicles.brains import Brains
 from sim_bridge.vehicles.compiled_brain import WANDER, CompiledBrain
 
@@ -81,6 +81,7 @@ class Batch:
         self.readings.flags.writeable = False
         self._seeds: list[int] = keys.tolist()
         self._brains: Brains | None = None
+        self._coasts = np.zeros(self.count, dtype=np.bool_)
         self._closed = False
         self._pool: ThreadPoolExecutor | None = None
         self._open_pool()
@@ -155,34 +156,54 @@ class Batch:
 
     # ---- steps -------------------------------------------------------------------------------------------------------
 
-    def step(self, signals: ArrayLike, steps: int = 1) -> Floats:
-        """`steps` steps under motor signals of shape (N, 2), left and right. Returns the readings.
+    def step(self, signals: ArrayLike, steps: int = 1, *, coasts: ArrayLike = False) -> Floats:
+        """`steps` steps under motor signals of shape (N, 2), left and right. Returns the readings. Where `coasts` is
+        true, for all or each world (N,), the servos of a robot with a board get no pulses, and its wheels turn freely.
 
         Ctrl-C ends it soon, after some of the steps; the batch goes on from there.
 
         Raises:
             BrainError: a signal is not finite, and then no world has moved.
-            RobotError: the shape does not fit, or it is closed.
+            RobotError: the shape does not fit, it is closed, or a robot without a board shall coast.
         """
         given = np.ascontiguousarray(_floats("batch: signals", signals, BrainError, f"({self.count}, 2)"))
         if given.shape != (self.count, 2):
             raise RobotError(f"batch: signals {given.shape}; expected shape ({self.count}, 2)")
         if not np.isfinite(given).all():
             raise BrainError("batch: a motor signal is not a finite number; expected numbers in [-1, 1]")
+        self._coast(_array("batch: coasts", coasts, RobotError, f"({self.count},)"))
         pointer = ffi.from_buffer("double[]", given)
         self._advance(
             lambda first, count, some: lib.vehicles_step(self.handle, first, count, pointer + 2 * first, some), steps
         )
         return self.readings
 
-    def run(self, brain: object, steps: int, *, period: float | None = None) -> Floats:
+    def _coast(self, coasts: NDArray[Any]) -> None:
+        if coasts.dtype != np.bool_ or coasts.shape not in ((), (self.count,)):
+            shown = arguments.shown(coasts.tolist())
+            raise RobotError(f"batch: coasts are {shown}; expected True or False, or {self.count} of them")
+        if self.model.unit is None and coasts.any():
+            raise RobotError("batch: coasts is True, but only servos at a board get no pulses; expected signals of 0")
+        for index in np.flatnonzero(coasts != self._coasts).tolist():
+            lib.vehicles_coast(self.handle, index, not self._coasts[index])
+        self._coasts = np.broadcast_to(coasts, (self.count,))
+
+    def run(
+        self,
+        brain: object,
+        steps: int,
+        *,
+        period: float | None = None,
+        parameters: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+    ) -> Floats:
         """`steps` steps with a brain. Returns the readings.
 
         A `CompiledBrain` is asked in each step; its memory in each world is at `state`. Any other brain is one as
-        `boebot.run` takes it: a name, a file, `step(robot)`, a class, an object. Each world has its own, in `brains`
-        (an object is copied), and its own robot, with the world's seed. They are asked every `period` seconds (None: as
-        the brain says, or 0.05), from the first step on; with the brain of the run before they go on. Ctrl-C ends it
-        soon, after some of the steps.
+        `boebot.run` takes it: a name, a file, `step(robot)`, a class, an object; or a list of N of them. Each world has
+        its own, in `brains` (an object is copied), and its own robot, with the world's seed. `parameters` of brains of
+        processes are as of `boebot.run`, for all or a list of N. They are asked every `period` seconds (None: as the
+        brain says, or 0.05), from the first step on; with the brain of the run before they go on. Ctrl-C ends it soon,
+        after some of the steps.
 
         Raises:
             BrainError: the model or the memory is not what the brain needs, and then no world has moved; or the brain
@@ -193,9 +214,10 @@ class Batch:
         if isinstance(brain, ffi.CData):
             raise BrainError(f"batch: brain is {arguments.shown(brain)}; expected a CompiledBrain of it")
         if not isinstance(brain, CompiledBrain):
-            return self._run_python(brain, steps, period)
-        if period is not None:
-            raise BrainError("batch: a compiled brain is asked in each step; expected no period")
+            return self._run_python(brain, steps, period, parameters)
+        if period is not None or parameters is not None:
+            raise BrainError("batch: a compiled brain is asked in each step; expected no period and no parameters")
+        self._coast(np.array(False))
         brain.check("batch", self.model, self.state_bytes)
         well = self._advance(
             lambda first, count, some: int(lib.vehicles_run(self.handle, first, count, brain.function, some)), steps
@@ -208,15 +230,16 @@ class Batch:
             )
         return self.readings
 
-    def _run_python(self, brain: object, steps: int, period: float | None) -> Floats:
+    def _run_python(self, brain: object, steps: int, period: float | None, parameters: Any) -> Floats:
         left = arguments.whole("batch: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
-        if self._brains is None or self._brains.made_of != (brain, period):
-            self._brains = Brains(brain, self.model, self._seeds, period)
+        if self._brains is None or self._brains.made_of != (brain, period, parameters):
+            self._brains = Brains(brain, self.model, self._seeds, period, parameters)
         while left > 0:
             runs = (self.flags == lib.VEHICLE_RUNS).tolist()
             signals = self._brains.step(self.steps.tolist(), self.readings.tolist(), runs)
-            self.step(signals, min(left, self._brains.period_ticks))
-            left -= min(left, self._brains.period_ticks)
+            few = min(left, self._brains.period_steps)
+            self.step(signals, few, coasts=self._brains.coasts)
+            left -= few
         return self.readings
 
     @property
@@ -269,6 +292,18 @@ class Batch:
     def steps(self) -> NDArray[np.uint64]:
         """Shape (N,): steps done by each world."""
         return self._of_all("state", "step", kind=np.uint64)[:, 0]
+
+    def figures(self) -> dict[str, NDArray[Any]]:
+        """What came of each world so far, shape (N,), under the names that `Run.table()` has for it."""
+        distance = self._of_all("body", "state", "distance", kind=np.float64)[:, 0]
+        contacts = self._of_all("state", "contacts", kind=np.uint64)[:, 0]
+        return {
+            "seed": np.array(self._seeds),
+            "run_time_s": np.round(self.steps * self.model.dt, 3),
+            "true_distance_m": np.round(distance, 3),
+            "true_contacts": contacts.astype(np.int64),
+            "ended": np.array([ENDS[flag] or "complete" for flag in self.flags.tolist()]),
+        }
 
     def _of_all(self, *place: str, kind: type[Any], numbers: int = 1) -> NDArray[Any]:
         """A field of C struct vehicle, of each world: a copy of shape (N, numbers)."""

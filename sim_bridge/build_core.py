@@ -32,7 +32,7 @@ double body_wheel_hold(const body *self, double dt);
 int body_segment_touches(body *self, const scene *around, double x0, double y0, double x1, double y1,
                          double height);
 typedef struct { size_t obstacles; mover *movers; ...; } world;
-typedef struct { uint64_t step; int32_t flag; double energy; ...; } vehicle_state;
+typedef struct { uint64_t step; int32_t flag; double energy; uint64_t contacts; ...; } vehicle_state;
 typedef struct { world own; body body; vehicle_state state; ...; } vehicle;
 struct vehicle_model { size_t readings; int drive, has_battery, noise, ends_at_collision; ...; };
 struct vehicles {

@@ -81,6 +81,8 @@ class Model(Protocol):
     """What a device is added to: `VehicleModel`."""
 
     robot: RobotDescription | None
+    draw: Draw
+    """magnitudes of its imperfections, nominal"""
 
     def sensor(self, kind: str, name: str, /, **parameters: Any) -> None:
         """Adds a sensor."""
@@ -108,7 +110,7 @@ def joined(*kinds: type) -> Callable[[Function], Function]:
 
 
 def modelled(*kinds: type) -> Callable[[Function], Function]:
-    """Marks what adds such a device to a robot without a board: `function(device, name, model)`."""
+    """Marks what adds such a device to a robot in a world without boards: `function(device, name, model)`."""
 
     def mark(function: Function) -> Function:
         _MODELLED.update(dict.fromkeys(kinds, function))
@@ -136,8 +138,13 @@ def part_of(device: object, at: At) -> Part | None:
     return part
 
 
+def has_part(device: object) -> bool:
+    """Whether such a device has a part at a board."""
+    return _function(_JOINED, device) is not None
+
+
 def add_to(model: Model, name: str, device: object) -> bool:
-    """Adds the device to the model of a robot without a board; False: there is none for it."""
+    """Adds the device to the model of a robot in a world without boards; False: there is none for it."""
     function = _function(_MODELLED, device)
     if function is not None:
         function(device, name, model)

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from boebot.devices.encoder import QuadratureEncoder, SingleEncoder
+from boebot.devices.encoder import QuadratureEncoder, SingleEncoder, WheelEncoder
 from sim_bridge.compiled import ffi
-from sim_bridge.devices.catalogue import At, Part, joined
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
+from sim_bridge.vehicles.checked_structs import POSITIVE, SHARE, SWITCH
 
 NO_PIN = 255
+
+WHEEL_ENCODER = SensorKind(
+    "wheel_encoder",
+    {"edges_per_turn": POSITIVE, "missed": SHARE, "right": SWITCH, "directed": SWITCH},
+    has_period=False,
+)
 
 
 @joined(SingleEncoder)
@@ -23,6 +30,19 @@ def quadrature(device: QuadratureEncoder, at: At) -> Part:
     """Two channels."""
     parameters = encoder_parameters(device.edges_per_turn, at.draw)
     return Part("encoder_kind", at.side, [device.pin_a, device.pin_b], parameters)
+
+
+@modelled(SingleEncoder, QuadratureEncoder)
+def wheel_encoder(device: WheelEncoder, name: str, model: Model) -> None:
+    """Edges counted, and the time between the last two, as the firmware reports them; of two channels all are seen."""
+    model.sensor(
+        "wheel_encoder",
+        name,
+        edges_per_turn=device.edges_per_turn,
+        missed=model.draw["encoder_missed"] if device.LINES == 1 else 0.0,
+        right=int(name.endswith("right")),
+        directed=int(device.LINES > 1),
+    )
 
 
 def encoder_parameters(edges_per_turn: int, draw: Draw = AS_BUILT) -> Any:

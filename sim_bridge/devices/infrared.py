@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from boebot.devices.infrared import InfraredPair, InfraredProximity
+from boebot.devices.infrared import InfraredPair, InfraredProximity, schedule_of
+from boebot.running.driver import TICK_S
 from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, beam_of, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
-from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SWITCH
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, SWITCH, values_of
 
 INFRARED_PROXIMITY = SensorKind(
     "infrared_proximity",
     {"range": POSITIVE, "reflectance": SWITCH} | dict.fromkeys(("c1", "c2", "sigma"), NOT_NEGATIVE),
+    reach="range",
+)
+INFRARED_PAIR = SensorKind(
+    "infrared_pair",
+    dict.fromkeys(("range", "range_sigma", "direct"), NOT_NEGATIVE) | {"false_hit": SHARE},
     reach="range",
 )
 
@@ -37,6 +43,14 @@ def proximity(device: InfraredProximity, name: str, model: Model) -> None:
         c2=device.c2,
         sigma=device.sigma,
     )
+
+
+@modelled(InfraredPair)
+def pair(device: InfraredPair, name: str, model: Model) -> None:
+    """Seen or not."""
+    assert model.robot is not None
+    period_s = schedule_of(model.robot.device).period_ticks * TICK_S
+    model.sensor("infrared_pair", name, period=period_s, **values_of(infrared_parameters(device, model.draw)))
 
 
 def infrared_parameters(pair: InfraredPair, draw: Draw = AS_BUILT) -> Any:

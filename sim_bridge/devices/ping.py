@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from boebot.devices.ping import PingSensor, RangeFinder, Sonar
+from boebot.running.driver import TICK_S
 from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, beam_of, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
-from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, SWITCH, Range
+from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, SHARE, SWITCH, Range, values_of
 
 
 def _ranges(values: Mapping[str, Any]) -> str:
@@ -26,6 +28,9 @@ SONAR = SensorKind(
     reach="range_maximum",
     nothing=None,
 )
+
+
+PING = replace(SONAR, name="ping")
 
 
 @joined(PingSensor)
@@ -47,6 +52,12 @@ def sonar(device: Sonar, name: str, model: Model) -> None:
         sigma=device.sigma,
         miss=device.miss,
     )
+
+
+@modelled(PingSensor)
+def echo(device: PingSensor, name: str, model: Model) -> None:
+    """The length of its echo pulse."""
+    model.sensor("ping", name, period=device.period_ticks * TICK_S, **values_of(ping_parameters(device, model.draw)))
 
 
 def ping_parameters(ping: PingSensor, draw: Draw = AS_BUILT) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from boebot.devices.whisker import TouchWhisker, WhiskerSwitch
+from boebot.devices.whisker import BentWire, TouchWhisker, WhiskerSwitch
 from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
@@ -25,8 +25,8 @@ def part(device: WhiskerSwitch, at: At) -> Part:
     return Part("whisker_kind", at.number, [device.pin], whisker_parameters(device, at.draw))
 
 
-@modelled(TouchWhisker)
-def touch(device: TouchWhisker, name: str, model: Model) -> None:
+@modelled(TouchWhisker, WhiskerSwitch)
+def touch(device: BentWire, name: str, model: Model) -> None:
     """A segment that touches."""
     (root_x, root_y), (tip_x, tip_y) = device.root_m, device.tip_m
     model.sensor("touch", name, root_x=root_x, root_y=root_y, tip_x=tip_x, tip_y=tip_y)

@@ -87,18 +87,13 @@ static void step(part *base) {
   const double after = wheel_angle(self) * self->edges_per_rad + self->phase;
   self->position = after;
   self->waved = c->since + PART_GUARD;
-  while (after >= (double)(self->index + 1) || after < (double)self->index) {
-    const int forward = after >= (double)(self->index + 1);
-    const double border = (double)(forward ? self->index + 1 : self->index);
-    const long long next = forward ? self->index + 1 : self->index - 1;
-    double share = (border - before) / (after - before);
-    if (!(share > 0.0)) share = 0.0;
-    if (share > 1.0) share = 1.0;
+  double share;
+  for (int way; (way = wheel_encoder_pass(before, after, &self->index, &share)) != 0;) {
+    const long long next = self->index, last = next - way;
     const uint64_t at = c->since + PART_GUARD + (uint64_t)(share * (double)c->step_cycles);
     if (base->faults != NULL) wave(self, at);
-    if (level_a(self, next) != level_a(self, self->index)) show(self, at, 0, level_a(self, next));
-    if (level_b(next) != level_b(self->index)) show(self, at, 1, level_b(next));
-    self->index = next;
+    if (level_a(self, next) != level_a(self, last)) show(self, at, 0, level_a(self, next));
+    if (level_b(next) != level_b(last)) show(self, at, 1, level_b(next));
   }
   if (base->faults != NULL) wave(self, part_step_end(base) + PART_GUARD);
 }

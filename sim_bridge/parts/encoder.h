@@ -10,6 +10,7 @@
 #ifndef PART_ENCODER_H
 #define PART_ENCODER_H
 
+#include "../world/sensors/wheel_encoder.h"
 #include "part.h"
 
 /* python: begin */

@@ -67,8 +67,8 @@ static int init_ping(part *base, const part_place *place, const uint8_t *pins, c
   self->trigger_minimum = 2u * CYCLES_PER_US;
   self->trigger_maximum = 1000u * CYCLES_PER_US;
   self->delay = 750u * CYCLES_PER_US;
-  self->shortest = 115u * CYCLES_PER_US;
-  self->nothing = 18500u * CYCLES_PER_US;
+  self->shortest = PING_SHORTEST_US * CYCLES_PER_US;
+  self->nothing = PING_NOTHING_US * CYCLES_PER_US;
   self->rest = 200u * CYCLES_PER_US;
   return init(self, place, &(part_pin){pins[0], PART_HEARS | PART_DRIVES}, 1, parameters);
 }

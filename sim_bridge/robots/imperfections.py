@@ -24,7 +24,11 @@ _DRAW = 1000  # the draws that make a robot have other device numbers
 
 class Draw:
     """Draws one robot's peculiarities: always the same ones for the same unit and device; of a robot that says no unit,
-    for the same seed, robot and device. `draw["servo_lag_s"]` is a magnitude as this robot has it."""
+    for the same seed, robot and device. `draw["servo_lag_s"]` is a magnitude as this robot has it.
+
+    Attributes:
+        used: names of the magnitudes that were asked for.
+    """
 
     def __init__(
         self,
@@ -37,6 +41,7 @@ class Draw:
         """`unit`: the robot's serial number, whose peculiarities no seed changes; 0: nominal throughout. `magnitudes`:
         those that are not as in the table."""
         self._magnitudes = magnitudes or {}
+        self.used: set[str] = set()
         self._seed, self.noise, self._robot, self._unit = seed & (2**64 - 1), noise, robot, unit
 
     def __call__(self, device: int, what: int) -> float:
@@ -51,6 +56,7 @@ class Draw:
 
     def __getitem__(self, name: str) -> float:
         """A magnitude of the table, or what this robot has in its place."""
+        self.used.add(name)
         usual = imperfections()[name].value
         assert usual is not None, "a robot's file has it"
         return self._magnitudes.get(name, usual)

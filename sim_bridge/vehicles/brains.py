@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from boebot.arguments import shown
 from boebot.brains import LoadedBrain
 from boebot.errors import BoebotError, BrainError
+from boebot.running.board_robot import BoardRobot
+from boebot.running.brain_parameters import set_parameters
 from boebot.running.direct_driver import DirectRobot
-from boebot.running.driver import whole_ticks
+from boebot.running.driver import TICK_S, whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import prepare
+from sim_bridge.compiled import lib
 from sim_bridge.vehicles.model import VehicleModel
 
 
@@ -19,33 +23,56 @@ class Brains:
     """One brain and one robot for each world.
 
     Attributes:
-        made_of: the brain and the period that they were asked for by.
+        made_of: the brain, the period and the parameters that they were asked for by.
         loaded: the brain of each world.
-        period_ticks: steps of the world from step to step of a brain.
+        coasts: whether the servos of each world get no pulses, by its last command.
+        period_steps: steps of the world from step to step of a brain.
     """
 
-    def __init__(self, source: object, model: VehicleModel, seeds: list[int], period: float | None) -> None:
-        """Brains as `boebot.run` takes them, one for each of the `seeds`.
+    def __init__(
+        self, source: object, model: VehicleModel, seeds: list[int], period: float | None, parameters: Any = None
+    ) -> None:
+        """Brains as `boebot.run` takes them, one for each of the `seeds`, or a list with one for each; parameters of
+        them by name, or a list with those of each.
 
         Raises:
-            BoebotError: it is no brain, does not fit the robot, or cannot be made several times; no such period.
+            BoebotError: it is no brain, does not fit the robot, or cannot be made several times; no such period or
+                parameter; a list of another length; brains with different periods.
         """
-        if model.robot is None:
+        robot = model.robot
+        if robot is None:
             raise BrainError("batch: brains in Python need a robot's description; expected a model of vehicle_model()")
-        self.made_of = (source, period)
-        layout = {name: where for name, where in model.names.items() if name in model.robot.device}
+        self.made_of = (source, period, copy.deepcopy(parameters))
         self.loaded: list[LoadedBrain] = []
-        self._direct: list[DirectRobot] = []
+        self.coasts = [False] * len(seeds)
+        self.period_steps = 1
+        self._direct: list[DirectRobot | BoardRobot] = []
         self._times = StepTimes()
-        for seed in seeds:
-            loaded, _, period_s = prepare(_another(source) if self.loaded else source, model.robot, period)
-            self.period_ticks = whole_ticks(period_s, model.dt)
-            self.loaded.append(loaded)
-            direct = DirectRobot(model.robot, layout, model.readings, model.dt, self.period_ticks * model.dt, seed)
-            self._direct.append(direct)
+        tick_s = TICK_S if robot.has_board else model.dt
+        self._steps_a_tick = round(tick_s / model.dt)
+        layout = {name: where for name, where in model.names.items() if name in robot.device}
 
-    def step(self, ticks: list[int], readings: list[list[float]], runs: list[bool]) -> list[tuple[float, float]]:
-        """One step of the brain of each world that `runs`, after that many ticks and with these readings there. Returns
+        def pulses(*signals: float) -> list[int]:
+            return [lib.motion_pulse_of(*one) for one in zip(model.motion_maps, signals, strict=True)]
+
+        sources, values = _each("brains", source, len(seeds)), _each("parameters", parameters, len(seeds))
+        for world, seed in enumerate(seeds):
+            loaded, _, own_s = prepare(_another(sources[world]), robot, period)
+            steps = whole_ticks(own_s, tick_s) * self._steps_a_tick
+            if self.loaded and steps != self.period_steps:
+                raise BrainError(f"batch, world {world}: its brain has another period; expected one for all")
+            self.period_steps, period_s = steps, steps * model.dt
+            if values[world] is not None:
+                _set(f"batch, world {world}", loaded, values[world])
+            self.loaded.append(loaded)
+            self._direct.append(
+                BoardRobot(robot, layout, period_s, seed, pulses)
+                if robot.has_board
+                else DirectRobot(robot, layout, model.readings, model.dt, period_s, seed)
+            )
+
+    def step(self, steps: list[int], readings: list[list[float]], runs: list[bool]) -> list[tuple[float, float]]:
+        """One step of the brain of each world that `runs`, after that many steps and with these readings there. Returns
         the motor signals.
 
         Raises:
@@ -56,13 +83,34 @@ class Brains:
             for world, direct in enumerate(self._direct):
                 if not runs[world]:
                     continue
-                direct.show(direct.sample(ticks[world], tuple(readings[world])))
+                if isinstance(direct, BoardRobot):
+                    direct.see(steps[world] // self._steps_a_tick, readings[world])
+                else:
+                    direct.show(direct.sample(steps[world], tuple(readings[world])))
                 try:
                     step_once(direct.robot, self.loaded[world], watch, self._times)
                 except BoebotError as error:
                     raise type(error)(f"batch, world {world}: {error}") from error.__cause__
                 signals[world] = direct.signals()
+                self.coasts[world] = isinstance(direct, BoardRobot) and direct.coasts
         return signals
+
+
+def _each(what: str, given: Any, count: int) -> Sequence[Any]:
+    """One for each world, of a list or of one for all."""
+    each = given if isinstance(given, list | tuple) else [given] * count
+    if len(each) != count:
+        raise BrainError(f"batch: {len(each)} {what} for {count} worlds; expected one for all, or as many")
+    return each
+
+
+def _set(who: str, brain: LoadedBrain, values: Any) -> None:
+    if not isinstance(values, Mapping):
+        raise BrainError(f"{who}: parameters are {shown(values)}; expected them by name")
+    try:
+        set_parameters(brain, values)
+    except BrainError as error:
+        raise BrainError(f"{who}: {error}") from None
 
 
 def _another(source: Any) -> Any:

@@ -58,6 +58,12 @@ void vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters
   self->servo[1] = *right;
 }
 
+void vehicle_model_board(vehicle_model *self, const motion_map *left, const motion_map *right) {
+  self->has_board = 1;
+  self->motion[0] = *left;
+  self->motion[1] = *right;
+}
+
 void vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
                                    const motor_regulated_parameters *right) {
   self->drive = DRIVE_REGULATED;

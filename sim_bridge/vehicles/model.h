@@ -16,6 +16,7 @@
 #include "../world/sensors/sensor.h"
 #include "../world/servo_motor.h"
 #include "../world/supply.h"
+#include "motion.h"
 
 /* python: begin */
 enum {
@@ -41,6 +42,9 @@ void vehicle_model_drive_servo(vehicle_model *self, const servo_motor_parameters
                                const servo_motor_parameters *right);
 void vehicle_model_drive_regulated(vehicle_model *self, const motor_regulated_parameters *left,
                                    const motor_regulated_parameters *right);
+
+/* A model with servos gets its pulses as from a board: by these maps. */
+void vehicle_model_board(vehicle_model *self, const motion_map *left, const motion_map *right);
 
 /* The notes' battery, which empties by these rates; sensors/charge.h reads it. */
 void vehicle_model_battery(vehicle_model *self, const energy_parameters *energy);
@@ -70,7 +74,9 @@ struct vehicle_model {
   double dt;
   int drive, full;
   motor_dc_parameters dc[2];
-  servo_motor_parameters servo[2];
+  servo_motor_parameters servo[2]; /* those of a world may be others */
+  int has_board;
+  motion_map motion[2]; /* if it has one */
   motor_regulated_parameters regulated[2];
   int has_battery;
   energy_parameters energy;

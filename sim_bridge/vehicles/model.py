@@ -8,7 +8,7 @@ angles in rad, SI units; motor signals in [-1, 1], left and right.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 from boebot.arguments import shown, switch
@@ -17,7 +17,7 @@ from boebot.errors import RobotError
 from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.catalogue import SensorKind, sensor_kinds
 from sim_bridge.reading_table import ReadingTable
-from sim_bridge.robots.imperfections import collision_outline
+from sim_bridge.robots.imperfections import AS_BUILT, collision_outline
 from sim_bridge.vehicles.checked_structs import NOT_NEGATIVE, POSITIVE, Range, known, number, struct, values_of
 from sim_bridge.vehicles.drives import ENERGY, dc_parameters, regulated_parameters, servo_parameters
 
@@ -60,6 +60,9 @@ class VehicleModel:
         looks: sensors with a beam by name: the beam, and how far it reaches (m).
         a: A of (2.26), 1/m.
         b: B of (2.30).
+        draw: magnitudes of the robot's imperfections, nominal.
+        unit: of a robot with a board: both servos (C structs) of the one that a seed draws; None: without a board.
+        motion_maps: and how its signals become pulses (C structs motion_map).
     """
 
     def __init__(
@@ -79,6 +82,9 @@ class VehicleModel:
         self.body = dict(body)
         self.in_use = False
         self.robot: RobotDescription | None = None
+        self.draw = AS_BUILT
+        self.unit: Callable[[int], list[Any]] | None = None
+        self.motion_maps: list[Any] = []
         self._keep: list[Any] = [given, outline]  # what the model in C points to
         handle = lib.vehicle_model_new(parameters, self.dt)
         if handle == ffi.NULL:
@@ -156,6 +162,13 @@ class VehicleModel:
             for side, changes in _sides(left, right)
         ]
         lib.vehicle_model_drive_servo(self._undriven, *servos)
+        self.check_drive()
+
+    def board_servos(self, nominal: list[Any], unit: Callable[[int], list[Any]], maps: list[Any]) -> None:
+        """The two servos of a robot with a board, left and right: see `unit` and `motion_maps`."""
+        lib.vehicle_model_drive_servo(self._undriven, *nominal)
+        lib.vehicle_model_board(self.handle, *maps)
+        self.unit, self.motion_maps = unit, maps
         self.check_drive()
 
     @property

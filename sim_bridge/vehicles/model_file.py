@@ -20,8 +20,9 @@ from boebot.devices.motor import DcMotor, Motor, RegulatedMotor
 from boebot.errors import RobotError
 from sim_bridge.devices.catalogue import add_to
 from sim_bridge.devices.motor import dc_parameters, regulated_parameters
-from sim_bridge.robots.imperfections import applied, body_numbers
+from sim_bridge.robots.imperfections import Draw, applied, body_numbers
 from sim_bridge.vehicles import STEP_S
+from sim_bridge.vehicles.board_robots import BOARD_STEP_S, join_board
 from sim_bridge.vehicles.checked_structs import FINITE, number
 from sim_bridge.vehicles.model import SIDES, VehicleModel
 
@@ -29,33 +30,40 @@ from sim_bridge.vehicles.model import SIDES, VehicleModel
 def vehicle_model(
     robot: str | Path | robots.RobotDescription,
     *,
-    dt: float = STEP_S,
+    dt: float | None = None,
     noise: bool = True,
     ends_at_collision: bool = False,
     without: Sequence[str] = (),
     imperfections: Mapping[str, float] | None = None,
 ) -> VehicleModel:
-    """The model of a robot without a board: a bundled name, a .toml file, or its description.
+    """The model of a robot: a bundled name, a .toml file, or its description. Of one with a board it is that of its
+    servos and sensors, without the board (docs/how-to/thousands-of-runs.md).
 
     Touching something does not end a run, as with `boebot run`, unless `ends_at_collision`. `without` and
-    `imperfections` as of `boebot.run`.
+    `imperfections` as of `boebot.run`. `dt`: s, of a step; None: 0.01, with a board half of its control tick.
 
     Raises:
-        RobotError: no such robot, one with a board, or a parameter outside its range.
+        RobotError: no such robot, a device that is modelled at its board only, or a parameter outside its range.
         BoardError: an imperfection is none, is out of its range, or changes nothing of this robot.
     """
     described = robot if isinstance(robot, robots.RobotDescription) else robots.load_robot(_file(robot))
-    if described.has_board:
-        raise RobotError(f"robot {described.name!r} is driven by its board; expected one with board = 'none'")
     described = applied(described, without, imperfections, noise=noise)
     body: dict[str, Any] = body_numbers(described.body)
     if described.scheme == "arsim":
         body["axis_half_track"] = body["half_track"] / 2  # as its UpdateMotorAxisAngularSpeed has it
-    body["slip"] = int(described.body.tyre_slip or 0)
+    draw = Draw(0, False, magnitudes=described.imperfections)
+    slips = described.body.tyre_slip
+    body["slip"] = int(described.has_board if slips is None else slips)
+    if described.has_board:
+        body["spin_inertia"] = draw["spin_inertia_kg_m2"]
+        dt = BOARD_STEP_S if dt is None else dt
     if described.body.outline_m:
         body["outline_m"] = described.body.outline_m
-    model = VehicleModel(body, dt=dt, noise=noise, ends_at_collision=ends_at_collision)
-    model.robot = described
+    model = VehicleModel(body, dt=STEP_S if dt is None else dt, noise=noise, ends_at_collision=ends_at_collision)
+    model.robot, model.draw = described, draw
+    if described.has_board:
+        join_board(model, described, noise=noise)
+        return model
     _drive(model, described)
     for name, device in described.device.items():
         if device.on and not isinstance(device, Motor) and not add_to(model, name, device):

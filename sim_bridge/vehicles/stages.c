@@ -6,6 +6,7 @@
 #include "vehicle.h"
 
 #define SERVO_PERIOD_S 0.020
+#define CONTACT_GAP_S 0.1 /* touches nearer in time are one contact */
 
 int vehicles_send(vehicles *self, size_t i, double left, double right) {
   if (!isfinite(left) || !isfinite(right)) return VEHICLE_BAD_NUMBER;
@@ -18,6 +19,13 @@ int vehicles_send(vehicles *self, size_t i, double left, double right) {
 static double dc_torque(const motor_dc_parameters *motor, double signal, double speed, double hold) {
   const double volts = signal * motor->voltage_maximum; /* V = s V_max: a signal that was sent is limited */
   return motor_dc_geared(motor, motor_dc_current(motor, volts, speed), speed, motor_dc_stopping(motor, hold));
+}
+
+/* Pulse of a motor signal: by the board's map, or by the notes'. */
+static double pulse_of(const vehicle *w, int side) {
+  const vehicle_model *m = w->all->model;
+  if (m->has_board) return motion_pulse_of(&m->motion[side], w->state.signals[side]) / MOTION_COUNTS_PER_US;
+  return servo_motor_pulse_of(&w->servo[side], w->state.signals[side]);
 }
 
 /* Torques of both wheels for the next step. */
@@ -43,8 +51,8 @@ static void torques(const vehicle_model *m, vehicle *w, double out[2]) {
   }
   const int pulse = s->step >= s->next_pulse;
   for (int side = 0; side < 2; side++) {
-    const servo_motor_parameters *servo = &m->servo[side];
-    if (pulse) servo_motor_pulse(servo, &s->servos[side], servo_motor_pulse_of(servo, s->signals[side]));
+    const servo_motor_parameters *servo = &w->servo[side];
+    if (pulse && !s->coasts) servo_motor_pulse(servo, &s->servos[side], pulse_of(w, side));
     out[side] = servo_motor_torque(servo, &s->servos[side], rims[side], 1.0);
   }
   if (pulse) s->next_pulse = s->step + (m->dt < SERVO_PERIOD_S ? (uint64_t)(SERVO_PERIOD_S / m->dt + 0.5) : 1u);
@@ -78,13 +86,19 @@ void vehicles_move(vehicles *self, size_t i) { world_move(&self->worlds[i].own);
 
 void vehicles_update_arena(vehicles *self, size_t i) { world_update(&self->worlds[i].own); }
 
+static void count_contact(vehicle_state *s, double dt) {
+  if (s->contacts == 0 || s->step - s->touched > (uint64_t)(CONTACT_GAP_S / dt + 0.5)) s->contacts++;
+  s->touched = s->step;
+}
+
 int vehicles_check(vehicles *self, size_t i) {
   const vehicle_model *m = self->model;
   vehicle_state *s = &self->worlds[i].state;
   const body_state *b = &self->worlds[i].body.state;
+  if (b->touching) count_contact(s, m->dt);
   const int at_charger = m->has_battery && arena_is_at_charger(self->worlds[i].in->arena, b->x, b->y);
   if (m->has_battery) s->energy = energy_step(&m->energy, s->energy, s->signals[0], s->signals[1], at_charger, m->dt);
-  if (m->ends_at_collision && self->worlds[i].body.state.touching) {
+  if (m->ends_at_collision && b->touching) {
     s->flag = VEHICLE_COLLIDED;
   } else if (m->has_battery && s->energy <= 0.0) {
     s->flag = VEHICLE_EXHAUSTED;

@@ -37,6 +37,7 @@ uint64_t vehicles_hash(const vehicles *self, size_t i) {
   uint64_t sum = 0;
   hash_body(&sum, &w->body.state);
   hash_state(&sum, &w->state);
+  if (m->has_board) whole(&sum, (uint64_t)w->state.coasts);
   for (size_t k = 0; k < w->own.obstacles; k++) { /* where a moving shape is follows from time and waiting */
     NUMBERS(&sum, w->own.movers[k].waited);
     whole(&sum, (uint64_t)w->own.movers[k].waits);

@@ -36,6 +36,13 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
  * without slip. */
 void vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate);
 
+/* Vehicle `i`, placed and not yet moved, has these servos: its own unit, in place of those of the model. */
+void vehicles_set_servos(vehicles *self, size_t i, const servo_motor_parameters *left,
+                         const servo_motor_parameters *right);
+
+/* From here on the servos of vehicle `i` get no pulses and let go (1), or get them again (0). */
+void vehicles_coast(vehicles *self, size_t i, int coasts);
+
 /* `steps` steps of worlds first ... first + count - 1 with motor signals (count, 2) that hold throughout. A world whose
  * run has ended stays as it is. Signals are finite, worlds are placed. Different threads may step different worlds. */
 void vehicles_step(vehicles *self, size_t first, size_t count, const double *signals, size_t steps);
@@ -85,14 +92,18 @@ typedef struct {
   double acceleration;
   double energy;
   uint64_t next_pulse; /* step of the servos' next pulse */
+  int32_t coasts;      /* they get none */
+  uint64_t contacts;   /* touches begun, apart by 0.1 s at least */
+  uint64_t touched;    /* the last step that touched */
   servo_motor servos[2];
 } vehicle_state;
 
 typedef struct {
   vehicles *all;
-  const world *in;     /* the world that it is in; NULL: none yet */
-  world own;           /* its own, if that is it: with this vehicle alone */
-  world_robot member;  /* of it */
+  const world *in;    /* the world that it is in; NULL: none yet */
+  world own;          /* its own, if that is it: with this vehicle alone */
+  world_robot member; /* of it */
+  servo_motor_parameters servo[2];
   double hold;         /* of the DC motors' friction, see motor_dc.h */
   double speed_before; /* when the step under way began, m/s */
   body body;

@@ -80,12 +80,21 @@ int vehicles_place(vehicles *self, size_t i, const arena *where, uint64_t seed, 
   w->body.id = id;
   w->hold = body_wheel_hold(&w->body, m->dt);
   body_place(&w->body, x, y, heading);
-  for (int side = 0; side < 2 && m->drive == DRIVE_SERVO; side++)
-    servo_motor_init(&m->servo[side], &w->state.servos[side], m->dt);
+  if (m->drive == DRIVE_SERVO) vehicles_set_servos(self, i, &m->servo[0], &m->servo[1]);
   vehicle_sensors_start(self, i);
   vehicles_sense(self, i);
   return VEHICLE_OK;
 }
+
+void vehicles_set_servos(vehicles *self, size_t i, const servo_motor_parameters *left,
+                         const servo_motor_parameters *right) {
+  vehicle *w = &self->worlds[i];
+  w->servo[0] = *left;
+  w->servo[1] = *right;
+  for (int side = 0; side < 2; side++) servo_motor_init(&w->servo[side], &w->state.servos[side], self->model->dt);
+}
+
+void vehicles_coast(vehicles *self, size_t i, int coasts) { self->worlds[i].state.coasts = coasts; }
 
 void vehicles_set_speeds(vehicles *self, size_t i, double speed, double turn_rate) {
   body *b = &self->worlds[i].body;

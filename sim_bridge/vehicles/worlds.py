@@ -68,5 +68,7 @@ def place(
         )
     if status == lib.VEHICLE_NO_MEMORY:
         raise MemoryError(f"{who}: no memory for the world's moving shapes or laser")
+    if not status and model.unit is not None:
+        lib.vehicles_set_servos(handle, index, *model.unit(key))
     if status:
         raise RobotError(f"{who}: cannot start at {pose}; expected a pose near the arena")

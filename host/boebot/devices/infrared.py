@@ -126,7 +126,7 @@ class InfraredPair(InfraredBeam, Device, tag="infrared_pair", frozen=True, kw_on
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""
-        schedule, bit, tick_s = _schedule(place.devices), _bit(place), place.tick_s
+        schedule, bit, tick_s = schedule_of(place.devices), _bit(place), place.tick_s
         fresh = min(STALE_PERIODS * schedule.period_ticks, NEVER - 1)
 
         def read(sample: Telemetry, _: Latest) -> Infrared:
@@ -149,7 +149,7 @@ class InfraredPair(InfraredBeam, Device, tag="infrared_pair", frozen=True, kw_on
 
     def has_messages(self, devices: Mapping[str, Device]) -> bool:
         """The zones."""
-        return _schedule(devices).sweep
+        return schedule_of(devices).sweep
 
     def columns(self, place: Place, run: Run) -> list[Column]:
         """Detected or not, the age, and the zone of a robot that sweeps."""
@@ -158,7 +158,7 @@ class InfraredPair(InfraredBeam, Device, tag="infrared_pair", frozen=True, kw_on
             Column("detected", "", (run.raw["infrared"] & _bit(place)) != 0, None),
             Column("age", "s", np.where(age < NEVER, age * place.tick_s, np.nan), 3),
         ]
-        if _schedule(place.devices).sweep:
+        if schedule_of(place.devices).sweep:
             messages, newest, _ = run.held(DevicesTelemetry)
             field = _zone_field(place)
             zones = [message[field] if message.infrared_zone_age < NEVER else np.nan for message in messages]
@@ -181,7 +181,8 @@ class InfraredSchedule(Device, tag="infrared_schedule", frozen=True, kw_only=Tru
     NAMES: ClassVar[tuple[str, ...]] = ("infrared",)
 
 
-def _schedule(devices: Mapping[str, Device]) -> InfraredSchedule:
+def schedule_of(devices: Mapping[str, Device]) -> InfraredSchedule:
+    """How often the pairs among these devices are read."""
     found = devices.get("infrared")
     return found if isinstance(found, InfraredSchedule) and found.on else InfraredSchedule()
 

@@ -79,3 +79,13 @@ int infrared_pair_sees_burst(const infrared_pair *self, const viewpoint *from, c
   /* The sender's own body may be met on the last bit of the way to its LED. */
   return free_way < 0.0 || (hit.shape < 0 && from->around->movers[-1 - hit.shape].id == burst->id);
 }
+
+/* ---- of a robot whose board is left out --------------------------------------------------------------------------- */
+
+static size_t make(void *self, const void *parameters) { return infrared_pair_init(self, parameters) == 0; }
+
+static void read(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise, double *readings) {
+  *readings = infrared_pair_look(self, &s->from, INFRARED_CARRIER_HZ, noise).seen;
+}
+
+const sensor_kind infrared_pair_sensor = {.noise = 14, .size = sizeof(infrared_pair), .make = make, .read = read};

@@ -8,7 +8,7 @@
 #ifndef SENSORS_INFRARED_PAIR_H
 #define SENSORS_INFRARED_PAIR_H
 
-#include "beam.h"
+#include "sensor.h"
 
 /* python: begin */
 typedef struct {
@@ -58,6 +58,11 @@ infrared_burst infrared_pair_burst(const infrared_pair *self, const viewpoint *f
 
 /* 1 if the receiver sees the light of another robot's burst directly (cross-talk). */
 int infrared_pair_sees_burst(const infrared_pair *self, const viewpoint *from, const infrared_burst *burst);
+
+/* Reading: 1 if a burst at the carrier of firmware/src/infrared.c is seen, else 0. */
+extern const sensor_kind infrared_pair_sensor;
 /* python: end */
+
+#define INFRARED_CARRIER_HZ (16e6 / 422.0) /* half a period is 211 cycles */
 
 #endif

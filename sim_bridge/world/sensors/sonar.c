@@ -69,3 +69,14 @@ static void read(const void *self, sensor_memory *memory, const sensing *s, nois
 }
 
 const sensor_kind sonar_sensor = {.noise = 3, .size = sizeof(sonar), .make = make, .read = read};
+
+/* ---- of a robot whose board is left out --------------------------------------------------------------------------- */
+
+static void read_echo(const void *self, sensor_memory *memory, const sensing *s, noise_source *noise,
+                      double *readings) {
+  const double distance = sonar_ping(self, &s->from, noise);
+  const double us = distance < 0.0 ? PING_NOTHING_US : floor(sonar_echo_time(self, distance) * 1e6 + 0.5);
+  *readings = fmin(fmax(us, PING_SHORTEST_US), PING_NOTHING_US);
+}
+
+const sensor_kind ping_sensor = {.noise = 15, .size = sizeof(sonar), .make = make, .read = read_echo};

@@ -44,6 +44,14 @@ double sonar_speed_of_sound(double temperature);
 double sonar_echo_time(const sonar *self, double distance);
 
 extern const sensor_kind sonar_sensor;
+
+/* A Ping))) at a board. Reading: length of its echo pulse as the firmware takes it, us. */
+typedef sonar_parameters ping_parameters;
+extern const sensor_kind ping_sensor;
 /* python: end */
+
+/* The Ping's echo pulse: not shorter than, and so long where nothing is heard (Parallax, document 28015). */
+#define PING_SHORTEST_US 115
+#define PING_NOTHING_US 18500
 
 #endif
