@@ -186,7 +186,7 @@ class Batch:
             raise RobotError("batch: coasts is True, but only servos at a board get no pulses; expected signals of 0")
         for index in np.flatnonzero(coasts != self._coasts).tolist():
             lib.vehicles_coast(self.handle, index, not self._coasts[index])
-        self._coasts = np.broadcast_to(coasts, (self.count,))
+        self._coasts[:] = coasts
 
     def run(
         self,
@@ -294,7 +294,8 @@ class Batch:
         return self._of_all("state", "step", kind=np.uint64)[:, 0]
 
     def figures(self) -> dict[str, NDArray[Any]]:
-        """What came of each world so far, shape (N,), under the names that `Run.table()` has for it."""
+        """What came of each world so far, shape (N,), under the names that `Run.table()` has for it; "ended":
+        "complete", or why it goes no further."""
         distance = self._of_all("body", "state", "distance", kind=np.float64)[:, 0]
         contacts = self._of_all("state", "contacts", kind=np.uint64)[:, 0]
         return {

@@ -8,13 +8,13 @@ from boebot.devices.encoder import QuadratureEncoder, SingleEncoder, WheelEncode
 from sim_bridge.compiled import ffi
 from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
 from sim_bridge.robots.imperfections import AS_BUILT, Draw
-from sim_bridge.vehicles.checked_structs import POSITIVE, SHARE, SWITCH
+from sim_bridge.vehicles.checked_structs import SHARE, SWITCH, Range
 
 NO_PIN = 255
 
 WHEEL_ENCODER = SensorKind(
     "wheel_encoder",
-    {"edges_per_turn": POSITIVE, "missed": SHARE, "right": SWITCH, "directed": SWITCH},
+    {"edges_per_turn": Range(2.0, 4096.0), "missed": SHARE, "right": SWITCH, "directed": SWITCH},
     has_period=False,
 )
 

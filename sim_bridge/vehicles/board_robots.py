@@ -4,6 +4,7 @@ pulse. What firmware, line and supply do besides is left out: docs/how-to/thousa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from boebot.description.robots import RobotDescription
@@ -23,8 +24,8 @@ BOARD_STEP_S: Final = TICK_S / 2  # of the world, unless wished otherwise
 NUMBER: Final = 0  # of the first robot of a run: there the same seed is the same unit
 
 
-def join_board(model: VehicleModel, robot: RobotDescription, *, noise: bool) -> None:
-    """Adds servos and sensors of a robot with a board to its model.
+def join_board(model: VehicleModel, robot: RobotDescription, given: Mapping[str, float], *, noise: bool) -> None:
+    """Adds servos and sensors of a robot with a board to its model. `given`: imperfections that were asked for.
 
     Raises:
         RobotError: it has a device that is modelled at its board only, or the step does not divide the control tick.
@@ -55,9 +56,10 @@ def join_board(model: VehicleModel, robot: RobotDescription, *, noise: bool) -> 
         return servos_of(Draw(seed, noise, NUMBER, robot.unit, robot.imperfections))
 
     model.board_servos(servos_of(model.draw), unit, [_motion_map(servo) for servo in servos])
-    for name, value in robot.imperfections.items():
+    for name, value in (robot.imperfections | dict(given)).items():
         row = imperfections()[name]
-        if name not in model.draw.used and not (row.switch and value == row.neutral):
+        is_used = name in model.draw.used or (row.key and "supply" not in row.of)
+        if not is_used and not (row.switch and value == row.neutral):
             raise BoardError(f"imperfections: {name} changes nothing of {who} without its board; expected boebot.run")
 
 

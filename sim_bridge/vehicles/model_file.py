@@ -62,7 +62,7 @@ def vehicle_model(
     model = VehicleModel(body, dt=STEP_S if dt is None else dt, noise=noise, ends_at_collision=ends_at_collision)
     model.robot, model.draw = described, draw
     if described.has_board:
-        join_board(model, described, noise=noise)
+        join_board(model, described, imperfections or {}, noise=noise)
         return model
     _drive(model, described)
     for name, device in described.device.items():

@@ -28,7 +28,7 @@ from boebot.errors import BoebotError, BrainError, CallError, RobotError
 from boebot.robot import Robot
 from sim_bridge.batch import Batch
 from sim_bridge.compiled import ffi, lib
-from sim_bridge.vehicle import VehicleModel, arsim, vehicle_model
+from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, vehicle_model
 
 ROOT = Path(__file__).resolve().parents[3]
 RUNS = 100
@@ -255,6 +255,29 @@ def test_without_pulses_the_wheels_turn_freely(field: Path) -> None:
     assert (ways[0] > ways[1] + 1e-3).all()
 
 
+def test_who_coasts_may_be_changed_in_place(field: Path) -> None:
+    batch = Batch(vehicle_model("shieldbot", noise=False), load_arena(field), np.zeros((2, 3)), [1, 2])
+    coasts = np.array([False, True])
+    batch.step(np.full((2, 2), 0.5), 100, coasts=coasts)
+    assert rims(batch)[0, 0] > 0.05 and abs(rims(batch)[1, 0]) < 1e-9
+    coasts[:] = True, False
+    batch.step(np.full((2, 2), 0.5), 100, coasts=coasts)
+    assert abs(rims(batch)[0, 0]) < 1e-2 and rims(batch)[1, 0] > 0.05
+
+
+def test_a_wheel_without_limits_does_not_hold_up_the_world() -> None:
+    """A wheel of a millionth of a millimetre turns millions of times in a step, which no encoder sees."""
+    model = VehicleModel(ARSIM_BODY | {"wheel_radius": 1e-9, "wheel_mass": 0.0, "wheel_inertia": 0.0})
+    model.regulated_motors({"gain_n_s": 1e-9}, {"gain_n_s": 1e-9})
+    model.sensor("wheel_encoder", "encoder", edges_per_turn=64, missed=0.0, right=0, directed=0)
+    vehicle = Vehicle(model, load_arena("arsim"))
+    vehicle.place((0, 0, 0), speed=10.0)
+    vehicle.run(lambda _: (1.0, 1.0), 10)
+    assert vehicle.body.wheel_left > 1e8 and list(vehicle["encoder"]) == [0.0, 0.0]
+    with pytest.raises(RobotError, match="expected a number from 2 to 4096"):
+        VehicleModel(ARSIM_BODY).sensor("wheel_encoder", "e", edges_per_turn=1e12, missed=0, right=0, directed=0)
+
+
 def test_latched_motors_get_no_pulses(field: Path) -> None:
     seen_latched = []
 
@@ -310,6 +333,11 @@ def test_worlds_are_the_same_whatever_the_batch_order_and_threads() -> None:
             r"device.infrared_left .*\(infrared_p",
         ),
         (lambda: vehicle_model(robot_with(ping={"plugged": False})), RobotError, "device.ping of robot 'shieldbot'"),
+        (
+            lambda: vehicle_model("shieldbot", imperfections={"supply_drop_out_v": 1.0}),
+            BoebotError,
+            "imperfections: supply_drop_out_v changes nothing",
+        ),
         (
             lambda: vehicle_model("shieldbot", imperfections={"whisker_bounce_s": 0.01}),
             BoebotError,

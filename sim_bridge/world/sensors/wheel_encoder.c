@@ -7,6 +7,8 @@
 
 #define STAMP_S 16e-6
 #define PERIOD_LONGEST 31250.0 /* 0.5 s in stamps */
+#define EDGES_MAXIMUM 1e5      /* in a step */
+#define INDEX_MAXIMUM 1e15
 
 typedef struct {
   double begun;    /* 1: the phase is drawn */
@@ -49,10 +51,14 @@ static void step(const void *self, sensor_memory *memory, const sensing *s, nois
   kept *k = (kept *)memory->numbers;
   const double before = k->position, after = position_of(p, k, s);
   long long index = (long long)k->index;
+  k->position = after;
+  if (!(fabs(after - before) < EDGES_MAXIMUM && fabs(after) < INDEX_MAXIMUM)) { /* no disc turns as fast or as far */
+    if (fabs(after) < INDEX_MAXIMUM) k->index = floor(after);
+    return;
+  }
   double share;
   for (int way; (way = wheel_encoder_pass(before, after, &index, &share)) != 0;)
     see(p, k, way, floor((s->time - (1.0 - share) * s->dt) / STAMP_S), noise);
-  k->position = after;
   k->index = (double)index;
 }
 
