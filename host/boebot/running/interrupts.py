@@ -27,7 +27,8 @@ _LOOK_S = 0.5  # between two looks at whether the parent of a brain's process is
 first: int | None = None  # number of the signal that has asked to end; None: there was none
 _first_s = 0.0
 _held = 0  # blocks in which the first one is noted only
-_process = 0  # the run's; 0: there is none
+_runs = 0  # that go on in this process; several may take turns in threads, and end in any order
+_process = 0  # of the latest one
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
@@ -83,23 +84,23 @@ def uncut() -> Iterator[None]:
 def heard() -> Iterator[None]:
     """While a run goes on, signals that would raise KeyboardInterrupt are handled as above; others are the program's
     own affair. Outside the main thread, which alone hears of them, they stay as they are."""
-    global first, _process
+    global first, _runs, _process
     is_main = threading.current_thread() is threading.main_thread()
     mine = [one for one in SIGNALS if is_main and signal.getsignal(one) is signal.default_int_handler]
-    before, _process = _process, os.getpid()
+    _runs, _process = _runs + 1, os.getpid()
     try:
         for number in mine:
             signal.signal(number, interrupt)
         yield
     finally:
-        _process, first = before, None if mine else first
+        _runs, first = _runs - 1, None if mine else first
         for number in mine:
             signal.signal(number, signal.default_int_handler)
 
 
 def _in_child() -> None:
     """A process that a brain forks ends once the run's process has."""
-    if _process:
+    if _runs:
         threading.Thread(target=_end_with, args=(_process,), daemon=True).start()
 
 

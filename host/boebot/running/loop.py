@@ -356,6 +356,8 @@ class _Loop:
                 try:
                     self._turn(robot, watch)
                 except BoebotError as error:
+                    if robot.failure is None:  # it is not the robot's: `progress` has raised it, or who watches
+                        raise
                     raise of_robot(error, robot.number, len(self._robots)) from error
                 if (failure := robot.failure) is not None:
                     raise of_robot(failure, robot.number, len(self._robots)) from failure
@@ -420,6 +422,8 @@ class _Loop:
             if (result := robot.result) is None:
                 raise error if error is not None else BoebotError(f"robot {robot.number} did not begin")
             result.error = error if isinstance(error, KeyboardInterrupt) else robot.failure
+            if len(self._robots) == 1:
+                result.error = result.error or error  # also what is not the robot's
             if result.error is None and (quiet := unfired(result.faults)) is not None:
                 result.error = quiet
                 error = error or of_robot(quiet, robot.number, len(self._robots))

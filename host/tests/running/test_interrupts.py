@@ -18,6 +18,7 @@ import pytest
 
 from boebot.boards import BoardRequest, BoardSession, board_kinds, find_server
 from boebot.description.robots import load_robot
+from boebot.pausable_thread import DONE, PausableThread
 from boebot.record.blocks import Group
 from boebot.record.reading import CutError
 from boebot.record.record import Record
@@ -241,3 +242,32 @@ def step(robot):
             return
         time.sleep(0.05)
     pytest.fail("it goes on")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+@pytest.mark.parametrize("first_ended", [0, 1])
+def test_runs_that_take_turns_may_end_in_any_order(first_ended: int) -> None:
+    """A process that is forked then ends with this one while one of them goes on, and no more after the last."""
+    threads: list[PausableThread] = []
+
+    def work(index: int) -> None:
+        loop.execute(Request.single(lambda robot: threads[index].pause("step"), on="native", seconds=0.1))
+
+    threads += [PausableThread(lambda index=index: work(index), f"run {index}") for index in range(2)]  # type: ignore[misc]
+    looks = []
+    for thread in threads:
+        thread.resume()
+    for index in (first_ended, 1 - first_ended):
+        looks.append(threads_of_a_child())
+        while threads[index].resume() != DONE:
+            pass
+        assert threads[index].error is None
+    looks.append(threads_of_a_child())
+    assert looks == [2, 2, 1]
+
+
+def threads_of_a_child() -> int:
+    """How many threads a process has that is forked now: with one more it looks whether this one is there."""
+    if (child := os.fork()) == 0:
+        os._exit(threading.active_count())
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import boebot
+from boebot.boards import board_kinds
 from boebot.description.robots import load_robot
 from boebot.errors import BoardError, BoebotError, BrainError, ProtocolError
 from boebot.link import messages
@@ -480,6 +481,32 @@ def test_progress_is_reported(session: InProcess) -> None:
     reported: list[float] = []
     boebot.run(straight, seconds=1, progress=reported.append)
     assert reported and all(0 <= passed <= 1 for passed in reported)
+
+
+def test_an_error_of_progress_ends_the_run_and_is_its_error(session: InProcess) -> None:
+    class LongEnoughError(BoebotError):
+        pass
+
+    def progress(passed: float) -> None:
+        raise LongEnoughError(f"after {passed:g} s")
+
+    result = loop.execute(Request.single(straight, seconds=5), progress)
+    assert isinstance(result.error, LongEnoughError) and result.run_time < 5
+    assert result.table()["ended"] == "after 0 s"
+
+
+@pytest.mark.skipif("native" not in board_kinds(), reason="the simulator is not installed")
+def test_an_error_of_progress_is_no_robots_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop, "PROGRESS_S", 0.0)
+
+    def progress(passed: float) -> None:
+        if passed > 1:
+            raise BoebotError("long enough")
+
+    members = [boebot.Member(brain=straight, robot="arsim", pose=(x, 0.0, 0.0)) for x in (0.0, 1.0)]
+    together = loop.execute(Request(members=members, arena="room", seconds=5), progress)
+    assert str(together.error) == "long enough"
+    assert all(str(one.error) == "the run has ended: long enough" for one in together.robots)
 
 
 def test_encoder_counts_roll_over(monkeypatch: pytest.MonkeyPatch) -> None:
