@@ -1,6 +1,8 @@
 """Brains composed in TOML: which processes, with which parameters and utilities, and which state variables.
 
     period_s = 0.05
+    robot = "shieldbot-charging"     # the bundled ones of a run that names neither;
+    arena = "station"                # boebot.brains reads both
 
     [variable.near]                  # by its kind,
     [variable.tired]
@@ -196,6 +198,8 @@ def _file_type() -> type[msgspec.Struct]:
             ("variable", dict[str, _Variable], msgspec.field(default_factory=dict)),
             ("period_s", float, 0.05),
             ("margin", float, 0.0),
+            ("robot", str | None, None),
+            ("arena", str | None, None),
         ],
         forbid_unknown_fields=True,
     )

@@ -9,8 +9,8 @@ A brain is a Python file with one of
 
 or a TOML file that composes such processes (boebot.brain.composition). A Python file may also say `PERIOD = 0.1`
 (seconds from step to step) and `NEEDS = ["whiskers", "ping"]` (devices without which it cannot work); a brain of
-processes knows both by itself. `ROBOT = "shieldbot-line"` and `ARENA = "office"` name the bundled ones of a run that
-names neither.
+processes knows both by itself. `ROBOT = "shieldbot-line"` and `ARENA = "office"`, in a TOML file `robot` and `arena`,
+name the bundled ones of a run that names neither.
 
 Files are read anew for each run and each robot. A Brain object that is handed over is run itself, so that its maker
 can read its `steps` and `switches` afterwards: with each new run it begins afresh, and it drives one robot at a
@@ -170,13 +170,22 @@ def load_brain(source: object) -> LoadedBrain:
         path = _find(source)
         if path.suffix == TOML:
             from boebot.brain import composition
+            from boebot.description import toml_files
 
-            return _from_object(composition.load(path), as_utf8(path.stem), path)
+            table = toml_files.read(path, BrainError)
+            made = _from_object(composition.composed(table, path.name), as_utf8(path.stem), path)
+            named: dict[str, Any] = {key: table[key] for key in ("robot", "arena") if key in table}
+            for key, name in named.items():
+                _check_bundled(name, toml_files.where(table, path.name, key), key)
+            return replace(made, **named)
         source = _execute(path)
     if isinstance(source, ModuleType):
         file = getattr(source, "__file__", None)
         found = _from_module(source, Path(file) if file else None)
-        return replace(found, robot=_bundled(source, "ROBOT"), arena=_bundled(source, "ARENA"))
+        robot, arena = getattr(source, "ROBOT", None), getattr(source, "ARENA", None)
+        _check_bundled(robot, source.__name__, "ROBOT")
+        _check_bundled(arena, source.__name__, "ARENA")
+        return replace(found, robot=robot, arena=arena)
     if isinstance(source, type):
         return _from_object(_construct(source, None), source.__name__, None)
     from boebot.brain import Brain, Process
@@ -425,12 +434,11 @@ def _period(owner: object, where: str) -> float | None:
     return float(period)
 
 
-def _bundled(module: ModuleType, what: str) -> str | None:
-    """The name of the bundled robot or arena that a brain is for."""
-    name = getattr(module, what, None)
+def _check_bundled(name: object, where: str, what: str) -> None:
+    """Of the robot or arena that a brain is for."""
     if name is None or (isinstance(name, str) and not name.endswith(TOML)):
-        return name
-    raise BrainError(f"{module.__name__}: {what} is {name!r}; expected the name of a bundled one")
+        return
+    raise BrainError(f"{where}: {what} is {name!r}; expected the name of a bundled one")
 
 
 def _needs(owner: object, where: str) -> tuple[str, ...]:

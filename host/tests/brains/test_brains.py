@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -81,8 +82,15 @@ def test_function_class_and_object_themselves() -> None:
     assert load_brain(Mine()).name == "Mine"
 
 
-def test_a_brain_may_say_for_which_robot_and_arena_it_is(tmp_path: Path) -> None:
-    brain = write(tmp_path, 'ROBOT, ARENA = "shieldbot-line", "office"\ndef step(robot): robot.stop()\n')
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("brain.py", 'ROBOT, ARENA = "shieldbot-line", "office"\ndef step(robot): robot.stop()\n'),
+        ("brain.toml", 'robot = "shieldbot-line"\narena = "office"\n[process.wander]\n'),
+    ],
+)
+def test_a_brain_may_say_for_which_robot_and_arena_it_is(file: str, text: str, tmp_path: Path) -> None:
+    brain = write(tmp_path, text, file)
     for given, robot, arena in (
         ({}, "shieldbot-line", "office"),
         ({"robot": "shieldbot"}, "shieldbot", None),
@@ -93,8 +101,19 @@ def test_a_brain_may_say_for_which_robot_and_arena_it_is(tmp_path: Path) -> None
         tasks = request.tasks()
         assert (tasks[0].board.robot.name, tasks[0].board.arena) == (robot, arena)
         assert request.said(tasks)["arena"] == arena, "so that the run can be repeated"
-    with pytest.raises(BrainError, match=r"ROBOT is 'mine\.toml'; expected the name of a bundled one"):
-        load_brain(write(tmp_path, 'ROBOT = "mine.toml"\ndef step(robot): robot.stop()\n'))
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "sentence"),
+    [
+        ("a.py", 'ROBOT = "b.toml"\ndef step(robot): robot.stop()\n', "a: ROBOT is 'b.toml'; expected the name of a"),
+        ("a.toml", 'arena = "b.toml"\n[process.stop]\n', "a.toml:1: arena is 'b.toml'; expected the name of"),
+        ("a.toml", "robot = 3\n[process.stop]\n", "a.toml:1: robot: expected"),
+    ],
+)
+def test_it_says_so_by_the_name_of_a_bundled_one(file: str, text: str, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(BrainError, match=re.escape(sentence)):
+        load_brain(write(tmp_path, text, file))
 
 
 def test_brain_may_import_a_file_beside_it(tmp_path: Path) -> None:
