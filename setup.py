@@ -39,7 +39,7 @@ PIN_HEADERS = FIRMWARE.glob("generated/pins_*.h")
 PIN_MAPS = sorted(path.stem.removeprefix("pins_").replace("_", "-") for path in PIN_HEADERS)
 
 # Packages beside the library, which join it by entry points.
-GUESTS = ("avr_timing", "boebot_can", "boebot_course", "boebot_timing")
+GUESTS = ("avr_timing", "boebot_campaign", "boebot_can", "boebot_course", "boebot_timing")
 WITH_PARTS = [*GUESTS, *(f"{name}.*" for name in GUESTS)]
 
 # What a wheel carries beside its modules: folder in the package <- (folder in the checkout, patterns).

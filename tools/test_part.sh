@@ -17,7 +17,7 @@ python() {
 
 run() {
   case $part in
-    host) python host/tests host/boebot_can host/boebot_course "$@" ;;
+    host) python host/tests host/boebot_campaign host/boebot_can host/boebot_course "$@" ;;
     others) python docs host/avr_timing host/boebot_timing tools hil_tests sim_bridge protocol "$@" ;;
     # All units for one pin map, and for two others what only they have. Quadrature encoders: sim_bridge/tests/firmware,
     # and `make soak`.

@@ -88,6 +88,9 @@ def __getattr__(name: str) -> Any:
     if name == "boards":
         return import_module("boebot.boards")
     if name not in _HOMES:
+        guests = import_module("boebot.guests")
+        if name in (functions := guests.guests(guests.FUNCTIONS)):
+            return functions[name].load()
         raise AttributeError(f"module 'boebot' has no attribute {name!r}")
     value = getattr(import_module(f"boebot.{_HOMES[name]}"), name)
     globals()[name] = value

@@ -10,6 +10,8 @@
     boebot.records    a foreign record, by suffix    boebot.guests.ReadRecord
     boebot.checks     what cannot be in time         boebot.running.tasks.Check
     boebot.bounds     what functions take at most    boebot.guests.BoundsOf
+    boebot.functions  a function of `boebot`         Callable, named as in the package: boebot.NAME
+    boebot.folders    a folder of many runs          Folder; the name is that of a file by which it is known
 
 Nothing of a guest is imported before it is asked for. The entry points are looked up once per process; names of the
 core come before those of guests.
@@ -22,12 +24,13 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, cast
 
 from boebot.errors import BoebotError
 
-PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS, BOUNDS = (
-    f"boebot.{group}" for group in ("ports", "commands", "lists", "formats", "records", "checks", "bounds")
+PORTS, COMMANDS, LISTS, FORMATS, RECORDS, CHECKS, BOUNDS, FUNCTIONS, FOLDERS = (
+    f"boebot.{group}"
+    for group in ("ports", "commands", "lists", "formats", "records", "checks", "bounds", "functions", "folders")
 )
 
 
@@ -39,6 +42,22 @@ class Command(NamedTuple):
     """In the list of all commands."""
     work: str
     """`module:name` of a function, or of a typer.Typer."""
+
+
+class Folder(NamedTuple):
+    """A kind of folder that holds many runs; each is `module:name`, imported when it is needed."""
+
+    report: str
+    """Prints what came of them, and draws it: called with the folder, and whether to print JSON."""
+    request: str
+    """The `boebot.running.tasks.Request` of one run: called with the folder and the run's number."""
+
+
+def folder_of(path: Path) -> Folder | None:
+    """The kind of a folder of many runs; None: it is none that is known."""
+    found = (guest for name, guest in guests(FOLDERS).items() if (path / name).is_file())
+    kind = next(found, None)
+    return None if kind is None else cast(Folder, kind.load())
 
 
 class ReadRecord(Protocol):

@@ -106,19 +106,22 @@ def print_columns(
 
 
 @contextlib.contextmanager
-def progress_bar(title: str, total: float, quiet: bool = False, unit: str = " s") -> Iterator[Progress]:
+def progress_bar(
+    title: str, total: float, quiet: bool = False, unit: str = " s", *, left: bool = False
+) -> Iterator[Progress]:
     """Gives a function to call with how much of the total is done, such as the seconds that have passed; shows a bar
-    meanwhile."""
+    meanwhile, and with `left` the time that the rest will take."""
     if quiet or not sys.stderr.isatty():
         yield lambda _: None
         return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn(f"{{task.completed:.0f}}{'' if math.isinf(total) else f' of {total:g}'}{unit}"),
         TimeElapsedColumn(),
+        *([TextColumn("left"), TimeRemainingColumn()] if left else []),
         console=console(stderr=True),
         transient=True,
     )

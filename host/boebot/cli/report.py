@@ -11,7 +11,7 @@ import typer
 from boebot.cli import ending, options, output
 from boebot.cli.ending import detail
 from boebot.errors import expected_one
-from boebot.guests import FORMATS, guests
+from boebot.guests import FORMATS, Guest, folder_of, guests
 from boebot.record.reading import CutError, mend
 from boebot.record.run import Run
 from boebot.record.run_folder import RECORD, RunFolder
@@ -54,7 +54,8 @@ def report(
     verbose: options.Verbose = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Print a run's figures and write its files anew, from its record; or draw columns of it.
+    """Print a run's figures and write its files anew, from its record; or draw columns of it. Of a folder of many runs,
+    what came of them.
 
     A record that is cut is read up to there; of one that is damaged, what is left is read and the exit code is 1.
     --as csv writes run.csv, the bytes of the line, and the steps of a brain of processes; --as foxglove writes
@@ -67,6 +68,11 @@ def report(
     if not plot and (columns or robot is not None or out is not None):
         raise typer.BadParameter("COLUMN, --robot and --out go with --plot")
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
+    if (kind := folder_of(run)) is not None:
+        if plot or formats or mended:
+            raise typer.BadParameter("--plot, --as and --mend are of one run; this is a folder of many")
+        Guest(run.name, kind.report).load()(run, wanted)
+        return
     result = read_run(run)
     with ending.of_record(result):
         if plot:

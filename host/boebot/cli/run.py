@@ -14,8 +14,9 @@ import typer
 
 from boebot.brains import LoadedBrain, bundled, load_program, names_program
 from boebot.cli import options, output, quantity, streams
-from boebot.cli.ending import detail, end
+from boebot.cli.ending import Detail, detail, end
 from boebot.errors import BoebotError, CallError, MissingTextError
+from boebot.guests import Guest, folder_of
 from boebot.record import run_folder
 from boebot.running.tasks import Member, Request
 
@@ -49,8 +50,9 @@ from top to bottom; with --brain, one of several behaviors."""
 
 
 def run(
+    context: typer.Context,
     brain: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(
             metavar="BRAIN",
             autocompletion=options.complete_brains,
@@ -58,7 +60,7 @@ def run(
             "Brain or brain = Brain([...]), a TOML file of processes, or a program for the Uno: .ino, folder, .elf, "
             ".hex; several: a robot for each.",
         ),
-    ],
+    ] = None,
     on: options.RunOn = None,
     robot: Annotated[
         list[str] | None,
@@ -164,6 +166,11 @@ def run(
         bool, typer.Option("--strict", help="The first such note is an error, and ends the run.")
     ] = False,
     gdb: options.Gdb = None,
+    sweep: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="In place of a BRAIN: one run of a sweep again, from what its folder keeps."),
+    ] = None,
+    row: Annotated[int | None, typer.Option(metavar="N", min=0, help="Which run of the sweep, from 0.")] = None,
     view: options.View = False,
     speed: options.Speed = None,
     view_port: options.ViewPort = None,
@@ -177,6 +184,11 @@ def run(
 ) -> None:
     """See `_HELP`."""
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
+    if sweep is not None or row is not None:
+        request = _of_sweep(context, sweep, row)
+        return _run(request, f"row {row}", None, out, wanted, view=view, speed=speed, port=view_port, quiet=quiet)
+    if not brain:
+        raise typer.BadParameter("there is no BRAIN; expected one, or --sweep and --row")
     ideal, imperfect = options.names(without), options.magnitudes(imperfection)
     if timeout is not None and seconds != SECONDS:
         raise CallError("--seconds and --timeout both say how long the run is; expected one of them")
@@ -217,25 +229,59 @@ def run(
         strict=strict,
         gdb=gdb,
     )
-    programs = [member for member in request.members if isinstance(member.brain, LoadedBrain)]
     name = brain[0] if len(brain) == 1 else f"{count} robots"
+    try:
+        _run(request, name, on, out, wanted, view=view, speed=speed, port=view_port, quiet=quiet)
+    except MissingTextError as error:
+        error.exit_code = timeout_exit_code
+        raise
+
+
+def _run(
+    request: Request,
+    name: str,
+    on: str | None,
+    out: Path | None,
+    wanted: Detail,
+    *,
+    view: bool,
+    speed: float | None,
+    port: int | None,
+    quiet: bool,
+) -> None:
+    """Runs it, and says what happened."""
+    programs = [member for member in request.members if isinstance(member.brain, LoadedBrain)]
     with run_folder.locked(out) as folder:
         with contextlib.ExitStack() as shown:
             title = name if on is None else f"{name} on {on}"
-            progress = shown.enter_context(output.progress_bar(title, seconds, quiet or view or bool(programs)))
+            progress = shown.enter_context(output.progress_bar(title, request.seconds, quiet or view or bool(programs)))
             run_it = shown.enter_context(
-                options.runner(view=view, speed=speed, port=view_port, waits=True, types=len(programs) == 1)
+                options.runner(view=view, speed=speed, port=port, waits=True, types=len(programs) == 1)
             )
-            shown.enter_context(streams.kept(for_the_answer=json))
+            shown.enter_context(streams.kept(for_the_answer=wanted is Detail.JSON))
             if quiet and programs:
                 nowhere = shown.enter_context(Path(os.devnull).open("w", encoding="utf-8"))
                 shown.enter_context(contextlib.redirect_stdout(nowhere))
             result = run_it(request, progress, folder)
-        try:
-            end(result, out, wanted)
-        except MissingTextError as error:
-            error.exit_code = timeout_exit_code
-            raise
+        end(result, out, wanted)
+
+
+def _of_sweep(context: typer.Context, folder: Path | None, row: int | None) -> Request:
+    """The run that the folder keeps.
+
+    Raises:
+        CallError: it keeps none, or another option is given, which would say otherwise what to run.
+    """
+    sources = {one: getattr(context.get_parameter_source(one), "name", "") for one in context.params}
+    given = [one for one, source in sources.items() if source == "COMMANDLINE"]
+    if others := set(given) - {"sweep", "row", "view", "speed", "view_port", "out", "json", "verbose", "quiet"}:
+        raise CallError(f"{sorted(others)[0]} and --sweep both say what to run; expected one of them")
+    if folder is None or row is None:
+        raise CallError("--sweep names a folder and --row a run in it; expected both")
+    if (kind := folder_of(folder)) is None:
+        raise CallError(f"{folder} holds no sweep; expected a folder that boebot sweep has written")
+    request: Request = Guest(folder.name, kind.request).load()(folder, row)
+    return request
 
 
 run.__doc__ = _HELP

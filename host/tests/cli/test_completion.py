@@ -74,7 +74,7 @@ def test_shell_completes_commands_options_names_and_files(
         return out.split()
 
     assert completed("re") == ["report", "replay"]
-    assert completed("run", "--ro") == ["--robot", "--robots"]
+    assert completed("run", "--ro") == ["--robot", "--robots", "--row"]
     assert completed("run", "w") == ["wander", "wood/", "worm.py"]
     assert completed("run", "--arena", "") == [*arena_names(), "wood/"]
     assert completed("parameters", "s") == ["set", "save"]

@@ -1,0 +1,193 @@
+"""Spreads a sweep's rows over Dask's workers: those of this computer, or of any scheduler.
+
+Tasks of about a second write parts and return only how long it took; what is done is in the folder. A few tasks for
+each worker wait at the scheduler at a time, so that memory does not grow with the sweep. A task whose worker has died,
+or whose scheduler has gone, is submitted again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from boebot import missing
+from boebot.errors import BoebotError, CallError
+from boebot.system import NEW_GROUP, end_group
+from boebot_campaign.kept import Folder, version
+from boebot_campaign.tasks import do_part
+
+PART_S = 1.0  # that a task should take
+MOST_ROWS = 10_000  # of a task
+AHEAD = 3  # tasks a worker that are submitted
+POLL_S = 0.02
+BACK_S = 60.0  # wait for a scheduler that has gone
+DEATHS = 5  # more of a task than its rows can account for
+LOG = ".workers.log"
+
+Told = Callable[[int], object]
+"""Is called with how many rows are done."""
+
+
+def run(folder: Folder, scheduler: str | None, workers: int, told: Told) -> None:
+    """Runs all rows that are not done.
+
+    Raises:
+        BoebotError: in one sentence; what is done stays, and the next sweep goes on there.
+    """
+    distributed = missing.imported("distributed", "a sweep", "dask.distributed", "sweep")
+    missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+    with contextlib.ExitStack() as ends:
+        address = scheduler or ends.enter_context(_local(folder, workers))
+        client = ends.enter_context(_client(distributed, address))
+        _check(client, folder, distributed)
+        _Work(client, folder, told, is_local=scheduler is None).all()
+
+
+class _Work:
+    """The rows on their way."""
+
+    def __init__(self, client: Any, folder: Folder, told: Told, *, is_local: bool) -> None:
+        self._client, self._folder, self._told, self._is_local = client, folder, told, is_local
+        self._gaps = deque(folder.undone())
+        self._count = folder.plan.count
+        self._done = self._count - sum(end - first for first, end in self._gaps)
+        self._row_s: float | None = None
+        self._pending: dict[Any, tuple[int, int]] = {}
+        self._deaths: dict[tuple[int, int], int] = {}
+
+    def all(self) -> None:
+        self._told(self._done)
+        while self._gaps or self._pending:
+            self._submit()
+            for future in [one for one in self._pending if one.status != "pending"]:
+                self._settle(future, *self._pending.pop(future))
+            time.sleep(POLL_S)
+
+    def _submit(self) -> None:
+        most = AHEAD * max(len(self._client.scheduler_info()["workers"]), 1)
+        while self._gaps and len(self._pending) < most:
+            first, end = self._gaps.popleft()
+            rows = 1 if self._row_s is None else int(min(max(PART_S / max(self._row_s, 1e-6), 1), MOST_ROWS))
+            middle = min(end, first + min(rows, max((end - first) // 8, 1) if end - first < most * rows else rows))
+            if middle < end:
+                self._gaps.appendleft((middle, end))
+            self._send(first, middle)
+
+    def _send(self, first: int, end: int) -> None:
+        path = str(self._folder.path)
+        key = f"boebot-{first}-{end}-{uuid.uuid4().hex}"
+        self._pending[self._client.submit(do_part, path, self._folder.stamp, first, end, key=key, pure=False)] = (
+            first,
+            end,
+        )
+
+    def _settle(self, future: Any, first: int, end: int) -> None:
+        if future.status == "finished":
+            row_s = future.result() / (end - first)
+            self._row_s = row_s if self._row_s is None else 0.8 * self._row_s + 0.2 * row_s
+            self._done += end - first
+            self._told(self._done)
+            return
+        error = future.exception() if future.status == "error" else None
+        if error is not None and type(error).__name__ != "KilledWorker":
+            raise (
+                error
+                if isinstance(error, BoebotError)
+                else BoebotError(f"a worker of the sweep has failed: {type(error).__name__}: {error}")
+            )
+        deaths = self._deaths[first, end] = self._deaths.get((first, end), 0) + 1
+        if deaths > DEATHS + 2 * (end - first):
+            raise BoebotError(f"workers die before they begin; {self._folder.path / LOG} may say why")
+        if error is None:
+            self._wait_for_scheduler()
+        self._send(first, end)
+
+    def _wait_for_scheduler(self) -> None:
+        """After its end; of this computer there is no other."""
+        until = time.perf_counter() + (0.0 if self._is_local else BACK_S)
+        while True:
+            with contextlib.suppress(TimeoutError, OSError):
+                if self._client.status == "running":
+                    self._client.wait_for_workers(1, timeout=1.0)
+                    return
+            if time.perf_counter() > until:
+                raise BoebotError("the scheduler has gone; the same command goes on where it was")
+            time.sleep(POLL_S)
+
+
+@contextlib.contextmanager
+def _local(folder: Folder, workers: int) -> Iterator[str]:
+    """The address of a cluster of this computer, which ends with the block, or with this process."""
+    command = [sys.executable, "-m", "boebot_campaign.local", str(workers)]
+    with (folder.path / LOG).open("wb") as log:
+        helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, **NEW_GROUP)
+    assert helper.stdin is not None and helper.stdout is not None
+    try:
+        if not (address := helper.stdout.readline().decode().strip()):
+            raise BoebotError(f"the workers of this computer do not begin; {folder.path / LOG} says why")
+        yield address
+    finally:
+        helper.stdin.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            helper.wait(10.0)
+        with contextlib.suppress(ProcessLookupError):
+            end_group(helper, by_force=True)
+        helper.wait()
+
+
+@contextlib.contextmanager
+def _client(distributed: Any, address: str) -> Iterator[Any]:
+    try:
+        client = distributed.Client(address, timeout=10.0, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise CallError(f"there is no scheduler at {address}: {error}; expected one as tcp://HOST:PORT") from None
+    try:
+        yield client
+    finally:
+        with contextlib.suppress(Exception):  # it may have gone, and then all is said
+            client.close(timeout=2.0)
+
+
+def seen(probe: str) -> tuple[bool, str]:
+    """At a worker: whether it sees that file, and its versions."""
+    return Path(probe).is_file(), versions()
+
+
+def versions() -> str:
+    """What has to be the same everywhere."""
+    python = ".".join(map(str, sys.version_info[:2]))
+    packages = ", ".join(f"{name} {metadata.version(name)}" for name in ("distributed", "pyarrow"))
+    return f"boebot {version()}, Python {python}, {packages}"
+
+
+def _check(client: Any, folder: Folder, distributed: Any) -> None:
+    """Raises BoebotError, before the first run, where scheduler or workers do not fit."""
+    theirs = client.get_versions(check=False)["scheduler"]["packages"]["distributed"]
+    if theirs != distributed.__version__:
+        raise BoebotError(f"the scheduler has distributed {theirs}; expected {distributed.__version__}, as here")
+    with contextlib.suppress(TimeoutError):
+        client.wait_for_workers(1, timeout=30.0)
+    probe = folder.path / f".probe-{uuid.uuid4().hex}"
+    probe.touch()
+    try:
+        answers = client.run(seen, str(probe), on_error="return")
+    finally:
+        probe.unlink()
+    if not answers:
+        raise BoebotError("the scheduler has no workers; expected at least one")
+    for worker, answer in answers.items():
+        if isinstance(answer, BaseException):
+            raise BoebotError(f"worker {worker} cannot run boebot: {answer}; expected {versions()}, as here")
+        is_there, has = answer
+        if has != versions():
+            raise BoebotError(f"worker {worker} has {has}; expected {versions()}, as here")
+        if not is_there:
+            raise BoebotError(f"worker {worker} does not see {folder.path}; expected a folder that all workers share")

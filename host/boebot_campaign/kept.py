@@ -1,0 +1,296 @@
+"""The folder of a sweep: what was run, and the rows so far.
+
+    sweep.json      the plan, the kit's version, and hashes of what follows
+    points.npy      the design's points
+    files/          brains, robots and arenas as they were, a folder for each
+    parts/          0000812-0000851.parquet: rows 812 to 851. What is done is read from these names alone.
+                    0000812-0000851.begun: a line for each row that was begun, while the part is not there
+    rows.parquet    all rows in order, when all are done; the parts are gone then
+
+A file gets its name when it is whole and on the disk, so that a folder can be trusted whenever its writers have died.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+import uuid
+from collections.abc import Callable, Iterator
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+import boebot
+from boebot import missing, system
+from boebot.errors import BoebotError
+from boebot.link.messages import SCHEMA_HASH
+from boebot.record.run_folder import make_folder, unwritable
+from boebot.running.sources import sources
+from boebot.running.tasks import Request
+from boebot_campaign import designs
+from boebot_campaign.plan import Plan
+
+NAME, POINTS, FILES, PARTS, ROWS = "sweep.json", "points.npy", "files", "parts", "rows.parquet"
+GROUP_ROWS = 65_536  # of rows.parquet, which is written group by group
+_WHAT = "the sweep's files"
+
+
+class Kept(msgspec.Struct, frozen=True, kw_only=True):
+    """What sweep.json says.
+
+    Attributes:
+        version: of the kit, with its protocol.
+        names: for each brain, robot and arena that was given as a file: where its copy is, below the folder.
+        hashes: SHA-256 of each copy, by the same kind of path.
+    """
+
+    version: str
+    plan: Plan
+    names: dict[str, str]
+    hashes: dict[str, str]
+
+
+class Folder:
+    """A sweep's folder, of which sweep.json is there."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises BoebotError: there is no sweep."""
+        self.path = path.absolute()
+        try:
+            self.kept = msgspec.json.decode((path / NAME).read_bytes(), type=Kept)
+            self.points = np.load(path / POINTS)
+        except FileNotFoundError:
+            raise BoebotError(f"{path} holds no sweep; expected a folder with {NAME}") from None
+        except (OSError, ValueError, msgspec.DecodeError) as error:
+            raise BoebotError(
+                f"the sweep in {path} cannot be read: {error}; expected one that boebot has kept"
+            ) from None
+        self.parts = self.path / PARTS
+
+    @cached_property
+    def plan(self) -> Plan:
+        """What is run."""
+        return self.kept.plan
+
+    @cached_property
+    def stamp(self) -> str:
+        """Another one for each sweep."""
+        return _digest((self.path / NAME).read_bytes())
+
+    @property
+    def is_whole(self) -> bool:
+        """All rows are there, in one file."""
+        return (self.path / ROWS).is_file()
+
+    def place(self, name: str | None) -> str | None:
+        """Where the copy of a file is that the plan names; a bundled name is its own."""
+        copy = self.kept.names.get(name or "")
+        return name if copy is None else str(self.path / copy)
+
+    def done(self) -> list[tuple[int, int]]:
+        """First row, and the one after the last, of each part that is there, in order."""
+        stems = (path.stem.split("-") for path in self.parts.glob("[0-9]*-[0-9]*.parquet"))
+        return sorted((int(first), int(last) + 1) for first, last in stems)
+
+    def undone(self, begin: int = 0, end: int | None = None) -> list[tuple[int, int]]:
+        """The gaps between them, from row `begin` to before `end`."""
+        gaps, at, stop = [], begin, self.plan.count if end is None else end
+        for first, after in [] if self.is_whole else [*self.done(), (stop, stop)]:
+            if min(first, stop) > at:
+                gaps.append((at, min(first, stop)))
+            at = max(at, after)
+        return gaps
+
+    def part(self, first: int, end: int) -> Path:
+        """The file of those rows."""
+        return self.parts / f"{first:07}-{end - 1:07}.parquet"
+
+    def check(self) -> None:
+        """Raises BoebotError where a copy is not what it was."""
+        for name, digest in self.kept.hashes.items():
+            copy = self.path / name
+            if not copy.is_file() or _digest(copy.read_bytes()) != digest:
+                raise BoebotError(f"{copy} has changed since the sweep began; expected it as it was, or another --out")
+
+    def merge(self) -> Path:
+        """Makes rows.parquet of the parts, some rows at a time; a row that two parts have is taken once."""
+        parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
+        if not self.is_whole:
+            _write_whole(self.path / ROWS, lambda path: self._merge(path, parquet))
+        shutil.rmtree(self.parts, ignore_errors=True)
+        return self.path / ROWS
+
+    def _merge(self, path: Path, parquet: Any) -> None:
+        arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+        writer: Any = None
+        waiting, at = [], 0
+        for first, end in self.done():
+            if end > at:
+                waiting.append(parquet.read_table(self.part(first, end)).slice(max(at - first, 0)))
+                at = end
+            if sum(len(one) for one in waiting) >= GROUP_ROWS or at == self.plan.count:
+                table = arrow.concat_tables(waiting)
+                writer = writer or parquet.ParquetWriter(path, table.schema)
+                writer.write_table(table)
+                waiting = []
+                if at == self.plan.count:
+                    break
+        writer.close()
+
+    def table(self) -> Any:
+        """The rows so far: a pyarrow.Table."""
+        parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
+        arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+        if self.is_whole:
+            return parquet.read_table(self.path / ROWS)
+        if not (done := self.done()):
+            raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
+        tables, at = [], 0
+        for first, end in done:
+            tables.append(parquet.read_table(self.part(first, end)).slice(max(at - first, 0)))
+            at = max(at, end)
+        return arrow.concat_tables(tables)
+
+
+@lru_cache(maxsize=2)
+def opened(path: Path, stamp: str) -> Folder:
+    """The folder, read once a process: for workers. `stamp`: its `Folder.stamp`, of the sweep that is meant."""
+    del stamp
+    return Folder(path)
+
+
+@contextlib.contextmanager
+def locked(path: Path, plan: Plan) -> Iterator[Folder]:
+    """The folder of that plan, made or taken up again; no other sweep writes there in the block.
+
+    Raises:
+        BoebotError: another one does, or it holds other things, or a sweep of another plan, version or file.
+    """
+    make_folder(path)
+    try:
+        lock = system.lock_folder(path)
+    except BlockingIOError:
+        raise BoebotError(f"another sweep writes to {path} now; expected a folder for this one alone") from None
+    except OSError as error:
+        raise unwritable(path, error, _WHAT) from None
+    try:
+        there = {entry.name for entry in path.iterdir() if not entry.name.startswith(".")}
+        if there and NAME not in there and there - {FILES, POINTS, PARTS}:
+            raise BoebotError(
+                f"{path} holds {sorted(there)[0]!r} and no sweep ({NAME}); expected an empty folder or a new one"
+            )
+        try:
+            _make(path, plan) if NAME not in there else _take_up(path, plan)
+        except OSError as error:
+            raise unwritable(path, error, _WHAT) from None
+        yield Folder(path)
+    finally:
+        os.close(lock)
+
+
+def _make(path: Path, plan: Plan) -> None:
+    names, files = _sources(plan)
+    shutil.rmtree(path / FILES, ignore_errors=True)
+    for name, data in files.items():
+        (path / name).parent.mkdir(parents=True, exist_ok=True)
+        _write_whole(path / name, lambda part, data=data: part.write_bytes(data))  # type: ignore[misc]
+    (path / PARTS).mkdir(exist_ok=True)
+    points = designs.points(plan.design, plan.points, len(plan.axes), plan.first_seed % 2**32)
+    _write_whole(path / POINTS, lambda part: part.write_bytes(_npy(points)))
+    hashes = {name: _digest(data) for name, data in files.items()}
+    kept = Kept(version=version(), plan=plan, names=names, hashes=hashes)
+    _write_whole(path / NAME, lambda part: part.write_bytes(msgspec.json.format(msgspec.json.encode(kept))))
+
+
+def _take_up(path: Path, plan: Plan) -> None:
+    """Checks that it is the same sweep; removes what writers have left that died."""
+    folder = Folder(path)
+    expected = "expected it as it was when the sweep began, or another --out"
+    if folder.kept.version != version():
+        raise BoebotError(f"the sweep in {path} is of boebot {folder.kept.version}, this is {version()}; {expected}")
+    for key in plan.__struct_fields__:
+        if _portable(getattr(plan, key)) != _portable(getattr(folder.plan, key)):
+            raise BoebotError(f"sweep.toml has changed since the sweep in {path} began, in {key}; {expected}")
+    folder.check()
+    _, files = _sources(plan)
+    for name, digest in folder.kept.hashes.items():
+        if name not in files or _digest(files[name]) != digest:
+            original = next((one for one, copy in folder.kept.names.items() if copy == name), Path(name).name)
+            raise BoebotError(f"{original} has changed since the sweep in {path} began; {expected}")
+    for left in (*folder.parts.glob(".*.tmp"), *folder.parts.glob("*.begun"), *path.glob(".*.tmp")):
+        left.unlink(missing_ok=True)
+    folder.parts.mkdir(exist_ok=True)
+
+
+def _portable(value: Any) -> Any:
+    """Of a plan; files without their folders, which may have moved."""
+    return [Path(one).name if isinstance(one, str) else one for one in value] if isinstance(value, list) else value
+
+
+def _sources(plan: Plan) -> tuple[dict[str, str], dict[str, bytes]]:
+    """`Kept.names`, and the files by their paths below the folder."""
+    names: dict[str, str] = {}
+    files: dict[str, bytes] = {}
+    lists = {"brain": plan.brains, "robot": plan.robots, "arena": [*plan.arenas, *plan.test_arenas]}
+    for kind, given in lists.items():
+        for number, name in enumerate(given):
+            if not Path(name).is_absolute():
+                continue
+            if kind == "brain":
+                request = Request.single(name, plan.all_robots[0])
+            elif kind == "robot":
+                request = Request.single(plan.brains[0], name)
+            else:
+                request = Request.single(plan.brains[0], plan.all_robots[0], arena=name)
+            found = sources(request, request.tasks())
+            below = f"{FILES}/{kind}-{number}"
+            names[name] = f"{below}/{Path(name).name}"
+            files |= {
+                f"{below}/{one.removeprefix(f'{kind}/')}": data
+                for one, data in found.items()
+                if one.startswith(f"{kind}/")
+            }
+    return names, files
+
+
+def version() -> str:
+    """Of the kit, as far as rows may depend on it; of a checkout that was edited it is the same."""
+    return f"{boebot.__version__} (schema {SCHEMA_HASH:08x})"
+
+
+def write_part(path: Path, table: Any) -> None:
+    """A part, whole or not at all. Raises BoebotError: the folder cannot be written to."""
+    parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
+    _write_whole(path, lambda part: parquet.write_table(table, part))
+
+
+def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Under a name that no other writer has; on the disk before it gets its own."""
+    part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+    try:
+        write(part)
+        with part.open("rb+") as file:
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise unwritable(path.parent, error, _WHAT) from None
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def _npy(points: np.ndarray) -> bytes:
+    import io
+
+    file = io.BytesIO()
+    np.save(file, points)
+    return file.getvalue()
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

@@ -1,0 +1,39 @@
+"""The cluster of this computer, a process of its own: `python -m boebot_campaign.local WORKERS` prints the scheduler's
+address and ends, with its workers, when its standard input closes: also where who began it was killed. A script that
+sweeps needs no `if __name__ == "__main__"` so, which Dask's own local cluster asks for."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.scheduler.allowed-failures": 0,  # boebot_campaign.tasks finds out which row it was
+    "distributed.scheduler.worker-saturation": 1.0,
+}
+"""What Dask does beside the work costs a tenth of it by default."""
+
+
+def main(workers: int) -> None:
+    """Serves until standard input closes."""
+    import dask
+    from distributed import LocalCluster
+
+    answer = os.fdopen(os.dup(1), "w")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)  # brains print there, and who began this process reads one line only
+    dask.config.set(QUIET)
+    made: Any = LocalCluster
+    with made(
+        n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        print(cluster.scheduler_address, file=answer, flush=True)
+        sys.stdin.buffer.read()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

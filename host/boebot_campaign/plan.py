@@ -1,0 +1,276 @@
+"""What a sweep is to run: sweep.toml, read and checked. Which rows there are is arithmetic: nothing lists them.
+
+A row is one run. Its number counts, from the slowest to the fastest: arena, brain, robot, point of the design, faults,
+start, seed. Brains are compared at equal seeds and starts, so their differences are paired.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from boebot.arenas import load_arena
+from boebot.boards import is_live
+from boebot.brains import load_brain
+from boebot.description import toml_files
+from boebot.errors import CallError
+from boebot.imperfections import checked
+from boebot.running.brain_parameters import in_force
+from boebot.running.tasks import Member, Request
+from boebot_campaign.designs import Design
+
+MOST_RUNS = 10_000_000
+TRAIN, TEST = "train", "test"
+Pose = tuple[float, float, float]
+
+
+class Range(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename={"low": "from", "high": "to"}
+):
+    """Numbers from `low` to `high`; in a grid that many `steps`, both ends among them."""
+
+    low: float
+    high: float
+    steps: int = 0
+
+
+class Whole(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename={"low": "from", "high": "to"}
+):
+    """Whole numbers from `low` to `high`."""
+
+    low: int
+    high: int
+
+
+Axis = list[bool | int | float | str] | Range
+
+
+class Case(NamedTuple):
+    """One row of the plan."""
+
+    row: int
+    set: str
+    """TRAIN or TEST, by its arena"""
+    arena: str | None
+    brain: str
+    robot: str | None
+    parameters: Mapping[str, Any]
+    imperfections: Mapping[str, float]
+    faults: tuple[str, ...]
+    start: int
+    """number of the start"""
+    pose: Pose | None
+    """None: the arena's start, or a free place by chance"""
+    seed: int
+
+
+class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
+    """The keys of sweep.toml (docs/how-to/sweeps.md)."""
+
+    brains: list[str]
+    seconds: float
+    seeds: list[int] | Whole
+    robots: list[str] = []
+    arenas: list[str] = []
+    test_arenas: list[str] = []
+    on: str | None = None
+    starts: list[Pose] | int = []
+    design: Design = "grid"
+    points: int = 0
+    parameters: dict[str, Axis] = {}
+    imperfections: dict[str, Axis] = {}
+    faults: list[list[str]] = []
+    limit_s: float = 60.0
+
+    @cached_property
+    def axes(self) -> list[tuple[str, Axis]]:
+        """Parameters, then imperfections, by name."""
+        return [*self.parameters.items(), *self.imperfections.items()]
+
+    @cached_property
+    def sizes(self) -> tuple[int, ...]:
+        """How many there are of each that a row's number counts, the slowest first."""
+        points = math.prod(_length(axis) for _, axis in self.axes) if self.design == "grid" else self.points
+        starts = self.starts if isinstance(self.starts, int) else len(self.starts)
+        seeds = self.seeds.high - self.seeds.low + 1 if isinstance(self.seeds, Whole) else len(self.seeds)
+        return (
+            len(self.all_arenas),
+            len(self.brains),
+            len(self.all_robots),
+            points,
+            max(len(self.faults), 1),
+            max(starts, 1),
+            seeds,
+        )
+
+    @cached_property
+    def all_arenas(self) -> list[str | None]:
+        """Those of training, then those of tests; None: as the brain has it."""
+        return [*self.arenas, *self.test_arenas] or [None]
+
+    @cached_property
+    def all_robots(self) -> list[str | None]:
+        """None: as the brain has it."""
+        return [*self.robots] or [None]
+
+    @property
+    def count(self) -> int:
+        """How many rows there are."""
+        return math.prod(self.sizes)
+
+    @property
+    def first_seed(self) -> int:
+        """The design's, too."""
+        return self.seeds.low if isinstance(self.seeds, Whole) else self.seeds[0]
+
+    def case(self, row: int, points: np.ndarray) -> Case:
+        """The row of that number; `points`: of `designs.points`."""
+        rest, place = row, []
+        for size in reversed(self.sizes):
+            rest, index = divmod(rest, size)
+            place.append(index)
+        seed, start, faults, point, robot, brain, arena = place
+        values = self._values(point, points)
+        return Case(
+            row=row,
+            set=TRAIN if arena < max(len(self.arenas), 1) else TEST,
+            arena=self.all_arenas[arena],
+            brain=self.brains[brain],
+            robot=self.all_robots[robot],
+            parameters={name: values[name] for name in self.parameters},
+            imperfections={name: values[name] for name in self.imperfections},
+            faults=tuple(self.faults[faults]) if self.faults else (),
+            start=start,
+            pose=self.starts[start] if isinstance(self.starts, list) and self.starts else None,
+            seed=self.seeds.low + seed if isinstance(self.seeds, Whole) else self.seeds[seed],
+        )
+
+    def _values(self, point: int, points: np.ndarray) -> dict[str, Any]:
+        """Of each axis at that point of the design."""
+        values = {}
+        for column, (name, axis) in enumerate(self.axes):
+            if self.design == "grid":
+                point, index = divmod(point, _length(axis))
+                share = index / max(_length(axis) - 1, 1)
+            else:
+                share = float(points[point, column])
+                index = int(share * _length(axis))
+            values[name] = axis[index] if isinstance(axis, list) else axis.low + share * (axis.high - axis.low)
+        return values
+
+
+def read(path: Path) -> Plan:
+    """The plan in a file; what it names is found beside it.
+
+    Raises:
+        CallError: with file, line and key.
+    """
+    if not path.is_file():
+        raise CallError(f"there is no sweep file {path}; expected a TOML file")
+    table = toml_files.read(path, CallError)
+    plan = toml_files.convert(table, Plan, path.name, CallError)
+    return _checked(_found(plan, path.parent), f"{path.name}: ")
+
+
+def made(keys: Mapping[str, Any]) -> Plan:
+    """The plan of these keys, as a file could have them. Raises CallError."""
+    try:
+        plain = msgspec.to_builtins(dict(keys))
+    except TypeError as error:
+        raise CallError(f"a sweep is made of what TOML can have: {error}; brains are names or files") from None
+    return _checked(_found(toml_files.convert(plain, Plan, "sweep", CallError), Path()), "sweep: ")
+
+
+def _found(plan: Plan, folder: Path) -> Plan:
+    """With whole paths of files."""
+
+    def whole(names: list[str]) -> list[str]:
+        return [str((folder / name).absolute()) if Path(name).suffix in (".py", ".toml") else name for name in names]
+
+    kinds = ("brains", "robots", "arenas", "test_arenas")
+    return msgspec.structs.replace(plan, **{kind: whole(getattr(plan, kind)) for kind in kinds})
+
+
+def _length(axis: Axis) -> int:
+    return len(axis) if isinstance(axis, list) else axis.steps
+
+
+def _checked(plan: Plan, at: str) -> Plan:
+    """Raises CallError or another BoebotError, in one sentence, before anything is made."""
+    for key in ("brains", "seeds"):
+        if getattr(plan, key) == []:
+            raise CallError(f"{at}{key} is empty; expected at least one")
+    for name, values in (
+        ("arenas", [*plan.arenas, *plan.test_arenas]),
+        ("seeds", plan.seeds),
+        ("brains", plan.brains),
+        ("robots", plan.robots),
+    ):
+        short = [Path(one).name if isinstance(one, str) else one for one in values] if isinstance(values, list) else []
+        if len(set(short)) < len(short):
+            raise CallError(f"{at}{name} has one twice, by its name; expected each once")
+    if plan.test_arenas and not plan.arenas:
+        raise CallError(f"{at}there are test_arenas and no arenas; expected arenas, too, to train in")
+    if isinstance(plan.seeds, Whole) and plan.seeds.low > plan.seeds.high:
+        raise CallError(f"{at}seeds are from {plan.seeds.low} to {plan.seeds.high}; expected no less than from")
+    if isinstance(plan.starts, int) and plan.starts < 0:
+        raise CallError(f"{at}starts is {plan.starts}; expected poses, or a number of free places")
+    if not plan.limit_s > 0:
+        raise CallError(f"{at}limit_s is {plan.limit_s:g}; expected more than 0")
+    if plan.on is not None and is_live(plan.on):
+        raise CallError(f"{at}on is {plan.on!r}, a port; expected an emulated board, native or avr, or direct")
+    _check_design(plan, at)
+    if plan.count > MOST_RUNS:
+        raise CallError(f"{at}these are {plan.count:,} runs; expected at most {MOST_RUNS:,}")
+    _check_runs(plan)
+    return plan
+
+
+def _check_design(plan: Plan, at: str) -> None:
+    for name, axis in plan.axes:
+        if isinstance(axis, list) and not axis:
+            raise CallError(f"{at}{name} has no values; expected at least one")
+        if isinstance(axis, Range) and plan.design == "grid" and axis.steps < 2:
+            raise CallError(f"{at}{name} has {axis.steps} steps; expected 2 or more in a grid")
+        if isinstance(axis, Range) and plan.design != "grid" and axis.steps:
+            raise CallError(f"{at}{name} has steps, which only a grid takes; expected from and to")
+    if plan.design == "grid" and plan.points:
+        raise CallError(f"{at}a grid has {plan.points} points; it has as many as its values make: expected no points")
+    if plan.design == "sobol" and plan.points & (plan.points - 1):
+        near = 1 << plan.points.bit_length()
+        raise CallError(f"{at}a sobol design has {plan.points} points; expected a power of two, such as {near}")
+    if plan.design != "grid" and (plan.points < 1 or not plan.axes):
+        expected = "expected both points and values of parameters or imperfections"
+        raise CallError(f"{at}a {plan.design} design has {plan.points} points over {len(plan.axes)} axes; {expected}")
+
+
+def _check_runs(plan: Plan) -> None:
+    """Each brain with each robot, arena and choice of faults, and each value that is listed, is one that can run."""
+    for one, axis in plan.imperfections.items():
+        for value in _listed(axis):
+            checked({one: value})
+    for name in [*plan.arenas, *plan.test_arenas]:
+        load_arena(name)
+    for brain in plan.brains:
+        loaded = load_brain(brain)
+        first = {name: _listed(axis)[0] for name, axis in plan.parameters.items()}
+        for name, axis in plan.parameters.items():
+            for value in _listed(axis):
+                with in_force(loaded, {name: value}):
+                    pass
+        for robot in plan.all_robots:
+            for faults in plan.faults or [[]]:
+                for arena in plan.all_arenas:
+                    member = Member(brain=loaded, robot=robot, parameters=first)
+                    Request(members=[member], arena=arena, on=plan.on, seconds=plan.seconds, faults=faults).tasks()
+
+
+def _listed(axis: Axis) -> list[Any]:
+    return axis if isinstance(axis, list) else [axis.low, axis.high]

@@ -1,0 +1,199 @@
+"""One row of a sweep is one run: columns and their types, fixed by the plan, and how a run becomes a row.
+
+A row that is RAISED has its figures up to the error. Whether a run is TIMED_OUT or KILLED depends on the computer: it
+has no figures. Rows that are OK or RAISED are the same wherever they ran, but for the columns of APART.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import math
+import os
+import socket
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from boebot import missing
+from boebot.arenas import load_arena
+from boebot.brains import load_brain
+from boebot.errors import BoebotError
+from boebot.record.brain_record import BrainNames
+from boebot.running.loop import execute
+from boebot.running.tasks import Request, prepare
+from boebot_campaign.kept import Folder
+from boebot_campaign.plan import Case, Plan
+
+OK, RAISED, TIMED_OUT, KILLED = "ok", "raised", "timed out", "killed"
+APART = ("status", "error", "wall_time_s", "worker")
+GRACE_S = 5.0  # after the limit, until a run that cannot be ended takes its process with it
+_TEXTS = "board odometry_source unrealisable hung_at firmware image_hash hash"
+_COUNTS = """true_contacts whisker_touches steps late_steps behavior_switches ticks slow_readings lost_frames bad_frames
+    overruns dead_man_stops fallback_takeovers resets sessions_lost touched"""
+_NUMBERS = """run_time_s true_distance_m odometry_distance_m odometry_error_m battery_charge period_s
+    slow_reading_age_s"""
+FIGURES: Mapping[str, type] = {
+    name: kind for kind, names in ((str, _TEXTS), (int, _COUNTS), (float, _NUMBERS)) for name in names.split()
+}
+_one_run = threading.Lock()  # at a time: the process has one timer, and one handler of a signal
+
+
+class _TimeIsUpError(Exception):
+    """The run has lasted longer than its limit. No BoebotError: a run loop may take one for an end."""
+
+
+def columns(plan: Plan, brains: Sequence[str]) -> dict[str, type]:
+    """Name -> type of each column, in order; `brains`: the files or bundled names of those of the plan."""
+    loaded = [load_brain(name) for name in brains]
+    made_of = [names for one in loaded if (names := BrainNames.of(one.brain)) is not None]
+    shares = dict.fromkeys(f"{name}_share" for names in made_of for name in names.behaviors)
+    axes = {f"parameter.{name}": _kind(axis) for name, axis in plan.parameters.items()}
+    axes |= {f"imperfection.{name}": float for name in plan.imperfections}
+    return {
+        "row": int,
+        "set": str,
+        "arena": str,
+        "brain": str,
+        "robot": str,
+        **axes,
+        "faults": str,
+        "start": int,
+        "start_x_m": float,
+        "start_y_m": float,
+        "start_heading_rad": float,
+        "seed": int,
+        **FIGURES,
+        **dict.fromkeys(shares, float),
+        "status": str,
+        "error": str,
+        "wall_time_s": float,
+        "worker": str,
+    }
+
+
+def _kind(axis: Any) -> type:
+    """The type of an axis's values; of mixed ones text."""
+    kinds = {type(value) for value in axis} if isinstance(axis, list) else {float}
+    return kinds.pop() if len(kinds) == 1 else float if kinds == {int, float} else str
+
+
+def table_of(rows: list[dict[str, Any]], kinds: Mapping[str, type]) -> Any:
+    """As a pyarrow.Table, of the same schema for each part."""
+    arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+    arrow_of = {int: arrow.int64(), float: arrow.float64(), str: arrow.string(), bool: arrow.bool_()}
+    schema = arrow.schema([(name, arrow_of[kind]) for name, kind in kinds.items()])
+    fitting = [
+        {name: None if row.get(name) is None else kind(row[name]) for name, kind in kinds.items()} for row in rows
+    ]
+    return arrow.Table.from_pylist(fitting, schema=schema)
+
+
+def request_of(folder: Folder, case: Case) -> Request:
+    """The run of a row, from the files that the folder keeps."""
+    plan, arena = folder.plan, folder.place(case.arena)
+    brain, robot = folder.place(case.brain), folder.place(case.robot)
+    pose = case.pose
+    if pose is None and isinstance(plan.starts, int) and plan.starts:
+        pose = _free(arena, brain, robot, (plan.first_seed << 32) + case.start)
+    return Request.single(
+        brain,
+        robot,
+        pose=pose,
+        parameters=dict(case.parameters) or None,
+        imperfections=dict(case.imperfections) or None,
+        arena=arena,
+        on=plan.on,
+        seconds=plan.seconds,
+        seed=case.seed,
+        step_timeout=plan.limit_s,
+        faults=list(case.faults),
+    )
+
+
+@lru_cache(maxsize=4096)
+def _free(arena: str | None, brain: Any, robot: Any, seed: int) -> tuple[float, float, float]:
+    """A free start by chance, where that robot fits."""
+    loaded, description, _ = prepare(brain, robot, None)
+    if arena is None and robot is None:
+        arena = loaded.arena
+    return _arena(arena).free_start(description.body.reach_m, seed % 2**64)
+
+
+_arena = lru_cache(maxsize=8)(load_arena)
+
+
+def begun(case: Case) -> dict[str, Any]:
+    """The columns that are known before the run."""
+    x, y, heading = case.pose or (None, None, None)
+    return {
+        "row": case.row,
+        "set": case.set,
+        "arena": _short(case.arena),
+        "brain": _short(case.brain),
+        "robot": _short(case.robot),
+        "faults": ", ".join(case.faults) or None,
+        "start": case.start,
+        "start_x_m": x,
+        "start_y_m": y,
+        "start_heading_rad": heading,
+        "seed": case.seed,
+        **{f"parameter.{name}": value for name, value in case.parameters.items()},
+        **{f"imperfection.{name}": value for name, value in case.imperfections.items()},
+    }
+
+
+def _short(name: str | None) -> str | None:
+    """A file by its name alone: its folder differs from computer to computer."""
+    return name and Path(name).name
+
+
+def killed(case: Case) -> dict[str, Any]:
+    """The row of a run that ended its process twice."""
+    return begun(case) | {"status": KILLED, "error": "the run has ended its worker's process, twice"}
+
+
+def run_case(folder: Folder, case: Case) -> dict[str, Any]:
+    """Runs a case. Only what the run raises becomes a row."""
+    with _one_run:
+        return _run(folder, case)
+
+
+def _run(folder: Folder, case: Case) -> dict[str, Any]:
+    limit_s, since = folder.plan.limit_s, time.perf_counter()
+
+    def in_time(_: float) -> None:
+        if time.perf_counter() - since > limit_s:
+            raise _TimeIsUpError
+
+    row, error, result = begun(case), None, None
+    with (folder.path / ".hung.log").open("a") as hung:
+        if math.isfinite(limit_s):
+            faulthandler.dump_traceback_later(limit_s + GRACE_S, exit=True, file=hung)
+        try:
+            request = request_of(folder, case)
+            if (pose := request.members[0].pose) is not None:
+                row |= dict(zip(("start_x_m", "start_y_m", "start_heading_rad"), pose, strict=True))
+            result = execute(request, in_time)
+            error = result.error
+        except (BoebotError, _TimeIsUpError) as raised:
+            error = raised
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    wall_s = time.perf_counter() - since
+    status = OK if error is None else TIMED_OUT if wall_s > limit_s else RAISED
+    row |= {"status": status, "wall_time_s": round(wall_s, 3), "worker": f"{socket.gethostname()}:{os.getpid()}"}
+    if status == TIMED_OUT:
+        row["error"] = f"the run has lasted longer than {limit_s:g} s"
+    elif error is not None:
+        row["error"] = str(error).replace(f"{folder.path}{os.sep}", "")
+    if result is not None and status in (OK, RAISED):
+        row |= {name: value for name, value in result.robots[0].table().items() if name not in row and name != "ended"}
+    if not gc.get_freeze_count():
+        gc.freeze()
+    return row

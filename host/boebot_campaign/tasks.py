@@ -1,0 +1,101 @@
+"""What a worker does: the rows of a part, one by one, and the part's file. How a row that kills its worker is found.
+
+Before a row is run, a line is added to the part's file of markers, which goes when the part is there. Markers of
+another worker say that it has died: all rows but the last one begun are then run in parts of their own, and the suspect
+last, alone. Where two workers have died by a row, the row says so, and is not run again. So whatever Dask does with a
+task whose worker has died, each row is there once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+import uuid
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from boebot.record.run_folder import unwritable
+from boebot_campaign.kept import Folder, opened, write_part
+from boebot_campaign.plan import Plan
+from boebot_campaign.rows import columns, killed, run_case, table_of
+
+_me = uuid.uuid4().hex  # of this process
+
+
+def do_part(path: str, stamp: str, first: int, end: int) -> float:
+    """Sees to it that the rows from `first` to before `end` are in parts; returns the seconds that it took."""
+    since = time.perf_counter()
+    _do(opened(Path(path), stamp), first, end)
+    return time.perf_counter() - since
+
+
+def _do(folder: Folder, first: int, end: int) -> None:
+    part = folder.part(first, end)
+    if part.is_file():  # Dask repeats tasks whose worker has gone after they were done
+        return
+    markers = part.with_suffix(".begun")
+    lines = _others(markers)
+    if not lines or (end - first == 1 and len({who for _, who in lines}) == 1):
+        with _no_death(markers):
+            write_part(part, table_of(_rows(folder, first, end, markers), _columns(folder)))
+    elif end - first == 1:
+        case = folder.plan.case(first, folder.points)
+        write_part(part, table_of([killed(case)], _columns(folder)))
+    else:
+        suspect, who = lines[-1]
+        alone = folder.part(suspect, suspect + 1)
+        if not alone.is_file():
+            _mark(alone.with_suffix(".begun"), suspect, who)
+        for low, high in ((first, suspect), (suspect + 1, end), (suspect, suspect + 1)):
+            if folder.undone(low, high):
+                _do(folder, low, high)
+    markers.unlink(missing_ok=True)
+
+
+def _rows(folder: Folder, first: int, end: int, markers: Path) -> list[dict[str, Any]]:
+    rows = []
+    for row in range(first, end):
+        _mark(markers, row, _me)
+        rows.append(run_case(folder, folder.plan.case(row, folder.points)))
+    return rows
+
+
+@contextlib.contextmanager
+def _no_death(markers: Path) -> Iterator[None]:
+    """Whatever is raised in the block, such as by a full disk, leaves no markers of this process."""
+    try:
+        yield
+    except BaseException:
+        markers.unlink(missing_ok=True)
+        raise
+
+
+def _mark(markers: Path, row: int, who: str) -> None:
+    if (row, who) in _lines(markers):
+        return
+    try:
+        with markers.open("a") as file:
+            file.write(f"{row} {who}\n")
+    except OSError as error:
+        raise unwritable(markers.parent, error, "the sweep's files") from None
+
+
+def _others(markers: Path) -> list[tuple[int, str]]:
+    """Row and process of each line of another process, in order."""
+    return [(row, who) for row, who in _lines(markers) if who != _me]
+
+
+def _lines(markers: Path) -> list[tuple[int, str]]:
+    with contextlib.suppress(FileNotFoundError):
+        parts = (line.split() for line in markers.read_text().splitlines())
+        return [(int(part[0]), part[1]) for part in parts if len(part) == 2]
+    return []
+
+
+@lru_cache(maxsize=2)
+def _columns(folder: Folder) -> dict[str, type]:
+    plan: Plan = folder.plan
+    names = [folder.place(name) or name for name in plan.brains]
+    return columns(plan, names)

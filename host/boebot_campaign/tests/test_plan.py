@@ -1,0 +1,87 @@
+"""Plans: which rows there are, and one sentence for what cannot be run, before anything is made."""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+import boebot
+from boebot.errors import BoebotError
+from boebot_campaign import designs, plan
+
+ONE = {"brains": ["demo"], "seconds": 1.0, "seeds": [1]}
+
+
+def test_rows_are_all_combinations_each_once_and_seeds_are_paired() -> None:
+    made = plan.made(
+        {
+            "brains": ["demo", "clearway"],
+            "robots": ["shieldbot-charging"],
+            "arenas": ["room"],
+            "test_arenas": ["station"],
+            "seconds": 1.0,
+            "seeds": {"from": 5, "to": 7},
+            "starts": [[0.0, 0.0, 0.0], [0.5, 0.5, 1.0]],
+            "parameters": {"avoid.utility.b": [0.0, 1.0]},
+            "imperfections": {"servo_lag_s": {"from": 0.02, "to": 0.08, "steps": 3}},
+        }
+    )
+    none = designs.points(made.design, made.points, 2, 1)
+    cases = [made.case(row, none) for row in range(made.count)]
+    found = {
+        (one.arena, one.brain, one.parameters["avoid.utility.b"], one.imperfections["servo_lag_s"], one.pose, one.seed)
+        for one in cases
+    }
+    poses = [(0.0, 0.0, 0.0), (0.5, 0.5, 1.0)]
+    wanted = product(["room", "station"], ["demo", "clearway"], [0.0, 1.0], [0.02, 0.05, 0.08], poses, [5, 6, 7])
+    assert found == set(wanted) and len(cases) == 2 * 2 * 2 * 3 * 2 * 3
+    assert {(one.arena, one.set) for one in cases} == {("room", "train"), ("station", "test")}
+    pairs = [[(one.start, one.seed) for one in cases if one.brain == brain] for brain in ("demo", "clearway")]
+    assert pairs[0] == pairs[1]
+
+
+@pytest.mark.parametrize("design", ["random", "latin", "sobol"])
+def test_designs_fill_the_range_and_are_the_same_each_time(design: designs.Design) -> None:
+    once, again = (designs.points(design, 64, 3, seed=4) for _ in range(2))
+    assert (once == again).all() and (designs.points(design, 64, 3, seed=5) != once).any()
+    assert once.shape == (64, 3) and once.min() >= 0 and once.max() < 1
+    if design != "random":  # each 64th of each axis has one point
+        assert all(sorted((64 * column).astype(int)) == list(range(64)) for column in once.T)
+
+
+BAD = {
+    "no seeds": ({"seeds": []}, "seeds is empty"),
+    "too many runs": ({"seeds": {"from": 1, "to": 10**12}}, "1,000,000,000,000 runs"),
+    "no such parameter": ({"parameters": {"avoid.trun": [0.1]}}, "no parameter 'avoid.trun'.*avoid.turn"),
+    "parameter of a brain that has none": (
+        {"brains": ["wander"], "parameters": {"a.b": [1]}},
+        "has no parameter 'a.b'",
+    ),
+    "value that the process refuses": ({"parameters": {"wander.turn_probability": [7.0]}}, "turn_probability"),
+    "no such imperfection": ({"imperfections": {"servo_lag": [0.1]}}, "no imperfection 'servo_lag'"),
+    "unknown key": ({"seed": [1]}, "no key 'seed'.*did you mean 'seeds'"),
+    "no brain file": ({"brains": ["none_such.py"]}, "no brain file .*none_such.py"),
+    "no such arena": ({"arenas": ["rom"]}, "no arena 'rom'"),
+    "no such fault": ({"faults": [["ping.mising@1"]]}, "ping.mising"),
+    "a port": ({"on": "/dev/ttyACM0"}, "a port"),
+    "design without points": ({"design": "latin", "parameters": {"avoid.utility.b": {"from": 0, "to": 1}}}, "0 points"),
+    "sobol of odd points": (
+        {"design": "sobol", "points": 100, "parameters": {"avoid.utility.b": {"from": 0, "to": 1}}},
+        "power of two",
+    ),
+    "grid without steps": ({"parameters": {"avoid.utility.b": {"from": 0, "to": 1}}}, "0 steps"),
+    "limit of nothing": ({"limit_s": 0.0}, "limit_s"),
+}
+
+
+@pytest.mark.parametrize(("keys", "sentence"), BAD.values(), ids=BAD.keys())
+def test_what_cannot_be_run_is_one_sentence_and_no_folder(
+    keys: dict[str, object], sentence: str, tmp_path: Path
+) -> None:
+    with pytest.raises(BoebotError) as caught:
+        boebot.sweep(out=tmp_path / "out", **{**ONE, **keys})
+    assert re.search(sentence, str(caught.value)) and "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()

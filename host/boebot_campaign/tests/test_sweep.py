@@ -1,0 +1,251 @@
+"""Sweeps by the command and from Python: every row once, the same rows whatever happened on the way."""
+
+from __future__ import annotations
+
+import json
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import boebot
+from boebot.errors import BoebotError
+from boebot_campaign import kept, plan, tasks
+from boebot_campaign.rows import APART
+
+COMMAND = [sys.executable, "-m", "boebot", "sweep"]
+PLAN = """\
+brains = ["odd.py", "clearway"]
+robots = ["shieldbot"]
+arenas = ["room"]
+seconds = 1
+seeds = { from = 1, to = 10 }
+starts = 2
+"""
+ODD = """\
+brains = ["odd.py"]
+seconds = 1
+seeds = [1, 2]
+limit_s = 1.5
+[parameters]
+"odd.how" = ["well", "raises", "loops", "kills"]
+"""
+
+
+def saved(folder: Path, text: str) -> Path:
+    shutil.copy(Path(__file__).with_name("odd.py"), folder)
+    (folder / "sweep.toml").write_text(text)
+    return folder / "sweep.toml"
+
+
+def rows_of(folder: Path) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = kept.Folder(folder).table().to_pylist()
+    return [{name: value for name, value in row.items() if name not in APART} for row in rows]
+
+
+def at_a_worker(out: Path, *parts: tuple[int, int], file_bytes: int = -1) -> subprocess.CompletedProcess[str]:
+    """A process that does those parts one after the other, as Dask's workers do; the largest file that it may write."""
+    code = (
+        "import json, sys; from boebot_campaign import kept, tasks; from pathlib import Path; out = sys.argv[1]; "
+        "[tasks.do_part(out, kept.Folder(Path(out)).stamp, *part) for part in json.loads(sys.argv[2])]"
+    )
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, resource.RLIM_INFINITY))
+
+    command = [sys.executable, "-c", code, str(out), json.dumps(parts)]
+    return subprocess.run(command, preexec_fn=limited, capture_output=True, text=True)
+
+
+def by_hand(out: Path, file: Path, *parts: tuple[int, int]) -> list[dict[str, Any]]:
+    """The rows after those parts, or else all that are not there yet, were done in that order without a cluster."""
+    with kept.locked(out, plan.read(file)) as folder:
+        done = at_a_worker(out, *(parts or folder.undone()))
+        assert done.returncode == 0, done.stderr
+        folder.merge()
+    return rows_of(out)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a plan, and its sweep in `out`, with two workers."""
+    folder = tmp_path_factory.mktemp("sweep")
+    boebot.sweep(saved(folder, PLAN), out=folder / "out", workers=2)
+    return folder
+
+
+def test_rows_do_not_depend_on_workers_parts_and_their_order(undisturbed: Path) -> None:
+    rows = rows_of(undisturbed / "out")
+    assert [row["row"] for row in rows] == list(range(40)) and len({row["hash"] for row in rows}) > 30
+    assert by_hand(undisturbed / "again", undisturbed / "sweep.toml", (30, 40), (0, 7), (5, 30)) == rows
+
+
+def test_a_killed_and_resumed_sweep_has_the_same_rows(undisturbed: Path, tmp_path: Path) -> None:
+    file, out = saved(tmp_path, PLAN), tmp_path / "out"
+    begun = subprocess.Popen([*COMMAND, str(file), "--out", str(out), "--workers", "1"], stderr=subprocess.DEVNULL)
+    until = time.perf_counter() + 60
+    while not list(out.glob("parts/*.parquet")) and time.perf_counter() < until:
+        time.sleep(0.02)
+    begun.kill()
+    begun.wait()
+    assert len(kept.Folder(out).done()) > 0 and kept.Folder(out).undone()
+    until = time.perf_counter() + 10
+    while ended_workers() and time.perf_counter() < until:
+        time.sleep(0.05)
+    assert not ended_workers()
+    assert by_hand(out, file) == rows_of(undisturbed / "out")
+
+
+def ended_workers() -> list[str]:
+    """Helper processes whose parent has gone."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            words, status = (entry / "cmdline").read_bytes(), (entry / "status").read_text()
+        except OSError:
+            continue
+        if b"boebot_campaign.local" in words and re.search(r"PPid:\t1$", status, re.MULTILINE):
+            found.append(entry.name)
+    return found
+
+
+@pytest.mark.soak
+def test_ctrl_c_is_a_sentence_and_leaves_no_process(tmp_path: Path) -> None:
+    file, out = saved(tmp_path, PLAN), tmp_path / "out"
+    begun = subprocess.Popen(
+        [*COMMAND, str(file), "--out", str(out), "--workers", "1"], stderr=subprocess.PIPE, text=True
+    )
+    until = time.perf_counter() + 60
+    while not list(out.glob("parts/*.parquet")) and time.perf_counter() < until:
+        time.sleep(0.02)
+    begun.send_signal(signal.SIGINT)
+    _, said = begun.communicate(timeout=20)
+    assert begun.returncode == 130 and "the same command goes on" in said and "Traceback" not in said
+    assert not ended_workers() and kept.Folder(out).done()
+
+
+@pytest.mark.soak
+def test_runs_that_raise_hang_or_kill_are_rows(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [*COMMAND, str(saved(tmp_path, ODD)), "--workers", "2", "--json"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["statuses"] == {"ok": 2, "raised": 2, "timed out": 2, "killed": 2}
+    rows = kept.Folder(tmp_path / "sweep").table().to_pylist()
+    assert [row["status"] for row in rows] == ["ok"] * 2 + ["raised"] * 2 + ["timed out"] * 2 + ["killed"] * 2
+    raised, *others = rows[2], rows[4], rows[6]
+    assert (
+        0.5 <= raised["run_time_s"] < 0.7 and "odd.py, line" in raised["error"] and str(tmp_path) not in raised["error"]
+    )
+    assert all(row["run_time_s"] is None and row["hash"] is None for row in others)
+
+
+@pytest.mark.soak
+def test_a_sleep_that_no_signal_ends_takes_its_worker_with_it(tmp_path: Path) -> None:
+    done = boebot.sweep(saved(tmp_path, ODD.replace('"loops", "kills"', '"sleeps"')), out=tmp_path / "out", workers=1)
+    rows = done.table().to_pylist()
+    assert {row["status"] for row in rows[4:]} <= {"timed out", "killed"} and [row["status"] for row in rows[:2]] == [
+        "ok"
+    ] * 2
+
+
+@pytest.mark.soak
+def test_a_full_disk_ends_the_sweep_in_a_sentence_and_loses_no_row(undisturbed: Path, tmp_path: Path) -> None:
+    file, out = saved(tmp_path, PLAN), tmp_path / "out"
+
+    def small() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
+
+    command = [*COMMAND, str(file), "--out", str(out), "--workers", "1"]
+    done = subprocess.run(command, preexec_fn=small, capture_output=True, text=True)
+    assert (
+        done.returncode == 1 and "the sweep's files cannot be written" in done.stderr and "Traceback" not in done.stderr
+    )
+    assert not list(out.glob("parts/.*")) and kept.Folder(out).undone() == [(0, 40)]
+    assert by_hand(out, file) == rows_of(undisturbed / "out")
+
+
+def test_a_full_disk_leaves_no_half_part(undisturbed: Path, tmp_path: Path) -> None:
+    file, out = saved(tmp_path, PLAN), tmp_path / "out"
+    with kept.locked(out, plan.read(file)) as folder:
+        done = at_a_worker(out, (0, 40), file_bytes=6000)
+        assert done.returncode == 1 and "BoebotError: the sweep's files cannot be written to" in done.stderr
+        assert not list(folder.parts.iterdir())
+    assert by_hand(out, file) == rows_of(undisturbed / "out")
+
+
+def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(tmp_path: Path) -> None:
+    file, out = saved(tmp_path, ODD.replace('"raises", "loops", "kills"', '"kills", "raises"')), tmp_path / "out"
+    with kept.locked(out, plan.read(file)) as folder:
+        for _ in range(4):  # two rows, two deaths each
+            assert at_a_worker(out, (0, 6)).returncode == -signal.SIGKILL
+        assert at_a_worker(out, (0, 6)).returncode == 0
+        assert not list(folder.parts.glob("*.begun"))
+        folder.merge()
+    rows = kept.Folder(out).table().to_pylist()
+    assert [row["status"] for row in rows] == ["ok"] * 2 + ["killed"] * 2 + ["raised"] * 2
+    raised, lost = rows[4], rows[2]
+    assert (
+        0.5 <= raised["run_time_s"] < 0.7 and "odd.py, line" in raised["error"] and str(tmp_path) not in raised["error"]
+    )
+    assert lost["run_time_s"] is None and lost["hash"] is None
+
+
+def test_a_run_beyond_the_limit_is_a_row_without_figures(tmp_path: Path) -> None:
+    text = ODD.replace('["well", "raises", "loops", "kills"]', '["loops"]').replace("1.5", "0.3")
+    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text))) as folder:
+        assert at_a_worker(folder.path, (0, 1)).returncode == 0
+        row = folder.table().to_pylist()[0]
+    assert row["status"] == "timed out" and row["error"] == "the run has lasted longer than 0.3 s"
+    assert row["hash"] is None and row["run_time_s"] is None
+
+
+def test_after_a_change_it_is_refused_and_the_file_named(undisturbed: Path, tmp_path: Path) -> None:
+    shutil.copytree(undisturbed, tmp_path / "copy")
+    file, out = tmp_path / "copy" / "sweep.toml", tmp_path / "copy" / "out"
+    (out / "rows.parquet").unlink()
+    file.write_text(PLAN.replace("to = 10", "to = 11"))
+    with pytest.raises(BoebotError, match=r"sweep.toml has changed .* in seeds"):
+        boebot.sweep(file, out=out)
+    copy = next(out.glob("files/brain-0/odd.py"))
+    copy.write_text(copy.read_text() + "\n")
+    with pytest.raises(BoebotError, match=re.escape(str(copy))):
+        boebot.sweep(undisturbed / "sweep.toml", out=out)
+
+
+def test_a_kept_row_is_run_again(undisturbed: Path) -> None:
+    row = rows_of(undisturbed / "out")[27]
+    command = [sys.executable, "-m", "boebot", "run", "--sweep", str(undisturbed / "out"), "--row", "27", "--json"]
+    (undisturbed / "odd.py").write_text("raise OSError('the kept one is meant')\n")
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert json.loads(done.stdout)["hash"] == row["hash"]
+
+
+def test_a_report_has_intervals_and_compares_the_brains(undisturbed: Path) -> None:
+    command = [sys.executable, "-m", "boebot", "report", str(undisturbed / "out"), "--json"]
+    said = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    rows = kept.Folder(undisturbed / "out").table().to_pylist()
+    ways = {name: [row["true_distance_m"] for row in rows if row["brain"] == name] for name in ("clearway", "odd.py")}
+    for level in (one for one in said["levels"] if one["factor"] == "brain"):
+        mean, least, most = level["true_distance_m"]
+        assert least < mean < most and mean == pytest.approx(sum(ways[level["value"]]) / 20)
+    pair = said["compared"][0]["true_distance_m"]
+    assert pair["pairs"] == 20
+    assert pair["difference"][0] == pytest.approx(sum(ways["clearway"]) / 20 - sum(ways["odd.py"]) / 20)
+    assert Path(said["files"][0]).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:
+    file = saved(tmp_path, PLAN)
+    with kept.locked(tmp_path / "out", plan.read(file)) as folder:
+        folder.part(0, 3).write_bytes(b"not looked at")
+        assert tasks.do_part(str(folder.path), folder.stamp, 0, 3) < 1.0
+        assert list(folder.parts.iterdir()) == [folder.part(0, 3)]
+        assert folder.part(0, 3).read_bytes() == b"not looked at"
