@@ -7,6 +7,8 @@ or whose scheduler has gone, is submitted again.
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import contextlib
 import subprocess
 import sys
@@ -28,10 +30,12 @@ PART_S = 1.0  # that a task should take
 MOST_ROWS = 10_000  # of a task
 AHEAD = 3  # tasks a worker that are submitted
 POLL_S = 0.02
+LOOK_S = 1.0  # from look to look at how many workers there are
 BACK_S = 60.0  # wait for a scheduler that has gone
 DEATHS = 5  # more of a task than its rows can account for
 LOG = ".workers.log"
 
+_GONE = (OSError, TimeoutError, asyncio.CancelledError, concurrent.futures.CancelledError)
 Told = Callable[[int], object]
 """Is called with how many rows are done."""
 
@@ -60,19 +64,33 @@ class _Work:
         self._count = folder.plan.count
         self._done = self._count - sum(end - first for first, end in self._gaps)
         self._row_s: float | None = None
+        self._workers, self._looks_s, self._seen_s = 1, 0.0, time.perf_counter()
         self._pending: dict[Any, tuple[int, int]] = {}
         self._deaths: dict[tuple[int, int], int] = {}
 
     def all(self) -> None:
         self._told(self._done)
         while self._gaps or self._pending:
+            self._look()
             self._submit()
             for future in [one for one in self._pending if one.status != "pending"]:
                 self._settle(future, *self._pending.pop(future))
             time.sleep(POLL_S)
 
+    def _look(self) -> None:
+        """At the workers, now and then. Raises BoebotError where those of this computer have gone and none comes."""
+        now = time.perf_counter()
+        if now < self._looks_s:
+            return
+        self._looks_s = now + LOOK_S
+        with contextlib.suppress(*_GONE):  # the scheduler has gone: its tasks say so
+            self._workers = len(self._client.nthreads())
+        self._seen_s = now if self._workers else self._seen_s
+        if self._is_local and now - self._seen_s > BACK_S:
+            raise BoebotError(f"the workers of this computer have ended; {self._folder.path / LOG} may say why")
+
     def _submit(self) -> None:
-        most = AHEAD * max(len(self._client.scheduler_info()["workers"]), 1)
+        most = AHEAD * max(self._workers, 1)
         while self._gaps and len(self._pending) < most:
             first, end = self._gaps.popleft()
             rows = 1 if self._row_s is None else int(min(max(PART_S / max(self._row_s, 1e-6), 1), MOST_ROWS))
@@ -90,19 +108,19 @@ class _Work:
         )
 
     def _settle(self, future: Any, first: int, end: int) -> None:
-        if future.status == "finished":
-            row_s = future.result() / (end - first)
-            self._row_s = row_s if self._row_s is None else 0.8 * self._row_s + 0.2 * row_s
-            self._done += end - first
-            self._told(self._done)
-            return
-        error = future.exception() if future.status == "error" else None
+        error: BaseException | None = None
+        with contextlib.suppress(*_GONE):  # its status may be known, and what it gives be lost with the scheduler
+            if future.status == "finished":
+                row_s = future.result(timeout=BACK_S) / (end - first)
+                self._row_s = row_s if self._row_s is None else 0.8 * self._row_s + 0.2 * row_s
+                self._done += end - first
+                self._told(self._done)
+                return
+            error = future.exception(timeout=BACK_S) if future.status == "error" else None
+        if isinstance(error, BoebotError):
+            raise error
         if error is not None and type(error).__name__ != "KilledWorker":
-            raise (
-                error
-                if isinstance(error, BoebotError)
-                else BoebotError(f"a worker of the sweep has failed: {type(error).__name__}: {error}")
-            )
+            raise BoebotError(f"a worker of the sweep has failed: {type(error).__name__}: {error}")
         deaths = self._deaths[first, end] = self._deaths.get((first, end), 0) + 1
         if deaths > DEATHS + 2 * (end - first):
             raise BoebotError(f"workers die before they begin; {self._folder.path / LOG} may say why")
@@ -114,7 +132,7 @@ class _Work:
         """After its end; of this computer there is no other."""
         until = time.perf_counter() + (0.0 if self._is_local else BACK_S)
         while True:
-            with contextlib.suppress(TimeoutError, OSError):
+            with contextlib.suppress(*_GONE):
                 if self._client.status == "running":
                     self._client.wait_for_workers(1, timeout=1.0)
                     return

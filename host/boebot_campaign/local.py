@@ -14,6 +14,7 @@ QUIET = {
     "distributed.admin.system-monitor.interval": "5s",
     "distributed.scheduler.allowed-failures": 0,  # boebot_campaign.tasks finds out which row it was
     "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.deploy.lost-worker-timeout": "3650 days",  # 15 s after a death it closes a worker that just restarts
 }
 """What Dask does beside the work costs a tenth of it by default."""
 

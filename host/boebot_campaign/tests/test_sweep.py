@@ -7,6 +7,7 @@ import re
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -249,3 +250,42 @@ def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:
         assert tasks.do_part(str(folder.path), folder.stamp, 0, 3) < 1.0
         assert list(folder.parts.iterdir()) == [folder.part(0, 3)]
         assert folder.part(0, 3).read_bytes() == b"not looked at"
+
+
+@pytest.mark.soak
+def test_a_sweep_outlives_a_scheduler_that_is_begun_anew(undisturbed: Path, tmp_path: Path) -> None:
+    file, out = saved(tmp_path, PLAN), tmp_path / "out"
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    url = f"tcp://127.0.0.1:{port}"
+    dask = [sys.executable, "-m", "dask"]
+    begun: list[subprocess.Popen[Any]] = []
+    log = (tmp_path / "log").open("w")
+
+    def begin(command: list[str]) -> subprocess.Popen[Any]:
+        begun.append(subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=log))
+        return begun[-1]
+
+    def cluster() -> subprocess.Popen[Any]:
+        scheduler = begin([*dask, "scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"])
+        begin([*dask, "worker", url, "--nthreads", "1", "--no-dashboard"])
+        return scheduler
+
+    try:
+        first = cluster()
+        sweep = begin([*COMMAND, str(file), "--out", str(out), "--scheduler", url])
+        until = time.perf_counter() + 60
+        while not list(out.glob("parts/*.parquet")) and time.perf_counter() < until:
+            time.sleep(0.02)
+        first.kill()
+        first.wait()
+        cluster()
+        assert sweep.wait(90) == 0, (tmp_path / "log").read_text()
+        assert rows_of(out) == rows_of(undisturbed / "out")
+    finally:
+        for process in begun:
+            process.terminate()
+        for process in begun:
+            process.wait(20)
+        log.close()
