@@ -17,8 +17,10 @@ from typing import Any
 import pytest
 
 import boebot
+from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
 from boebot_campaign import kept, plan, tasks
+from boebot_campaign.report import report
 from boebot_campaign.rows import APART
 
 COMMAND = [sys.executable, "-m", "boebot", "sweep"]
@@ -182,17 +184,19 @@ def test_a_full_disk_leaves_no_half_part(undisturbed: Path, tmp_path: Path) -> N
     assert by_hand(out, file) == rows_of(undisturbed / "out")
 
 
-def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(tmp_path: Path) -> None:
-    file, out = saved(tmp_path, ODD.replace('"raises", "loops", "kills"', '"kills", "raises"')), tmp_path / "out"
+@pytest.mark.parametrize("each", [1, pytest.param(2, marks=pytest.mark.soak)])
+def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(each: int, tmp_path: Path) -> None:
+    text = ODD.replace('"raises", "loops", "kills"', '"kills", "raises"')
+    file, out = saved(tmp_path, text if each == 2 else text.replace("[1, 2]", "[1]")), tmp_path / "out"
     with kept.locked(out, plan.read(file)) as folder:
-        for _ in range(4):  # two rows, two deaths each
-            assert at_a_worker(out, (0, 6)).returncode == -signal.SIGKILL
-        assert at_a_worker(out, (0, 6)).returncode == 0
+        for _ in range(2 * each):
+            assert at_a_worker(out, (0, 3 * each)).returncode == -signal.SIGKILL
+        assert at_a_worker(out, (0, 3 * each)).returncode == 0
         assert not list(folder.parts.glob("*.begun"))
         folder.merge()
     rows = kept.Folder(out).table().to_pylist()
-    assert [row["status"] for row in rows] == ["ok"] * 2 + ["killed"] * 2 + ["raised"] * 2
-    raised, lost = rows[4], rows[2]
+    assert [row["status"] for row in rows] == ["ok"] * each + ["killed"] * each + ["raised"] * each
+    raised, lost = rows[2 * each], rows[each]
     assert (
         0.5 <= raised["run_time_s"] < 0.7 and "odd.py, line" in raised["error"] and str(tmp_path) not in raised["error"]
     )
@@ -229,9 +233,9 @@ def test_a_kept_row_is_run_again(undisturbed: Path) -> None:
     assert json.loads(done.stdout)["hash"] == row["hash"]
 
 
-def test_a_report_has_intervals_and_compares_the_brains(undisturbed: Path) -> None:
-    command = [sys.executable, "-m", "boebot", "report", str(undisturbed / "out"), "--json"]
-    said = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+def test_a_report_has_intervals_and_compares_the_brains(undisturbed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report(undisturbed / "out", Detail.JSON)
+    said = json.loads(capsys.readouterr().out)
     rows = kept.Folder(undisturbed / "out").table().to_pylist()
     ways = {name: [row["true_distance_m"] for row in rows if row["brain"] == name] for name in ("clearway", "odd.py")}
     for level in (one for one in said["levels"] if one["factor"] == "brain"):
