@@ -39,6 +39,19 @@ from boebot.record.overview import Overview, overview
 from boebot.record.record import Record, Unrecorded
 from boebot.record.truth import Pose, plan_of, truth_of
 
+_TEXTS = """brain robot board arena without imperfections parameters odometry_source unrealisable hung_at faults
+    firmware compiler image_hash program_hash hash ended"""
+_COUNTS = """seed true_contacts whisker_touches steps late_steps behavior_switches ticks slow_readings lost_frames
+    bad_frames overruns dead_man_stops fallback_takeovers resets sessions_lost touched"""
+_NUMBERS = """run_time_s true_distance_m odometry_distance_m odometry_error_m battery_charge period_s
+    slow_reading_age_s"""
+FIGURES: Mapping[str, type] = {
+    name: kind for kind, names in ((str, _TEXTS), (int, _COUNTS), (float, _NUMBERS)) for name in names.split()
+}
+"""The figures of any run (`Run.table`) by name, each with its type where it is not None. A run of a brain of processes
+has one more for each behavior, a float: its name and SHARE."""
+SHARE = "_share"
+
 
 @dataclass(kw_only=True, repr=False)
 class Run:
@@ -287,8 +300,9 @@ class Run:
         return self.run_time / self.wall_time if self.wall_time else None
 
     def table(self) -> dict[str, Any]:
-        """The run's figures by name: numbers and texts, units in the names; None: not known, or nothing that this robot
-        has. Runs that are equal have equal ones: what depends on this computer's speed is in `wall_clock`."""
+        """The run's figures by name (FIGURES): numbers and texts, units in the names; None: not known, or nothing that
+        this robot has. Runs that are equal have equal ones: what depends on this computer's speed is in
+        `wall_clock`."""
         few, identity = self.overview, self.identity
         brain, on_board = few.brain, self.layout is None and self.is_recorded
         unknown = dict.fromkeys(() if self.brain_names is None else self.brain_names.behaviors)
@@ -315,7 +329,7 @@ class Run:
             "late_steps": self.late_steps,
             "unrealisable": self.unrealisable,
             "behavior_switches": None if brain is None else brain.behavior_switches,
-            **{f"{name}_share": _rounded(share, 4) for name, share in shares.items()},
+            **{f"{name}{SHARE}": _rounded(share, 4) for name, share in shares.items()},
             "ticks": None if self.program else self.ticks,
             "slow_readings": None if few.slow_reading_age is None else sum(map(self.record.count, MESSAGES)),
             "slow_reading_age_s": _rounded(few.slow_reading_age, 6),

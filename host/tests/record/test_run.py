@@ -9,6 +9,7 @@ import json
 import struct
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,6 +20,7 @@ from boebot.cli.ending import five_rows
 from boebot.cognition import near
 from boebot.live.live_view import LiveView
 from boebot.record import record
+from boebot.record.run import FIGURES, SHARE
 from boebot.record.run_folder import RunFolder
 from boebot.result import RunResult, read_run
 from boebot.running.loop import execute
@@ -26,7 +28,7 @@ from boebot.running.tasks import Request
 from boebot.view.tables import write_summary
 
 ROBOTS = ("arsim", "shieldbot-charging")  # without a board, and with one that has slow devices
-FIGURES = (cached_property, property)
+COMPUTED = (cached_property, property)
 
 
 def mind() -> Brain:
@@ -73,6 +75,26 @@ def test_each_robot_of_a_run_has_its_hash() -> None:
     assert one.hash == digest(one) and other.hash == digest(other) != one.hash
 
 
+@pytest.mark.parametrize("robot", [*ROBOTS, "rover"])
+def test_figures_are_those_of_every_table_with_their_types(robot: str, tmp_path: Path) -> None:
+    asked: dict[str, Any] = {"robot": robot, "seconds": 1.0, "without": ["slip"]}
+    if robot == "rover":  # a program drives it
+        (tmp_path / "stay.hex").write_text(":02000000FFCF30\n:00000001FF\n")
+        asked |= {"brain": tmp_path / "stay.hex"}
+    else:
+        asked |= {
+            "brain": mind(),
+            "parameters": {"avoid.turn": 0.4},
+            "faults": ["host.slow=0.1@0.2"] * (robot != "arsim"),
+        }
+    run = execute(Request.single(**asked))
+    table = run.table()
+    behaviors = () if run.brain_names is None else run.brain_names.behaviors
+    assert table.keys() == FIGURES.keys() | {f"{name}{SHARE}" for name in behaviors}
+    for name, value in table.items():
+        assert value is None or type(value) is FIGURES.get(name, float), name
+
+
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_of_an_unrecorded_run_each_figure_is_right_or_none(robot: str) -> None:
     recorded, unrecorded = (boebot.run(mind(), robot, seconds=3, record=kept) for kept in (True, False))
@@ -84,7 +106,7 @@ def test_of_an_unrecorded_run_each_figure_is_right_or_none(robot: str) -> None:
         unrecorded.summary()
         == f"brain on {robot} ({recorded.board}) in {expected['arena']}, 3.0 s, distance unknown, seed 1, complete"
     )
-    for name, kind in inspect.getmembers_static(RunResult, lambda member: isinstance(member, FIGURES)):
+    for name, kind in inspect.getmembers_static(RunResult, lambda member: isinstance(member, COMPUTED)):
         value = getattr(unrecorded, name)
         if isinstance(value, int | float) and name not in ("is_recorded", "has_truth", "real_time_factor"):
             assert value == getattr(recorded, name), (name, kind)
