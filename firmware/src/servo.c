@@ -20,15 +20,13 @@ void servo_start(void) {
   HAL_PIN_LOW(SERVO_RIGHT);
   HAL_PIN_OUTPUT(SERVO_LEFT);
   HAL_PIN_OUTPUT(SERVO_RIGHT);
+  HAL_PIN_PULL_UP(TURRET);
   servo_set(0, 0);
   servo_turn(0);
   servo_frame();
 }
 
 void servo_connect_turret(bool connected) {
-  if (servo_pulse(SERVO_TURRET) != 0) {
-    return;
-  }
   if (connected) {
     HAL_PIN_OUTPUT_LOW(TURRET);
   } else {

@@ -18,10 +18,8 @@ enum { SERVO_TURRET = SIDES, SERVOS };
 #define SERVO_TURRET_MIN 9600u  /* 600 us in cycles */
 #define SERVO_TURRET_MAX 38400u /* 2400 us */
 
-/* Lines low, but for the turret's. */
+/* Lines low. That of the turret's servo only while it is connected. */
 void servo_start(void);
-
-/* The turret's line low, or let go of; not in a frame with a pulse of it. */
 void servo_connect_turret(bool connected);
 
 /* Widths from the next frame on. */

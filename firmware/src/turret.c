@@ -9,12 +9,11 @@
 
 #define RADIAN 10000 /* in the angle's unit */
 
-void turret_start(void) { servo_connect_turret(false); }
+static bool is_connected;
 
 void turret_hold(int16_t angle) {
   const int32_t pulse = (int32_t)parameters_u16(PARAMETER_TURRET_CENTRE) +
                         motion_offset(parameters_i16(PARAMETER_TURRET_GAIN), angle, RADIAN);
-  servo_connect_turret(true); /* the task may come after the first pulse */
   servo_turn(pulse < (int32_t)SERVO_TURRET_MIN   ? SERVO_TURRET_MIN
              : pulse > (int32_t)SERVO_TURRET_MAX ? SERVO_TURRET_MAX
                                                  : (uint16_t)pulse);
@@ -22,13 +21,18 @@ void turret_hold(int16_t angle) {
 
 void turret_release(void) { servo_turn(0); }
 
-/* Once per servo frame: releases a turret that was switched off, and lets go of its pin after the last pulse. */
+void turret_start(void) { is_connected = false; }
+
+/* Once per servo frame: releases a turret that was switched off, and its pin after the last pulse. */
 void turret_task(void) {
   const bool in_use = parameters_device_in_use(DEVICES_TURRET);
   if (!in_use) {
     turret_release();
   }
-  servo_connect_turret(in_use);
+  if (in_use != is_connected && servo_pulse(SERVO_TURRET) == 0) {
+    is_connected = in_use;
+    servo_connect_turret(in_use);
+  }
 }
 
 bool turret_report_devices_telemetry(msg_devices_telemetry *message) {

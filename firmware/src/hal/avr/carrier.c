@@ -2,8 +2,8 @@
  * the last toggle. */
 #include "hal/hal.h"
 
-#define toggles_left GPIOR0 /* two cycles less than in RAM */
 static volatile uint8_t side_on;
+static volatile uint8_t toggles_left;
 static volatile uint8_t left_level, right_level; /* the receivers' bits at the end of their last bursts */
 
 ISR(TIMER2_COMPA_vect) {
@@ -11,7 +11,6 @@ ISR(TIMER2_COMPA_vect) {
   toggles_left = left;
   if (left == 0) {
     TCCR2B = 0;
-    TIFR2 = _BV(OCF2A); /* set anew, if this toggle has waited for longer than half of a period */
   }
   if (side_on == LEFT) {
     HAL_PIN_TOGGLE(INFRARED_LEFT_LED);
