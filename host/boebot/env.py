@@ -53,7 +53,7 @@ def forward(seen: Observation, command: Command) -> float:
 
 
 class BoardEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """A robot in its arena; an episode is one run of so many seconds.
+    """A robot in its arena; an episode is one run.
 
     Attributes:
         names: of the numbers of an observation, in order, such as "whisker_left.pressed". A value that a device may not

@@ -1,6 +1,6 @@
-"""The cluster of this computer, a process of its own: `python -m boebot_campaign.local WORKERS` prints the scheduler's
-address and ends, with its workers, when its standard input closes: also where who began it was killed. A script that
-sweeps needs no `if __name__ == "__main__"` so, which Dask's own local cluster asks for."""
+"""Dask's workers on this computer, in a process apart: `python -m boebot_campaign.local WORKERS` prints the scheduler's
+address. It ends, with its workers, when its standard input closes: when the sweep ends or is killed. Workers that begin
+here do not import the user's script, which so needs no `if __name__ == "__main__"`."""
 
 from __future__ import annotations
 

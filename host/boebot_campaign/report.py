@@ -28,7 +28,7 @@ FACTORS = ("set", "arena", "brain", "robot", "faults")
 BINS = 6  # of a factor that has more values than MOST_VALUES
 MOST_VALUES = 8
 RESAMPLES = 1000
-BY_NORMAL = 2000  # from so many on a mean is normal, and its interval needs no bootstrap
+BY_NORMAL = 2000  # values; with as many or more a mean is normally distributed, and needs no bootstrap
 
 
 class Level(NamedTuple):

@@ -23,6 +23,7 @@ from boebot.arenas import load_arena
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
 from boebot.record.brain_record import BrainNames
+from boebot.record.run import FIGURES, SHARE
 from boebot.running.loop import execute
 from boebot.running.tasks import Request, prepare
 from boebot_campaign.kept import Folder
@@ -31,29 +32,23 @@ from boebot_campaign.plan import Case, Plan
 OK, RAISED, TIMED_OUT, KILLED = "ok", "raised", "timed out", "killed"
 APART = ("status", "error", "wall_time_s", "worker")
 GRACE_S = 5.0  # after the limit, until a run that cannot be ended takes its process with it
-_TEXTS = "board odometry_source unrealisable hung_at firmware image_hash hash"
-_COUNTS = """true_contacts whisker_touches steps late_steps behavior_switches ticks slow_readings lost_frames bad_frames
-    overruns dead_man_stops fallback_takeovers resets sessions_lost touched"""
-_NUMBERS = """run_time_s true_distance_m odometry_distance_m odometry_error_m battery_charge period_s
-    slow_reading_age_s"""
-FIGURES: Mapping[str, type] = {
-    name: kind for kind, names in ((str, _TEXTS), (int, _COUNTS), (float, _NUMBERS)) for name in names.split()
-}
+# Of the figures of a run: what the plan says already, what is the same for all rows, and what `status` and `error` say.
+_LEFT_OUT = {"without", "imperfections", "parameters", "compiler", "program_hash", "ended"}
 _one_run = threading.Lock()  # at a time: the process has one timer, and one handler of a signal
 
 
 class _TimeIsUpError(Exception):
-    """The run has lasted longer than its limit. No BoebotError: a run loop may take one for an end."""
+    """The run has lasted longer than its limit. No BoebotError: those are errors of the run."""
 
 
 def columns(plan: Plan, brains: Sequence[str]) -> dict[str, type]:
     """Name -> type of each column, in order; `brains`: the files or bundled names of those of the plan."""
     loaded = [load_brain(name) for name in brains]
     made_of = [names for one in loaded if (names := BrainNames.of(one.brain)) is not None]
-    shares = dict.fromkeys(f"{name}_share" for names in made_of for name in names.behaviors)
+    shares = dict.fromkeys(f"{name}{SHARE}" for names in made_of for name in names.behaviors)
     axes = {f"parameter.{name}": _kind(axis) for name, axis in plan.parameters.items()}
     axes |= {f"imperfection.{name}": float for name in plan.imperfections}
-    return {
+    planned = {
         "row": int,
         "set": str,
         "arena": str,
@@ -66,7 +61,10 @@ def columns(plan: Plan, brains: Sequence[str]) -> dict[str, type]:
         "start_y_m": float,
         "start_heading_rad": float,
         "seed": int,
-        **FIGURES,
+    }
+    return {
+        **planned,
+        **{name: kind for name, kind in FIGURES.items() if name not in planned.keys() | _LEFT_OUT},
         **dict.fromkeys(shares, float),
         "status": str,
         "error": str,
@@ -193,7 +191,7 @@ def _run(folder: Folder, case: Case) -> dict[str, Any]:
     elif error is not None:
         row["error"] = str(error).replace(f"{folder.path}{os.sep}", "")
     if result is not None and status in (OK, RAISED):
-        row |= {name: value for name, value in result.robots[0].table().items() if name not in row and name != "ended"}
+        row |= {name: value for name, value in result.robots[0].table().items() if name not in row}
     if not gc.get_freeze_count():
         gc.freeze()
     return row

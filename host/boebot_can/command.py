@@ -39,7 +39,7 @@ def bridge(
         ),
     ] = None,
     socketcand: Annotated[
-        int | None, options.port("A bus of its own, which CAN tools join on this TCP port of loopback; 0: any.")
+        int | None, options.port("A new bus, which CAN tools join at this TCP port of loopback; 0: any.")
     ] = None,
     node: Annotated[int, typer.Option("--node", metavar="N", min=1, max=7, help="The board's number on the bus.")] = 1,
     robot: options.RobotName = "shieldbot",

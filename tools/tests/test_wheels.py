@@ -322,7 +322,7 @@ def test_errors_are_sentences(system: System, tmp_path: Path) -> None:
 
 
 def test_a_library_of_another_system_is_one_sentence(system: System, wheels: dict[str, Path], tmp_path: Path) -> None:
-    """In place of its own one: another wheel, unpacked over it; or what is left of one that was cut short."""
+    """A wheel of another system is unpacked over this one, or a library is cut short."""
     words = ["run", "wander", "--seconds", "0.1", "--on"]
     place = Path(system.run(tmp_path, "python", "-c", "import sim_bridge; print(sim_bridge.__path__[0])").strip())
     folder = Path(str(place).removeprefix("Z:").replace("\\", "/"))
