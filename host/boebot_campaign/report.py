@@ -19,6 +19,7 @@ from boebot import missing, rates
 from boebot.cli import output
 from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
+from boebot.record import figures as figures_in_words
 from boebot_campaign.kept import Folder
 from boebot_campaign.rows import OK
 
@@ -155,20 +156,27 @@ def _wilcoxon(differences: np.ndarray) -> float:
     return float(stats.wilcoxon(differences).pvalue)
 
 
+def _words(name: str) -> str:
+    """A figure's name as people read it, with its unit."""
+    ((words, _, unit),) = figures_in_words.rows({name: 0})
+    return f"{words} ({unit})" if unit else words
+
+
+def _said_mean(mean: Mean) -> str:
+    return f"{mean.mean:.3g} ({mean.least:.3g} to {mean.most:.3g})"
+
+
 def _print(table: list[dict[str, Any]], compared: list[dict[str, Any]], figures: list[str]) -> None:
     rows = []
     for row in table:
-        means = [
-            "" if (mean := row[name]) is None else f"{mean.mean:.3g} ({mean.least:.3g} to {mean.most:.3g})"
-            for name in figures
-        ]
+        means = ["" if row[name] is None else _said_mean(row[name]) for name in figures]
         rows.append([row["factor"], row["value"], rates.in_words(row[OK], row["runs"]) if row["runs"] else "0", *means])
-    output.print_columns(["factor", "value", "ok", *figures], rows, whole=2)
+    output.print_columns(["factor", "value", "ok", *map(_words, figures)], rows)
     for pair in compared:
         for name in (name for name in figures if name in pair):
-            two, way = pair[name], pair[name]["difference"]
+            two = pair[name]
             output.line(
-                f"{' less '.join(pair['brains'])}, {name}: {way.mean:.3g} ({way.least:.3g} to {way.most:.3g}) over "
+                f"{' less '.join(pair['brains'])}, {_words(name)}: {_said_mean(two['difference'])} over "
                 f"{two['pairs']} pairs; Cliff's delta {two['cliffs_delta']:.2f}, Wilcoxon p = {two['wilcoxon_p']:.2g}"
             )
     output.line("Intervals hold 95 %: Wilson's of rates, by bootstrap of means, which are of runs that are ok.")
@@ -181,7 +189,7 @@ def _drawn(path: Path, levels: list[Level], columns: dict[str, np.ndarray], figu
     factors = list(dict.fromkeys(level.factor for level in levels))
     factors = factors[1:] or factors
     figure = Figure(figsize=(3.2 * len(factors) + 1, 2.4 * (len(figures) + 1)), layout="constrained")
-    panels = figure.subplots(len(figures) + 1, len(factors), squeeze=False, sharey="row")
+    panels = figure.subplots(len(figures) + 1, len(factors), squeeze=False, sharex="col", sharey="row")
     for column, factor in enumerate(factors):
         own = [level for level in levels if level.factor == factor]
         for panel, name in zip(panels[:, column], [*figures, OK], strict=True):
@@ -192,9 +200,10 @@ def _drawn(path: Path, levels: list[Level], columns: dict[str, np.ndarray], figu
             panel.errorbar([level.at for level, _ in drawn], middle, np.maximum(ends, 0), fmt="o", capsize=3)
             panel.set_xticks([level.at for level in own], [level.value for level in own], rotation=20, fontsize=7)
             panel.margins(x=0.2)
+            panel.grid(axis="y", color="#dfe2ea")
         panels[-1, column].set_xlabel(factor)
     for panel, name in zip(panels[:, 0], [*figures, "share of runs ok"], strict=True):
-        panel.set_ylabel(name)
+        panel.set_ylabel(_words(name))
     try:
         figure.savefig(path, dpi=120)
     except OSError as error:
