@@ -1,10 +1,24 @@
-"""How well a rate is known that was counted: k of n runs collided."""
+"""How well a rate is known that was counted, k of n runs collided, and a mean of n values."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 NORMAL_95 = 1.959964  # 95 % of a normal distribution lie within so many standard deviations
+RESAMPLES = 1000
+BY_NORMAL = 2000  # values; with as many or more a mean is normally distributed, and needs no bootstrap
+
+
+class Mean(NamedTuple):
+    """Of some values, with its interval."""
+
+    mean: float
+    least: float
+    most: float
 
 
 def interval(count: int, trials: int) -> tuple[float, float]:
@@ -27,3 +41,15 @@ def in_words(count: int, trials: int) -> str:
     """The rate and its interval: "0 of 100, 0 to 4 %"."""
     least, most = interval(count, trials)
     return f"{count} of {trials}, {math.floor(100 * least)} to {math.ceil(100 * most)} %"
+
+
+def mean_of(values: NDArray[np.float64]) -> Mean:
+    """The mean and its interval at 95 % confidence: by bootstrap (Efron, Annals of Statistics 7, 1979), the percentiles
+    of means of samples drawn anew, the same each time."""
+    mean, count = float(values.mean()), len(values)
+    if count >= BY_NORMAL:
+        half = NORMAL_95 * float(values.std(ddof=1)) / count**0.5
+        return Mean(mean, mean - half, mean + half)
+    drawn = np.random.default_rng(1).integers(count, size=(RESAMPLES, count))
+    least, most = np.percentile(values[drawn].mean(axis=1), [2.5, 97.5])
+    return Mean(mean, float(least), float(most))

@@ -1,9 +1,8 @@
 """What came of a sweep: each figure against each factor, with 95 % intervals, as a table and a picture; and its brains
 compared, run by run at the same seed, start and all else.
 
-A rate has Wilson's interval (boebot.rates), a mean one by bootstrap (Efron, Annals of Statistics 7, 1979). Two brains
-differ by the mean of the paired differences, by Cliff's delta (Psychological Bulletin 114, 1993; -1 to 1, 0: neither
-does better), and by Wilcoxon's signed-rank test.
+Intervals are those of boebot.rates. Two brains differ by the mean of the paired differences, by Cliff's delta
+(Psychological Bulletin 114, 1993; -1 to 1, 0: neither does better), and by Wilcoxon's signed-rank test.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from boebot import missing, rates
 from boebot.cli import output
 from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
+from boebot.rates import Mean, mean_of
 from boebot.record import figures as figures_in_words
 from boebot_campaign.kept import Folder
 from boebot_campaign.rows import OK
@@ -28,8 +28,6 @@ MEANS = ("true_distance_m", "true_contacts", "behavior_switches")
 FACTORS = ("set", "arena", "brain", "robot", "faults")
 BINS = 6  # of a factor that has more values than MOST_VALUES
 MOST_VALUES = 8
-RESAMPLES = 1000
-BY_NORMAL = 2000  # values; with as many or more a mean is normally distributed, and needs no bootstrap
 
 
 class Level(NamedTuple):
@@ -40,14 +38,6 @@ class Level(NamedTuple):
     at: float
     """where it is drawn"""
     rows: np.ndarray
-
-
-class Mean(NamedTuple):
-    """Of a figure, with its interval."""
-
-    mean: float
-    least: float
-    most: float
 
 
 def report(path: Path, wanted: Detail) -> None:
@@ -100,17 +90,6 @@ def _mean_at(level: Level, columns: dict[str, np.ndarray], name: str) -> Mean | 
     found = columns[name][level.rows & (columns["status"] == OK)]
     found = found[[value is not None for value in found]].astype(float)
     return mean_of(found) if len(found) else None
-
-
-def mean_of(values: np.ndarray) -> Mean:
-    """The mean and its interval: by the percentiles of means of samples drawn anew, the same each time."""
-    mean, count = float(values.mean()), len(values)
-    if count >= BY_NORMAL:
-        half = rates.NORMAL_95 * float(values.std(ddof=1)) / count**0.5
-        return Mean(mean, mean - half, mean + half)
-    drawn = np.random.default_rng(1).integers(count, size=(RESAMPLES, count))
-    least, most = np.percentile(values[drawn].mean(axis=1), [2.5, 97.5])
-    return Mean(mean, float(least), float(most))
 
 
 def cliffs_delta(one: np.ndarray, other: np.ndarray) -> float:

@@ -87,21 +87,31 @@ class Life:
         return float(np.interp(time, self.times, self.work))
 
 
-def live(charge: Utility, seed: int, seconds: float = SECONDS) -> Life:
-    """A run until the end, or until the board's supply is low.
+def until_low(
+    brain: Brain,
+    described: RobotDescription,
+    seed: int,
+    seconds: float = SECONDS,
+    pose: tuple[float, float, float] | None = None,
+) -> tuple[Trial, float]:
+    """A run until the end, or until the board's supply is low: after how many seconds; infinite: never.
 
     Raises:
         BoebotError: something else ended it.
     """
-    brain = sweeper(charge)
-    request = Request.single(
-        brain, robot(contacts=charge is not NEVER), arena="station", on="native", seconds=seconds, seed=seed
+    result = execute(
+        Request.single(brain, described, arena="station", on="native", seconds=seconds, seed=seed, pose=pose)
     )
-    result = execute(request)
     is_low = isinstance(result.error, BoardError) and "supply is low" in str(result.error)
     if result.error is not None and not is_low:
         raise result.error
-    trial, record = Trial(result, brain), decisions(result)
+    return Trial(result, brain), result.run_time if is_low else math.inf
+
+
+def live(charge: Utility, seed: int) -> Life:
+    """A sweeper's run. Raises as `until_low`."""
+    trial, low_after = until_low(sweeper(charge), robot(contacts=charge is not NEVER), seed)
+    record = decisions(trial.result)
     names = record.names
     charging = record.values[:, names.variables.index("charging")] > 0
     last = np.clip(np.searchsorted(record.time, trial.time, side="right") - 1, 0, len(record) - 1)
@@ -111,7 +121,7 @@ def live(charge: Utility, seed: int, seconds: float = SECONDS) -> Life:
         1 - record.values[:, names.variables.index("low")],
         record.time,
         trial.when_active("charge") & charging[last],
-        result.run_time if is_low else math.inf,
+        low_after,
     )
 
 

@@ -198,6 +198,7 @@ OLD = [
     Mutant("E68", "readings", wall_unheeded),
     Mutant("robot-economics", "what charging is good for", station_without_current),
     Mutant("robot-economics", "the way to the station", station_not_sought),
+    Mutant("deciding", "the way to the station", station_not_sought),
 ]
 """Of the experiments E17 to E35 and E56 to E68, and of those that have a name only."""
 
