@@ -13,7 +13,7 @@ import typer
 from boebot.cli import options, output
 from boebot.errors import InterruptedRunError
 from boebot.running.loop import Progress
-from boebot_campaign import plan
+from boebot_campaign import kept, plan
 from boebot_campaign.rows import OK
 from boebot_campaign.sweep import Sweep
 from boebot_campaign.sweep import sweep as run_sweep
@@ -66,11 +66,13 @@ def sweep(
 
 def _say_errors(done: Sweep) -> None:
     """The errors that came most often, with a row to look at."""
-    table = done.table().select(["row", "status", "error"]).to_pylist()
     first: dict[str, int] = {}
-    counts = Counter(one["error"] for one in table if one["status"] != OK)
-    for one in table:
-        first.setdefault(one["error"], one["row"])
+    counts: Counter[str] = Counter()
+    for batch in kept.Folder(done.folder).table(["row", "status", "error"]).to_batches():
+        for one in batch.to_pylist():
+            if one["status"] != OK:
+                counts[one["error"]] += 1
+                first.setdefault(one["error"], one["row"])
     for error, count in counts.most_common(3):
         output.line(f"{count:,} times, first in row {first[error]}: {error}")
 

@@ -46,10 +46,11 @@ def run(folder: Folder, scheduler: str | None, workers: int, told: Told) -> None
     Raises:
         BoebotError: in one sentence; what is done stays, and the next sweep goes on there.
     """
-    distributed = missing.imported("distributed", "a sweep", "dask.distributed", "sweep")
-    missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
     with contextlib.ExitStack() as ends:
-        address = scheduler or ends.enter_context(_local(folder, workers))
+        helper = None if scheduler else ends.enter_context(_helper(folder, workers))
+        distributed = missing.imported("distributed", "a sweep", "dask.distributed", "sweep")
+        missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+        address = scheduler or _address(helper, folder)
         client = ends.enter_context(_client(distributed, address))
         _check(client, folder, distributed)
         _Work(client, folder, told, is_local=scheduler is None).all()
@@ -142,16 +143,14 @@ class _Work:
 
 
 @contextlib.contextmanager
-def _local(folder: Folder, workers: int) -> Iterator[str]:
-    """The address of a cluster of this computer, which ends with the block, or with this process."""
+def _helper(folder: Folder, workers: int) -> Iterator[subprocess.Popen[bytes]]:
+    """A process with a cluster of this computer, which ends with the block, or with this process."""
     command = [sys.executable, "-m", "boebot_campaign.local", str(workers)]
     with (folder.path / LOG).open("wb") as log:
         helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, **NEW_GROUP)
-    assert helper.stdin is not None and helper.stdout is not None
+    assert helper.stdin is not None
     try:
-        if not (address := helper.stdout.readline().decode().strip()):
-            raise BoebotError(f"the workers of this computer do not begin; {folder.path / LOG} says why")
-        yield address
+        yield helper
     finally:
         helper.stdin.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -159,6 +158,14 @@ def _local(folder: Folder, workers: int) -> Iterator[str]:
         with contextlib.suppress(ProcessLookupError):
             end_group(helper, by_force=True)
         helper.wait()
+
+
+def _address(helper: subprocess.Popen[bytes] | None, folder: Folder) -> str:
+    """Of its cluster, as soon as that has begun."""
+    assert helper is not None and helper.stdout is not None
+    if not (address := helper.stdout.readline().decode().strip()):
+        raise BoebotError(f"the workers of this computer do not begin; {folder.path / LOG} says why")
+    return address
 
 
 @contextlib.contextmanager

@@ -131,7 +131,7 @@ class Folder:
         waiting, at = [], 0
         for first, end in self.done():
             if end > at:
-                waiting.append(parquet.read_table(self.part(first, end)).slice(max(at - first, 0)))
+                waiting.append(_read(parquet, self.part(first, end)).slice(max(at - first, 0)))
                 at = end
             if sum(len(one) for one in waiting) >= GROUP_ROWS or at == self.plan.count:
                 table = arrow.concat_tables(waiting)
@@ -142,17 +142,17 @@ class Folder:
                     break
         writer.close()
 
-    def table(self) -> Any:
-        """The rows so far: a pyarrow.Table."""
+    def table(self, columns: list[str] | None = None) -> Any:
+        """The rows so far, with some of the columns or all: a pyarrow.Table."""
         parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
         arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
         if self.is_whole:
-            return parquet.read_table(self.path / ROWS)
+            return _read(parquet, self.path / ROWS, columns)
         if not (done := self.done()):
             raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
         tables, at = [], 0
         for first, end in done:
-            tables.append(parquet.read_table(self.part(first, end)).slice(max(at - first, 0)))
+            tables.append(_read(parquet, self.part(first, end), columns).slice(max(at - first, 0)))
             at = max(at, end)
         return arrow.concat_tables(tables)
 
@@ -261,6 +261,12 @@ def _sources(plan: Plan) -> tuple[dict[str, str], dict[str, bytes]]:
 def version() -> str:
     """Of the kit, as far as rows may depend on it; of a checkout that was edited it is the same."""
     return f"{boebot.__version__} (schema {SCHEMA_HASH:08x})"
+
+
+def _read(parquet: Any, path: Path, columns: list[str] | None = None) -> Any:
+    """A file's table. `parquet.read_table` would import pandas, where it is, which takes a second."""
+    with parquet.ParquetFile(path) as file:
+        return file.read(columns)
 
 
 def write_part(path: Path, table: Any) -> None:

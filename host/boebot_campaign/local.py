@@ -4,9 +4,15 @@ here do not import the user's script, which so needs no `if __name__ == "__main_
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import sys
+from multiprocessing import forkserver
 from typing import Any
+
+FORKS = sys.platform == "linux"  # elsewhere what numpy calls may not outlive a fork
+IMPORTED = ["distributed", "pyarrow.parquet", "pandas", "sim_bridge.sim", "boebot_campaign.tasks"]
+"""Once for all workers, also those that begin after a death. pyarrow imports pandas, where it is, for the first row."""
 
 QUIET = {
     "distributed.worker.profile.enabled": False,
@@ -14,6 +20,7 @@ QUIET = {
     "distributed.admin.system-monitor.interval": "5s",
     "distributed.scheduler.allowed-failures": 0,  # boebot_campaign.tasks finds out which row it was
     "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.worker.multiprocessing-method": "forkserver" if FORKS else "spawn",
     "distributed.deploy.lost-worker-timeout": "3650 days",  # 15 s after a death it closes a worker that just restarts
 }
 """What Dask does beside the work costs a tenth of it by default."""
@@ -21,12 +28,15 @@ QUIET = {
 
 def main(workers: int) -> None:
     """Serves until standard input closes."""
-    import dask
-    from distributed import LocalCluster
-
     answer = os.fdopen(os.dup(1), "w")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)  # brains print there, and who began this process reads one line only
+    if FORKS:
+        multiprocessing.set_forkserver_preload(IMPORTED)
+        forkserver.ensure_running()  # while this process imports, too
+    import dask
+    from distributed import LocalCluster
+
     dask.config.set(QUIET)
     made: Any = LocalCluster
     with made(

@@ -39,7 +39,7 @@ class Sweep:
 
     def statuses(self) -> dict[str, int]:
         """How many rows there are of each status."""
-        counts = self.table()["status"].value_counts().to_pylist()
+        counts = kept.Folder(self.folder).table(["status"])["status"].value_counts().to_pylist()
         return {one["values"]: one["counts"] for one in counts}
 
 

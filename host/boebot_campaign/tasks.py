@@ -9,6 +9,7 @@ task whose worker has died, each row is there once.
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 import uuid
 from collections.abc import Iterator
@@ -21,7 +22,15 @@ from boebot_campaign.kept import Folder, opened, write_part
 from boebot_campaign.plan import Plan
 from boebot_campaign.rows import columns, killed, run_case, table_of
 
-_me = uuid.uuid4().hex  # of this process
+
+def _me() -> str:
+    """A name of this process. One that is forked has another."""
+    return _name(os.getpid())
+
+
+@lru_cache(maxsize=1)
+def _name(_process: int) -> str:
+    return uuid.uuid4().hex
 
 
 def do_part(path: str, stamp: str, first: int, end: int) -> float:
@@ -57,7 +66,7 @@ def _do(folder: Folder, first: int, end: int) -> None:
 def _rows(folder: Folder, first: int, end: int, markers: Path) -> list[dict[str, Any]]:
     rows = []
     for row in range(first, end):
-        _mark(markers, row, _me)
+        _mark(markers, row, _me())
         rows.append(run_case(folder, folder.plan.case(row, folder.points)))
     return rows
 
@@ -84,7 +93,7 @@ def _mark(markers: Path, row: int, who: str) -> None:
 
 def _others(markers: Path) -> list[tuple[int, str]]:
     """Row and process of each line of another process, in order."""
-    return [(row, who) for row, who in _lines(markers) if who != _me]
+    return [(row, who) for row, who in _lines(markers) if who != _me()]
 
 
 def _lines(markers: Path) -> list[tuple[int, str]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import multiprocessing
 import re
 import resource
 import shutil
@@ -19,10 +21,12 @@ import pytest
 import boebot
 from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
-from boebot_campaign import kept, plan, tasks
+from boebot_campaign import kept, local, plan, tasks
 from boebot_campaign.report import report
 from boebot_campaign.rows import APART
 
+FORKED = multiprocessing.get_context("forkserver")
+FORKED.set_forkserver_preload(local.IMPORTED)
 COMMAND = [sys.executable, "-m", "boebot", "sweep"]
 PLAN = """\
 brains = ["odd.py", "clearway"]
@@ -53,25 +57,19 @@ def rows_of(folder: Path) -> list[dict[str, Any]]:
     return [{name: value for name, value in row.items() if name not in APART} for row in rows]
 
 
-def at_a_worker(out: Path, *parts: tuple[int, int], file_bytes: int = -1) -> subprocess.CompletedProcess[str]:
-    """A process that does those parts one after the other, as Dask's workers do; the largest file that it may write."""
-    code = (
-        "import json, sys; from boebot_campaign import kept, tasks; from pathlib import Path; out = sys.argv[1]; "
-        "[tasks.do_part(out, kept.Folder(Path(out)).stamp, *part) for part in json.loads(sys.argv[2])]"
-    )
-
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, resource.RLIM_INFINITY))
-
-    command = [sys.executable, "-c", code, str(out), json.dumps(parts)]
-    return subprocess.run(command, preexec_fn=limited, capture_output=True, text=True)
+def at_a_worker(out: Path, first: int, end: int) -> int | None:
+    """The exit code of a process that does that part, as Dask's workers do."""
+    worker = FORKED.Process(target=tasks.do_part, args=(str(out), kept.Folder(out).stamp, first, end))
+    worker.start()
+    worker.join()
+    return worker.exitcode
 
 
 def by_hand(out: Path, file: Path, *parts: tuple[int, int]) -> list[dict[str, Any]]:
     """The rows after those parts, or else all that are not there yet, were done in that order without a cluster."""
     with kept.locked(out, plan.read(file)) as folder:
-        done = at_a_worker(out, *(parts or folder.undone()))
-        assert done.returncode == 0, done.stderr
+        for part in parts or folder.undone():
+            assert at_a_worker(out, *part) == 0
         folder.merge()
     return rows_of(out)
 
@@ -96,26 +94,24 @@ def test_a_killed_and_resumed_sweep_has_the_same_rows(undisturbed: Path, tmp_pat
     until = time.perf_counter() + 60
     while not list(out.glob("parts/*.parquet")) and time.perf_counter() < until:
         time.sleep(0.02)
+    assert len(workers_of(out)) >= 2
     begun.kill()
     begun.wait()
     assert len(kept.Folder(out).done()) > 0 and kept.Folder(out).undone()
     until = time.perf_counter() + 10
-    while ended_workers() and time.perf_counter() < until:
+    while workers_of(out) and time.perf_counter() < until:
         time.sleep(0.05)
-    assert not ended_workers()
+    assert not workers_of(out)
     assert by_hand(out, file) == rows_of(undisturbed / "out")
 
 
-def ended_workers() -> list[str]:
-    """Helper processes whose parent has gone."""
+def workers_of(out: Path) -> list[str]:
+    """Processes of this computer that work for that sweep: their standard error is its log."""
     found = []
     for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            words, status = (entry / "cmdline").read_bytes(), (entry / "status").read_text()
-        except OSError:
-            continue
-        if b"boebot_campaign.local" in words and re.search(r"PPid:\t1$", status, re.MULTILINE):
-            found.append(entry.name)
+        with contextlib.suppress(OSError):
+            if (entry / "fd" / "2").readlink() == out.resolve() / ".workers.log":
+                found.append(entry.name)
     return found
 
 
@@ -131,7 +127,7 @@ def test_ctrl_c_is_a_sentence_and_leaves_no_process(tmp_path: Path) -> None:
     begun.send_signal(signal.SIGINT)
     _, said = begun.communicate(timeout=20)
     assert begun.returncode == 130 and "the same command goes on" in said and "Traceback" not in said
-    assert not ended_workers() and kept.Folder(out).done()
+    assert not workers_of(out) and kept.Folder(out).done()
 
 
 @pytest.mark.soak
@@ -177,8 +173,17 @@ def test_a_full_disk_ends_the_sweep_in_a_sentence_and_loses_no_row(undisturbed: 
 
 def test_a_full_disk_leaves_no_half_part(undisturbed: Path, tmp_path: Path) -> None:
     file, out = saved(tmp_path, PLAN), tmp_path / "out"
+    code = (
+        "import sys; from boebot_campaign import kept, tasks; from pathlib import Path; "
+        "tasks.do_part(sys.argv[1], kept.Folder(Path(sys.argv[1])).stamp, 0, 40)"
+    )
+
+    def small() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
+
     with kept.locked(out, plan.read(file)) as folder:
-        done = at_a_worker(out, (0, 40), file_bytes=6000)
+        command = [sys.executable, "-c", code, str(out)]
+        done = subprocess.run(command, preexec_fn=small, capture_output=True, text=True)
         assert done.returncode == 1 and "BoebotError: the sweep's files cannot be written to" in done.stderr
         assert not list(folder.parts.iterdir())
     assert by_hand(out, file) == rows_of(undisturbed / "out")
@@ -190,8 +195,8 @@ def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(each: int
     file, out = saved(tmp_path, text if each == 2 else text.replace("[1, 2]", "[1]")), tmp_path / "out"
     with kept.locked(out, plan.read(file)) as folder:
         for _ in range(2 * each):
-            assert at_a_worker(out, (0, 3 * each)).returncode == -signal.SIGKILL
-        assert at_a_worker(out, (0, 3 * each)).returncode == 0
+            assert at_a_worker(out, 0, 3 * each) == -signal.SIGKILL
+        assert at_a_worker(out, 0, 3 * each) == 0
         assert not list(folder.parts.glob("*.begun"))
         folder.merge()
     rows = kept.Folder(out).table().to_pylist()
@@ -206,7 +211,7 @@ def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(each: int
 def test_a_run_beyond_the_limit_is_a_row_without_figures(tmp_path: Path) -> None:
     text = ODD.replace('["well", "raises", "loops", "kills"]', '["loops"]').replace("1.5", "0.3")
     with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text))) as folder:
-        assert at_a_worker(folder.path, (0, 1)).returncode == 0
+        assert at_a_worker(folder.path, 0, 1) == 0
         row = folder.table().to_pylist()[0]
     assert row["status"] == "timed out" and row["error"] == "the run has lasted longer than 0.3 s"
     assert row["hash"] is None and row["run_time_s"] is None
