@@ -11,4 +11,5 @@ from boebot.guests import Command, Folder
 COMMAND = Command(
     "Run brains in all the ways that a file says, and keep a row of each run.", "boebot_campaign.command:sweep"
 )
+MATTERS = Command("Find out which imperfections a brain's result hangs on.", "boebot_campaign.matters:matters")
 FOLDER = Folder("boebot_campaign.report:report", "boebot_campaign.sweep:kept_request")

@@ -1,39 +1,45 @@
-"""`boebot sweep FILE`."""
+"""`boebot sweep FILE`, and what its relatives have in common with it: options, the bar with the newest rows."""
 
 from __future__ import annotations
 
 import contextlib
-from collections import Counter
+import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from boebot import missing
 from boebot.cli import options, output
 from boebot.errors import InterruptedRunError
+from boebot.record import figures
 from boebot.running.loop import Progress
-from boebot_campaign import kept, plan
-from boebot_campaign.rows import OK
-from boebot_campaign.sweep import Sweep
-from boebot_campaign.sweep import sweep as run_sweep
+from boebot_campaign import plan
+from boebot_campaign.kept import PARTS
+from boebot_campaign.report import MEANS, words
+from boebot_campaign.sweep import Sweep, run_plan
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+NEWEST = ("row", "brain", "arena", "seed", *MEANS, "status")
+NEWEST_ROWS = 6
+
+Out = Annotated[Path | None, typer.Option(metavar="DIR", help="The folder that it makes. Else called as the file.")]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="URL", help="Of a Dask cluster, tcp://HOST:PORT. Else workers of this computer.")
+]
+Workers = Annotated[int | None, typer.Option(metavar="N", min=1, help="Of this computer; else one a processor.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Check all, say how many runs it is, and run none.")]
 
 
 def sweep(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="What to run: docs/how-to/sweeps.md has its keys.")],
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="The sweep's folder. Else called as the file.")
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="URL", help="Of a Dask cluster, tcp://HOST:PORT. Else workers of this computer."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Of this computer; else one a processor.")
-    ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check all, say how many runs it is, and run none.")
-    ] = False,
+    out: Out = None,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
+    dry_run: DryRun = False,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -50,11 +56,8 @@ def sweep(
         )
         return
     folder = out or Path(file.stem)
-    try:
-        with _shown(asked.count, quiet or json) as told:
-            done = run_sweep(file, out=folder, scheduler=scheduler, workers=workers, progress=told)
-    except KeyboardInterrupt:
-        raise InterruptedRunError(f"interrupted; what is done is in {folder}, and the same command goes on") from None
+    with shown("sweep", folder, asked.count, quiet or json) as told:
+        done = run_plan(asked, folder, scheduler, workers, told)
     statuses = done.statuses()
     if json:
         output.print_json({"runs": asked.count, "statuses": statuses, "folder": str(folder), "rows": str(done.path)})
@@ -66,19 +69,49 @@ def sweep(
 
 def _say_errors(done: Sweep) -> None:
     """The errors that came most often, with a row to look at."""
-    first: dict[str, int] = {}
-    counts: Counter[str] = Counter()
-    for batch in kept.Folder(done.folder).table(["row", "status", "error"]).to_batches():
-        for one in batch.to_pylist():
-            if one["status"] != OK:
-                counts[one["error"]] += 1
-                first.setdefault(one["error"], one["row"])
-    for error, count in counts.most_common(3):
-        output.line(f"{count:,} times, first in row {first[error]}: {error}")
+    table = done.table(["row", "error"])
+    errors = table.filter(table["error"].is_valid()).group_by("error").aggregate([("row", "count"), ("row", "min")])
+    for one in errors.sort_by([("row_count", "descending")]).slice(0, 3).to_pylist():
+        output.line(f"{one['row_count']:,} times, first in row {one['row_min']}: {one['error']}")
 
 
 @contextlib.contextmanager
-def _shown(total: int, quiet: bool) -> Iterator[Progress]:
-    """Gives a function to call with how many rows are done; shows a bar with the time left."""
-    with output.progress_bar("sweep", total, quiet, unit=" runs", left=True) as progress:
-        yield progress
+def shown(what: str, folder: Path, total: int, quiet: bool) -> Iterator[Progress]:
+    """Gives a function to call with how many rows of a sweep's folder are done; shows a bar with the time left, and the
+    newest rows.
+
+    Raises:
+        InterruptedRunError: Ctrl-C in the block.
+    """
+    try:
+        with output.progress_bar(what, total, quiet, unit=" runs", left=True, below=NewestRows(folder)) as progress:
+            yield progress
+    except KeyboardInterrupt:
+        raise InterruptedRunError(f"interrupted; what is done is in {folder}, and the same command goes on") from None
+
+
+class NewestRows:
+    """The newest rows of a sweep's folder as a table: those of its newest part, read once in a second."""
+
+    def __init__(self, folder: Path) -> None:
+        self._parts, self._until_s = folder / PARTS, 0.0
+        self._table: RenderableType = ""
+
+    def __call__(self) -> RenderableType:
+        if time.perf_counter() > self._until_s:
+            with contextlib.suppress(OSError, ValueError):  # there is no part yet, or it has just been merged
+                self._table = self._read()
+            self._until_s = time.perf_counter() + 1.0
+        return self._table
+
+    def _read(self) -> RenderableType:
+        parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
+        newest = max(self._parts.glob("[0-9]*.parquet"), key=lambda part: part.stat().st_mtime)
+        table = output.empty_table()
+        for name in NEWEST:
+            table.add_column(words(name))
+        with parquet.ParquetFile(newest) as file:
+            rows = file.read(list(NEWEST)).to_pylist()
+        for row in rows[-NEWEST_ROWS:]:
+            table.add_row(*("" if value is None else figures.text(value) for value in row.values()))
+        return table

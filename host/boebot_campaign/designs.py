@@ -1,25 +1,63 @@
-"""Points of a design in the unit cube, a row for each point: scattered by chance, as a Latin hypercube (McKay, Beckman
-and Conover, Technometrics 21, 1979), or by Sobol's sequence, scrambled. The same seed gives the same points."""
+"""Points of a design in the unit cube, a row for each point. The same seed gives the same points.
+
+random      by chance
+latin       a Latin hypercube (McKay, Beckman and Conover, Technometrics 21, 1979)
+sobol       Sobol's sequence, scrambled
+two-level   each axis at one of its ends: columns of a Hadamard matrix and their negative (Box and Hunter,
+            Technometrics 3, 1961). Resolution IV: no effect of one axis is mixed with one of two axes together; of nine
+            axes or fewer VI: nor with one of four or fewer
+saltelli    for Sobol indices (Saltelli et al., Computer Physics Communications 181, 2010)
+"""
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
 from boebot import missing
 
-Design = Literal["grid", "random", "latin", "sobol"]
+Design = Literal["grid", "random", "latin", "sobol", "two-level", "saltelli"]
+
+
+def length(design: Design, count: int, axes: int) -> int:
+    """How many points a design has that is asked for with `count`; of a grid that is arithmetic."""
+    if design == "two-level":
+        return 2 * _hadamard(axes)[0]
+    return count * (axes + 2) if design == "saltelli" else count
+
+
+def _hadamard(axes: int) -> tuple[int, list[int]]:
+    """Order of the matrix, a power of two, and the column of each axis. Column a ^ b ^ c is the product of three; those
+    that are none of earlier ones are taken first."""
+    order, apart = 1, [0]
+    while len(apart) < axes and order < 64:
+        order, apart = 2 * order, []
+        for column in range(order):
+            if all(column != a ^ b ^ c for a, b, c in combinations(apart, 3)):
+                apart.append(column)
+    order = max(order, 1 << max(axes - 1, 0).bit_length())
+    return order, [*apart, *sorted(set(range(order)) - set(apart))][:axes]
 
 
 def points(design: Design, count: int, axes: int, seed: int) -> np.ndarray:
-    """`count` points of `axes` coordinates, each from 0 to below 1. Of a grid there are none: it is arithmetic. Sobol's
-    sequence is balanced only where `count` is a power of two."""
+    """`length` points of `axes` coordinates, each from 0 to below 1; of a two-level design 0 or 1. Of a grid there are
+    none. Sobol's sequence, and saltelli's, which is made of it, are balanced only where `count` is a power of two."""
     if design == "grid" or axes == 0:
         return np.empty((0, axes))
     if design == "random":
         return np.random.default_rng(seed).random((count, axes))
-    qmc = missing.imported("scipy.stats.qmc", f"a {design} design", "scipy", "sweep")
+    what = f"a {design} design"
+    if design == "two-level":
+        order, columns = _hadamard(axes)
+        signs = missing.imported("scipy.linalg", what, "scipy", "sweep").hadamard(order)[:, columns]
+        return np.asarray(np.vstack([signs, -signs]) > 0, dtype=float)
+    if design == "saltelli":
+        sobol = missing.imported("SALib.sample.sobol", what, "SALib", "learn")
+        problem = {"num_vars": axes, "names": [str(axis) for axis in range(axes)], "bounds": [[0, 1]] * axes}
+        return np.asarray(sobol.sample(problem, count, calc_second_order=False, seed=seed))
+    qmc = missing.imported("scipy.stats.qmc", what, "scipy", "sweep")
     if design == "latin":
         return np.asarray(qmc.LatinHypercube(axes, rng=seed).random(count))
     return np.asarray(qmc.Sobol(axes, rng=seed).random(count))

@@ -17,7 +17,7 @@ import hashlib
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -142,7 +142,7 @@ class Folder:
                     break
         writer.close()
 
-    def table(self, columns: list[str] | None = None) -> Any:
+    def table(self, columns: Sequence[str] | None = None) -> Any:
         """The rows so far, with some of the columns or all: a pyarrow.Table."""
         parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
         arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
@@ -263,10 +263,10 @@ def version() -> str:
     return f"{boebot.__version__} (schema {SCHEMA_HASH:08x})"
 
 
-def _read(parquet: Any, path: Path, columns: list[str] | None = None) -> Any:
+def _read(parquet: Any, path: Path, columns: Sequence[str] | None = None) -> Any:
     """A file's table. `parquet.read_table` would import pandas, where it is, which takes a second."""
     with parquet.ParquetFile(path) as file:
-        return file.read(columns)
+        return file.read(columns and list(columns))
 
 
 def write_part(path: Path, table: Any) -> None:

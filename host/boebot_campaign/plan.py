@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self, TypeVar
 
 import msgspec
 import numpy as np
@@ -19,10 +19,12 @@ from boebot.arenas import load_arena
 from boebot.boards import is_live
 from boebot.brains import load_brain
 from boebot.description import toml_files
+from boebot.description.robots import idle
 from boebot.errors import CallError
-from boebot.imperfections import checked
+from boebot.imperfections import checked, imperfections
 from boebot.running.brain_parameters import in_force
-from boebot.running.tasks import Member, Request
+from boebot.running.tasks import Member, Request, prepare
+from boebot_campaign import designs
 from boebot_campaign.designs import Design
 
 MOST_RUNS = 10_000_000
@@ -50,6 +52,7 @@ class Whole(
 
 
 Axis = list[bool | int | float | str] | Range
+AnyAxis = list[Any] | Range | Whole
 
 
 class Case(NamedTuple):
@@ -90,16 +93,18 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     limit_s: float = 60.0
 
     @cached_property
-    def axes(self) -> list[tuple[str, Axis]]:
-        """Parameters, then imperfections, by name."""
-        return [*self.parameters.items(), *self.imperfections.items()]
+    def axes(self) -> list[tuple[str, AnyAxis]]:
+        """Parameters, then imperfections, by name; in a saltelli design the seed, too."""
+        seed = [("seed", self.seeds)] if self.design == "saltelli" else []
+        return [*self.parameters.items(), *self.imperfections.items(), *seed]
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
         """How many there are of each that a row's number counts, the slowest first."""
-        points = math.prod(_length(axis) for _, axis in self.axes) if self.design == "grid" else self.points
+        points = designs.length(self.design, self.points, len(self.axes))
+        if self.design == "grid":
+            points = math.prod(length(axis) for _, axis in self.axes)
         starts = self.starts if isinstance(self.starts, int) else len(self.starts)
-        seeds = self.seeds.high - self.seeds.low + 1 if isinstance(self.seeds, Whole) else len(self.seeds)
         return (
             len(self.all_arenas),
             len(self.brains),
@@ -107,7 +112,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             points,
             max(len(self.faults), 1),
             max(starts, 1),
-            seeds,
+            1 if self.design == "saltelli" else length(self.seeds),
         )
 
     @cached_property
@@ -130,6 +135,11 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         """The design's, too."""
         return self.seeds.low if isinstance(self.seeds, Whole) else self.seeds[0]
 
+    def completed(self, at: str) -> Self:
+        """With what the file leaves to be found. Raises CallError, which begins with `at`."""
+        del at
+        return self
+
     def case(self, row: int, points: np.ndarray) -> Case:
         """The row of that number; `points`: of `designs.points`."""
         rest, place = row, []
@@ -149,7 +159,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             faults=tuple(self.faults[faults]) if self.faults else (),
             start=start,
             pose=self.starts[start] if isinstance(self.starts, list) and self.starts else None,
-            seed=self.seeds.low + seed if isinstance(self.seeds, Whole) else self.seeds[seed],
+            seed=values["seed"] if self.design == "saltelli" else _at(self.seeds, seed),
         )
 
     def _values(self, point: int, points: np.ndarray) -> dict[str, Any]:
@@ -157,26 +167,34 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         values = {}
         for column, (name, axis) in enumerate(self.axes):
             if self.design == "grid":
-                point, index = divmod(point, _length(axis))
-                share = index / max(_length(axis) - 1, 1)
+                point, index = divmod(point, length(axis))
+                share = index / max(length(axis) - 1, 1)
             else:
                 share = float(points[point, column])
-                index = int(share * _length(axis))
-            values[name] = axis[index] if isinstance(axis, list) else axis.low + share * (axis.high - axis.low)
+                index = min(int(share * length(axis)), length(axis) - 1)
+            values[name] = axis.low + share * (axis.high - axis.low) if isinstance(axis, Range) else _at(axis, index)
         return values
 
 
+_P = TypeVar("_P", bound=Plan)
+
+
 def read(path: Path) -> Plan:
-    """The plan in a file; what it names is found beside it.
+    """The plan in a file; what it names is found beside it. Raises CallError, with file, line and key."""
+    return read_as(path, Plan)
+
+
+def read_as(path: Path, kind: type[_P]) -> _P:
+    """The same of a file with more keys.
 
     Raises:
         CallError: with file, line and key.
     """
     if not path.is_file():
-        raise CallError(f"there is no sweep file {path}; expected a TOML file")
+        raise CallError(f"there is no file {path}; expected a TOML file")
     table = toml_files.read(path, CallError)
-    plan = toml_files.convert(table, Plan, path.name, CallError)
-    return _checked(_found(plan, path.parent), f"{path.name}: ")
+    plan, at = toml_files.convert(table, kind, path.name, CallError), f"{path.name}: "
+    return _checked(_found(plan, path.parent).completed(at), at)
 
 
 def made(keys: Mapping[str, Any]) -> Plan:
@@ -188,7 +206,7 @@ def made(keys: Mapping[str, Any]) -> Plan:
     return _checked(_found(toml_files.convert(plain, Plan, "sweep", CallError), Path()), "sweep: ")
 
 
-def _found(plan: Plan, folder: Path) -> Plan:
+def _found(plan: _P, folder: Path) -> _P:
     """With whole paths of files."""
 
     def whole(names: list[str]) -> list[str]:
@@ -198,11 +216,18 @@ def _found(plan: Plan, folder: Path) -> Plan:
     return msgspec.structs.replace(plan, **{kind: whole(getattr(plan, kind)) for kind in kinds})
 
 
-def _length(axis: Axis) -> int:
+def length(axis: AnyAxis) -> int:
+    """How many values an axis has."""
+    if isinstance(axis, Whole):
+        return axis.high - axis.low + 1
     return len(axis) if isinstance(axis, list) else axis.steps
 
 
-def _checked(plan: Plan, at: str) -> Plan:
+def _at(axis: list[Any] | Whole, index: int) -> Any:
+    return axis[index] if isinstance(axis, list) else axis.low + index
+
+
+def _checked(plan: _P, at: str) -> _P:
     """Raises CallError or another BoebotError, in one sentence, before anything is made."""
     for key in ("brains", "seeds"):
         if getattr(plan, key) == []:
@@ -229,7 +254,7 @@ def _checked(plan: Plan, at: str) -> Plan:
     _check_design(plan, at)
     if plan.count > MOST_RUNS:
         raise CallError(f"{at}these are {plan.count:,} runs; expected at most {MOST_RUNS:,}")
-    _check_runs(plan)
+    _check_runs(plan, at)
     return plan
 
 
@@ -241,36 +266,48 @@ def _check_design(plan: Plan, at: str) -> None:
             raise CallError(f"{at}{name} has {axis.steps} steps; expected 2 or more in a grid")
         if isinstance(axis, Range) and plan.design != "grid" and axis.steps:
             raise CallError(f"{at}{name} has steps, which only a grid takes; expected from and to")
-    if plan.design == "grid" and plan.points:
-        raise CallError(f"{at}a grid has {plan.points} points; it has as many as its values make: expected no points")
-    if plan.design == "sobol" and plan.points & (plan.points - 1):
+        if isinstance(axis, list) and plan.design == "two-level" and len(axis) != 2:
+            raise CallError(f"{at}{name} has {len(axis)} values; expected two in a two-level design")
+    is_counted = plan.design in ("grid", "two-level")
+    axes = len(plan.parameters) + len(plan.imperfections)
+    if is_counted and plan.points:
+        what = f"a {plan.design} design has {plan.points} points"
+        raise CallError(f"{at}{what}; it has as many as its values make: expected no points")
+    if plan.design in ("sobol", "saltelli") and plan.points & (plan.points - 1):
         near = 1 << plan.points.bit_length()
-        raise CallError(f"{at}a sobol design has {plan.points} points; expected a power of two, such as {near}")
-    if plan.design != "grid" and (plan.points < 1 or not plan.axes):
-        expected = "expected both points and values of parameters or imperfections"
-        raise CallError(f"{at}a {plan.design} design has {plan.points} points over {len(plan.axes)} axes; {expected}")
+        raise CallError(f"{at}a {plan.design} design has {plan.points} points; expected a power of two, such as {near}")
+    if plan.design != "grid" and (plan.points < 1 - is_counted or not axes):
+        expected = f"expected {'' if is_counted else 'both points and '}values of parameters or imperfections"
+        raise CallError(f"{at}a {plan.design} design has {plan.points} points over {axes} axes; {expected}")
 
 
-def _check_runs(plan: Plan) -> None:
+def _check_runs(plan: Plan, at: str) -> None:
     """Each brain with each robot, arena and choice of faults, and each value that is listed, is one that can run."""
     for one, axis in plan.imperfections.items():
-        for value in _listed(axis):
+        for value in listed(axis):
             checked({one: value})
+        if isinstance(axis, Range) and imperfections()[one].whole:
+            raise CallError(f"{at}{one} takes whole numbers; expected a list of them, no range")
     for name in [*plan.arenas, *plan.test_arenas]:
         load_arena(name)
     for brain in plan.brains:
         loaded = load_brain(brain)
-        first = {name: _listed(axis)[0] for name, axis in plan.parameters.items()}
+        first = {name: listed(axis)[0] for name, axis in plan.parameters.items()}
         for name, axis in plan.parameters.items():
-            for value in _listed(axis):
+            for value in listed(axis):
                 with in_force(loaded, {name: value}):
                     pass
         for robot in plan.all_robots:
+            description = prepare(loaded, robot, None)[1]
+            for one in plan.imperfections:
+                if imperfections()[one].needs not in plan.imperfections and (fault := idle(one, description)):
+                    raise CallError(f"{at}imperfections: {one} changes nothing: {fault}")
             for faults in plan.faults or [[]]:
                 for arena in plan.all_arenas:
                     member = Member(brain=loaded, robot=robot, parameters=first)
                     Request(members=[member], arena=arena, on=plan.on, seconds=plan.seconds, faults=faults).tasks()
 
 
-def _listed(axis: Axis) -> list[Any]:
+def listed(axis: AnyAxis) -> list[Any]:
+    """The values that are named."""
     return axis if isinstance(axis, list) else [axis.low, axis.high]

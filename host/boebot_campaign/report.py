@@ -1,5 +1,5 @@
 """What came of a sweep: each figure against each factor, with 95 % intervals, as a table and a picture; and its brains
-compared, run by run at the same seed, start and all else.
+compared, run by run at the same seed, start and all else. One factor is in memory at a time.
 
 Intervals are those of boebot.rates. Two brains differ by the mean of the paired differences, by Cliff's delta
 (Psychological Bulletin 114, 1993; -1 to 1, 0: neither does better), and by Wilcoxon's signed-rank test.
@@ -7,7 +7,7 @@ Intervals are those of boebot.rates. Two brains differ by the mean of the paired
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,13 +17,13 @@ import numpy as np
 from boebot import missing, rates
 from boebot.cli import output
 from boebot.cli.ending import Detail
-from boebot.errors import BoebotError
 from boebot.rates import Mean, mean_of
 from boebot.record import figures as figures_in_words
+from boebot.record.run_folder import unwritable
 from boebot_campaign.kept import Folder
 from boebot_campaign.rows import OK
 
-PICTURE = "report.png"
+PICTURE, PAGE = "report.png", "index.md"
 MEANS = ("true_distance_m", "true_contacts", "behavior_switches")
 FACTORS = ("set", "arena", "brain", "robot", "faults")
 BINS = 6  # of a factor that has more values than MOST_VALUES
@@ -31,65 +31,94 @@ MOST_VALUES = 8
 
 
 class Level(NamedTuple):
-    """One value of a factor, or a range of them, and the runs there."""
+    """One value of a factor, or a range of them, and what came of the runs there."""
 
     factor: str
     value: str
     at: float
     """where it is drawn"""
-    rows: np.ndarray
+    runs: int
+    ok: int
+    means: dict[str, Mean | None]
+
+    def said(self) -> dict[str, Any]:
+        """For programs."""
+        interval = list(rates.interval(self.ok, self.runs)) if self.runs else None
+        counts = {"runs": self.runs, OK: self.ok, "ok_interval": interval}
+        return {"factor": self.factor, "value": self.value, **counts, **self.means}
+
+    def mean(self, name: str) -> Mean | None:
+        """Of a figure, or of whether runs are ok."""
+        if name != OK:
+            return self.means[name]
+        return Mean(self.ok / self.runs, *rates.interval(self.ok, self.runs)) if self.runs else None
 
 
 def report(path: Path, wanted: Detail) -> None:
-    """`boebot report` of a sweep's folder. Raises BoebotError: there is no row yet, or no picture can be written."""
+    """`boebot report` of a sweep's folder. Raises BoebotError: there is no row yet, or it cannot be written to."""
     folder = Folder(path)
-    columns = {name: np.array(values, dtype=object) for name, values in folder.table().to_pydict().items()}
-    factors = [*FACTORS, *(name for name in columns if name.startswith(("parameter.", "imperfection.")))]
-    levels = [level for name in factors for level in _levels(name, columns[name])]
-    levels = [Level("all", "", 0.0, np.ones(len(columns["row"]), dtype=bool)), *levels]
-    figures = [name for name in MEANS if any(value is not None for value in columns[name])]
-    table = [_said(level, columns, figures) for level in levels]
-    compared = [_compared(*pair, columns, figures[:1]) for pair in combinations(sorted(set(columns["brain"])), 2)]
-    picture = _drawn(path / PICTURE, levels, columns, figures)
+    compute = missing.imported("pyarrow.compute", "a report", "pyarrow", "sweep")
+    is_ok = compute.equal(folder.table(["status"])["status"], OK).to_numpy()
+    found = {name: np.where(is_ok, _numbers(folder, name), np.nan) for name in MEANS}
+    figures = {name: values for name, values in found.items() if not np.isnan(values).all()}
+    levels = [_level("all", "", 0.0, np.ones(len(is_ok), dtype=bool), is_ok, figures)]
+    axes = {"parameter": folder.plan.parameters, "imperfection": folder.plan.imperfections}
+    for name in [*FACTORS, *(f"{kind}.{one}" for kind, own in axes.items() for one in own)]:
+        levels += [_level(name, *level, is_ok, figures) for level in _values(folder, name)]
+    compared = [] if not figures else _compared(folder, *next(iter(figures.items())))
+    picture = _drawn(path / PICTURE, levels, figures)
+    titles, rows = ["factor", "value", "ok", *map(words, figures)], [_in_words(level) for level in levels]
+    lines = [*_differences(compared), _INTERVALS]
+    page = saved_page(path / PAGE, f"Sweep {path.name}", [(titles, rows)], lines, PICTURE)
     if wanted is Detail.JSON:
-        output.print_json({"levels": table, "compared": compared, "files": [str(picture)]})
+        said = [level.said() for level in levels]
+        output.print_json({"levels": said, "compared": compared, "files": [str(picture), str(page)]})
     elif wanted is not Detail.NOTHING:
-        _print(table, compared, figures)
-        output.line(f"picture: {picture}")
+        output.print_columns(titles, rows)
+        for line in lines:
+            output.line(line)
+        output.line(f"picture: {picture}, page: {page}")
 
 
-def _levels(name: str, values: np.ndarray) -> Iterator[Level]:
-    """Of a factor that has several; many numbers are put together in bins of as many runs."""
-    known = sorted({value for value in values if value is not None}, key=lambda value: (str(type(value)), value))
-    is_number = all(isinstance(value, int | float) and not isinstance(value, bool) for value in known)
-    if len(known) + any(value is None for value in values) < 2:
+def _numbers(folder: Folder, name: str) -> np.ndarray:
+    """A column; NaN: null."""
+    return np.asarray(folder.table([name])[name].to_numpy(), dtype=float)
+
+
+def _values(folder: Folder, name: str) -> Iterator[tuple[str, float, np.ndarray]]:
+    """Of a factor that has several: the value, where it is drawn, and which rows have it. Many numbers are put together
+    in bins of as many runs."""
+    arrow = missing.imported("pyarrow", "a report", "pyarrow", "sweep")
+    column = folder.table([name])[name]
+    if arrow.types.is_string(column.type) or arrow.types.is_boolean(column.type):
+        encoded = column.combine_chunks().dictionary_encode(null_encoding="encode")
+        texts, places = encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
+        order = sorted(range(len(texts)), key=lambda one: (texts[one] is not None, str(texts[one])))
+        for at, index in enumerate(order if len(texts) > 1 else []):
+            yield "none" if texts[index] is None else str(texts[index]), float(at), places == index
         return
-    if is_number and len(known) > MOST_VALUES:
-        numbers = values.astype(float)
+    numbers = np.asarray(column.to_numpy(), dtype=float)
+    known = np.unique(numbers)
+    if len(known) > MOST_VALUES:
         edges = np.quantile(numbers, np.linspace(0, 1, BINS + 1))
         place = np.clip(np.searchsorted(edges, numbers, side="right") - 1, 0, BINS - 1)
         for index in range(BINS):
             text = f"{edges[index]:.4g} to {edges[index + 1]:.4g}"
-            yield Level(name, text, float(edges[index : index + 2].mean()), place == index)
+            yield text, float(edges[index : index + 2].mean()), place == index
         return
-    for index, value in enumerate([*([None] if any(value is None for value in values) else []), *known]):
-        at = float(value) if is_number and value is not None else float(index)
-        yield Level(name, "none" if value is None else f"{value:.4g}" if is_number else str(value), at, values == value)
+    for value in known if len(known) > 1 else []:
+        yield f"{value:.4g}", float(value), numbers == value
 
 
-def _said(level: Level, columns: dict[str, np.ndarray], figures: list[str]) -> dict[str, Any]:
-    """Its runs, the rate of those that ended as they should, and the means, by name."""
-    status = columns["status"][level.rows]
-    good = int(np.count_nonzero(status == OK))
-    row: dict[str, Any] = {"factor": level.factor, "value": level.value, "runs": len(status), OK: good}
-    row["ok_interval"] = list(rates.interval(good, len(status))) if len(status) else None
-    return row | {name: _mean_at(level, columns, name) for name in figures}
-
-
-def _mean_at(level: Level, columns: dict[str, np.ndarray], name: str) -> Mean | None:
-    found = columns[name][level.rows & (columns["status"] == OK)]
-    found = found[[value is not None for value in found]].astype(float)
-    return mean_of(found) if len(found) else None
+def _level(
+    factor: str, value: str, at: float, rows: np.ndarray, is_ok: np.ndarray, figures: dict[str, np.ndarray]
+) -> Level:
+    means: dict[str, Mean | None] = {}
+    for name, values in figures.items():
+        there = values[rows]
+        there = there[~np.isnan(there)]
+        means[name] = mean_of(there) if len(there) else None
+    return Level(factor, value, at, int(np.count_nonzero(rows)), int(np.count_nonzero(rows & is_ok)), means)
 
 
 def cliffs_delta(one: np.ndarray, other: np.ndarray) -> float:
@@ -99,27 +128,21 @@ def cliffs_delta(one: np.ndarray, other: np.ndarray) -> float:
     return float((below.sum() - (len(other) - upto).sum()) / (len(one) * len(other)))
 
 
-def _compared(one: str, other: str, columns: dict[str, np.ndarray], figures: list[str]) -> dict[str, Any]:
-    """Two brains by the figures, over the runs that both have ended as they should."""
-    factors = [name for name in columns if name in ("arena", "robot", "faults", "start", "seed") or "." in name]
-    keys = list(zip(*(columns[name] for name in factors), strict=True))
-    found: dict[str, Any] = {"brains": [one, other]}
-    for name in figures:
-        values: list[dict[Any, float]] = [
-            {
-                key: float(value)
-                for key, value, brain, status in zip(
-                    keys, columns[name], columns["brain"], columns["status"], strict=True
-                )
-                if brain == which and status == OK and value is not None
-            }
-            for which in (one, other)
-        ]
-        both = [key for key in values[0] if key in values[1]]
-        if len(both) > 1:
-            first, second = (np.array([those[key] for key in both]) for those in values)
-            found[name] = {
-                "pairs": len(both),
+def _compared(folder: Folder, name: str, values: np.ndarray) -> list[dict[str, Any]]:
+    """Each two brains by a figure, over the runs that both have ended as they should."""
+    plan = folder.plan
+    found: list[dict[str, Any]] = []
+    whole = np.full(plan.count, np.nan)
+    whole[folder.table(["row"])["row"].to_numpy()] = values
+    each = np.moveaxis(whole.reshape(plan.sizes), 1, 0).reshape(len(plan.brains), -1)
+    by_brain = {Path(brain).name: each[index] for index, brain in enumerate(plan.brains)}
+    for one, other in combinations(sorted(by_brain), 2):
+        both = ~np.isnan(by_brain[one]) & ~np.isnan(by_brain[other])
+        first, second = by_brain[one][both], by_brain[other][both]
+        found.append({"brains": [one, other]})
+        if len(first) > 1:
+            found[-1][name] = {
+                "pairs": len(first),
                 "difference": mean_of(first - second),
                 "cliffs_delta": cliffs_delta(first, second),
                 "wilcoxon_p": _wilcoxon(first - second),
@@ -135,33 +158,35 @@ def _wilcoxon(differences: np.ndarray) -> float:
     return float(stats.wilcoxon(differences).pvalue)
 
 
-def _words(name: str) -> str:
+_INTERVALS = "Intervals hold 95 %: Wilson's of rates, by bootstrap of means, which are of runs that are ok."
+
+
+def words(name: str) -> str:
     """A figure's name as people read it, with its unit."""
-    ((words, _, unit),) = figures_in_words.rows({name: 0})
-    return f"{words} ({unit})" if unit else words
+    ((said, _, unit),) = figures_in_words.rows({name: 0})
+    return f"{said} ({unit})" if unit else said
 
 
-def _said_mean(mean: Mean) -> str:
-    return f"{mean.mean:.3g} ({mean.least:.3g} to {mean.most:.3g})"
+def said(mean: Mean | None) -> str:
+    """With its interval."""
+    return "" if mean is None else f"{mean.mean:.3g} ({mean.least:.3g} to {mean.most:.3g})"
 
 
-def _print(table: list[dict[str, Any]], compared: list[dict[str, Any]], figures: list[str]) -> None:
-    rows = []
-    for row in table:
-        means = ["" if row[name] is None else _said_mean(row[name]) for name in figures]
-        rows.append([row["factor"], row["value"], rates.in_words(row[OK], row["runs"]) if row["runs"] else "0", *means])
-    output.print_columns(["factor", "value", "ok", *map(_words, figures)], rows)
+def _in_words(level: Level) -> list[str]:
+    good = rates.in_words(level.ok, level.runs) if level.runs else "0"
+    return [level.factor, level.value, good, *map(said, level.means.values())]
+
+
+def _differences(compared: list[dict[str, Any]]) -> Iterator[str]:
     for pair in compared:
-        for name in (name for name in figures if name in pair):
-            two = pair[name]
-            output.line(
-                f"{' less '.join(pair['brains'])}, {_words(name)}: {_said_mean(two['difference'])} over "
+        for name, two in ((name, two) for name, two in pair.items() if name != "brains"):
+            yield (
+                f"{' less '.join(pair['brains'])}, {words(name)}: {said(two['difference'])} over "
                 f"{two['pairs']} pairs; Cliff's delta {two['cliffs_delta']:.2f}, Wilcoxon p = {two['wilcoxon_p']:.2g}"
             )
-    output.line("Intervals hold 95 %: Wilson's of rates, by bootstrap of means, which are of runs that are ok.")
 
 
-def _drawn(path: Path, levels: list[Level], columns: dict[str, np.ndarray], figures: list[str]) -> Path:
+def _drawn(path: Path, levels: list[Level], figures: dict[str, np.ndarray]) -> Path:
     """A panel for each figure and factor."""
     from matplotlib.figure import Figure
 
@@ -172,25 +197,44 @@ def _drawn(path: Path, levels: list[Level], columns: dict[str, np.ndarray], figu
     for column, factor in enumerate(factors):
         own = [level for level in levels if level.factor == factor]
         for panel, name in zip(panels[:, column], [*figures, OK], strict=True):
-            means = [_rate(level, columns) if name == OK else _mean_at(level, columns, name) for level in own]
-            drawn = [(level, mean) for level, mean in zip(own, means, strict=True) if mean is not None]
+            drawn = [(level.at, mean) for level in own if (mean := level.mean(name)) is not None]
             middle = np.array([mean.mean for _, mean in drawn])
             ends = np.array([[mean.mean - mean.least, mean.most - mean.mean] for _, mean in drawn]).reshape(-1, 2).T
-            panel.errorbar([level.at for level, _ in drawn], middle, np.maximum(ends, 0), fmt="o", capsize=3)
+            panel.errorbar([at for at, _ in drawn], middle, np.maximum(ends, 0), fmt="o", capsize=3, clip_on=False)
             panel.set_xticks([level.at for level in own], [level.value for level in own], rotation=20, fontsize=7)
             panel.margins(x=0.2)
             panel.grid(axis="y", color="#dfe2ea")
         panels[-1, column].set_xlabel(factor)
     for panel, name in zip(panels[:, 0], [*figures, "share of runs ok"], strict=True):
-        panel.set_ylabel(_words(name))
+        panel.set_ylabel(words(name))
+        if name not in figures or not (figures[name] < 0).any():  # it cannot be negative
+            panel.set_ylim(bottom=max(panel.get_ylim()[0], 0))
+    return saved(figure, path)
+
+
+def saved(figure: Any, path: Path) -> Path:
+    """A picture, as a file. Raises BoebotError."""
     try:
         figure.savefig(path, dpi=120)
     except OSError as error:
-        raise BoebotError(f"{path} cannot be written: {error.strerror or error}") from None
+        raise unwritable(path.parent, error, path.name) from None
     return path
 
 
-def _rate(level: Level, columns: dict[str, np.ndarray]) -> Mean | None:
-    status = columns["status"][level.rows]
-    good = int(np.count_nonzero(status == OK))
-    return Mean(good / len(status), *rates.interval(good, len(status))) if len(status) else None
+def saved_page(
+    path: Path,
+    title: str,
+    tables: Sequence[tuple[Sequence[str], Sequence[Sequence[str]]]],
+    lines: Sequence[str],
+    picture: str,
+) -> Path:
+    """Tables, sentences and a picture as Markdown. Raises BoebotError."""
+    parts = [f"# {title}", f"![{title}]({picture})"]
+    for titles, rows in tables:
+        cells = [titles, ["---"] * len(titles), *rows]
+        parts.append("\n".join(f"| {' | '.join(one.replace('|', chr(92) + '|') for one in row)} |" for row in cells))
+    try:
+        path.write_text("\n\n".join([*parts, *lines]) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise unwritable(path.parent, error, path.name) from None
+    return path

@@ -22,6 +22,7 @@ from boebot import missing
 from boebot.arenas import load_arena
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
+from boebot.imperfections import imperfections
 from boebot.record.brain_record import BrainNames
 from boebot.record.run import FIGURES, SHARE
 from boebot.running.loop import execute
@@ -102,7 +103,7 @@ def request_of(folder: Folder, case: Case) -> Request:
         robot,
         pose=pose,
         parameters=dict(case.parameters) or None,
-        imperfections=dict(case.imperfections) or None,
+        imperfections=heard(case.imperfections) or None,
         arena=arena,
         on=plan.on,
         seconds=plan.seconds,
@@ -110,6 +111,12 @@ def request_of(folder: Folder, case: Case) -> Request:
         step_timeout=plan.limit_s,
         faults=list(case.faults),
     )
+
+
+def heard(given: Mapping[str, float]) -> dict[str, float]:
+    """Without those that another one needs, which is 0 here: of a run alone they are refused."""
+    table = imperfections()
+    return {name: value for name, value in given.items() if given.get(table[name].needs, 1)}
 
 
 @lru_cache(maxsize=4096)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,9 +29,9 @@ class Sweep:
         """All rows, in order: a Parquet file, which pandas and polars read."""
         return self.folder / kept.ROWS
 
-    def table(self) -> pyarrow.Table:
-        """The rows so far."""
-        return kept.Folder(self.folder).table()
+    def table(self, columns: Sequence[str] | None = None) -> pyarrow.Table:
+        """The rows so far, of those columns or of all."""
+        return kept.Folder(self.folder).table(columns)
 
     def to_pandas(self) -> pandas.DataFrame:
         """The rows so far, by their number."""
@@ -39,7 +39,7 @@ class Sweep:
 
     def statuses(self) -> dict[str, int]:
         """How many rows there are of each status."""
-        counts = kept.Folder(self.folder).table(["status"])["status"].value_counts().to_pylist()
+        counts = self.table(["status"])["status"].value_counts().to_pylist()
         return {one["values"]: one["counts"] for one in counts}
 
 
@@ -73,6 +73,17 @@ def sweep(
         raise CallError(f"workers is {workers}; expected at least 1, and none with a scheduler")
     asked = plan.made(keys) if file is None else plan.read(Path(file))
     path = Path(out if out is not None else Path(str(file)).stem)
+    return run_plan(asked, path, scheduler, workers, progress)
+
+
+def run_plan(
+    asked: plan.Plan,
+    path: Path,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Sweep:
+    """The same of a plan, into the folder `path`."""
     with kept.locked(path, asked) as folder:
         if folder.undone():
             engine.run(folder, scheduler, workers or os.cpu_count() or 1, progress or (lambda _: None))

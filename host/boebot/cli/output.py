@@ -10,14 +10,14 @@ import contextlib
 import json
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
 from boebot.errors import printable
 
 if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions
+    from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
     from rich.table import Table
 
@@ -107,16 +107,26 @@ def print_columns(
 
 @contextlib.contextmanager
 def progress_bar(
-    title: str, total: float, quiet: bool = False, unit: str = " s", *, left: bool = False
+    title: str,
+    total: float,
+    quiet: bool = False,
+    unit: str = " s",
+    *,
+    left: bool = False,
+    below: Callable[[], RenderableType] | None = None,
 ) -> Iterator[Progress]:
     """Gives a function to call with how much of the total is done, such as the seconds that have passed; shows a bar
-    meanwhile, and with `left` the time that the rest will take."""
+    meanwhile, with `left` the time that the rest will take, and what `below` gives, often and in another thread."""
     if quiet or not sys.stderr.isatty():
         yield lambda _: None
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    bar = Progress(
+    class Bar(Progress):
+        def get_renderables(self) -> Iterable[RenderableType]:
+            return [*super().get_renderables(), *([below()] if below else [])]
+
+    bar = Bar(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn(f"{{task.completed:.0f}}{'' if math.isinf(total) else f' of {total:g}'}{unit}"),

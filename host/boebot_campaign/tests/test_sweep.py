@@ -19,11 +19,13 @@ from typing import Any
 import pytest
 
 import boebot
+from boebot.cli import output
 from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
 from boebot_campaign import kept, local, plan, tasks
+from boebot_campaign.command import NEWEST_ROWS, NewestRows
 from boebot_campaign.report import report
-from boebot_campaign.rows import APART
+from boebot_campaign.rows import APART, columns, table_of
 
 FORKED = multiprocessing.get_context("forkserver")
 FORKED.set_forkserver_preload(local.IMPORTED)
@@ -249,7 +251,32 @@ def test_a_report_has_intervals_and_compares_the_brains(undisturbed: Path, capsy
     pair = said["compared"][0]["true_distance_m"]
     assert pair["pairs"] == 20
     assert pair["difference"][0] == pytest.approx(sum(ways["clearway"]) / 20 - sum(ways["odd.py"]) / 20)
-    assert Path(said["files"][0]).read_bytes().startswith(b"\x89PNG")
+    picture, page = map(Path, said["files"])
+    assert picture.read_bytes().startswith(b"\x89PNG") and f"({picture.name})" in page.read_text()
+    assert page.read_text().count("\n| ") == len(said["levels"]) + 2 and "clearway less odd.py" in page.read_text()
+
+
+def test_a_picture_of_what_cannot_be_negative_begins_at_0_or_above(
+    undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr("boebot_campaign.report.saved", lambda figure, _: drawn.append(figure))
+    report(undisturbed / "out", Detail.NOTHING)
+    assert all(panel.get_ylim()[0] >= 0 for panel in drawn[0].axes) and capsys.readouterr().out == ""
+
+
+def test_the_newest_rows_are_shown_while_a_sweep_runs(tmp_path: Path) -> None:
+    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, PLAN))) as folder:
+        shown = NewestRows(folder.path)
+        assert shown() == ""
+        rows = [{"row": row, "brain": "odd.py", "seed": row + 500, "status": "ok"} for row in range(10)]
+        kept.write_part(folder.part(0, 10), table_of(rows, columns(folder.plan, ["clearway"])))
+        assert shown() == ""  # it looks once in a second
+        printed = output.console()
+        with printed.capture() as caught:
+            printed.print(NewestRows(folder.path)())
+    lines = [line for line in caught.get().splitlines() if "odd.py" in line]
+    assert len(lines) == NEWEST_ROWS and "509" in lines[-1] and "row" in caught.get()
 
 
 def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:
