@@ -11,9 +11,18 @@
 
 static bool is_connected;
 
+/* Drives the servo's line, or lets go of it; in a frame with a pulse the line stays as it is. */
+static void connect(bool connected) {
+  if (connected != is_connected && servo_pulse(SERVO_TURRET) == 0) {
+    is_connected = connected;
+    servo_connect_turret(connected);
+  }
+}
+
 void turret_hold(int16_t angle) {
   const int32_t pulse = (int32_t)parameters_u16(PARAMETER_TURRET_CENTRE) +
                         motion_offset(parameters_i16(PARAMETER_TURRET_GAIN), angle, RADIAN);
+  connect(true); /* the task may come after the first pulse */
   servo_turn(pulse < (int32_t)SERVO_TURRET_MIN   ? SERVO_TURRET_MIN
              : pulse > (int32_t)SERVO_TURRET_MAX ? SERVO_TURRET_MAX
                                                  : (uint16_t)pulse);
@@ -29,10 +38,7 @@ void turret_task(void) {
   if (!in_use) {
     turret_release();
   }
-  if (in_use != is_connected && servo_pulse(SERVO_TURRET) == 0) {
-    is_connected = in_use;
-    servo_connect_turret(in_use);
-  }
+  connect(in_use);
 }
 
 bool turret_report_devices_telemetry(msg_devices_telemetry *message) {

@@ -1,10 +1,11 @@
 /* infrared.c: see infrared.h. */
 #include "infrared.h"
 
-#define PERIOD_MINIMUM 360u /* 44.4 kHz */
-#define PERIOD_MAXIMUM 480u /* 33.3 kHz */
-#define GAP 800u            /* longer: a new train */
+#define PERIOD_MINIMUM 360.0 /* 44.4 kHz */
+#define PERIOD_MAXIMUM 480.0 /* 33.3 kHz */
+#define GAP 800u             /* longer: a new train */
 #define CYCLES_TO_HEAR INFRARED_CYCLES_TO_HEAR
+#define CYCLES_TO_SETTLE INFRARED_CYCLES_TO_SETTLE
 #define HOLD_CYCLES (10u * 421u) /* the output stays low for ten periods after the last one */
 
 static void forget_past_light(infrared *self, uint64_t cycle) {
@@ -35,34 +36,55 @@ static void drive_output(infrared *self, uint64_t cycle) {
   if (low) part_drive(&self->part, low_until, self->part.pins[1].pin, BOARD_HIGH);
 }
 
-static double frequency_of(uint32_t period) { return (double)BOARD_CLOCK_HZ / (double)period; }
+static double frequency_of(double period) { return (double)BOARD_CLOCK_HZ / period; }
 
-static void look(infrared *self, uint64_t cycle) {
+/* The mean period of the last cycles: from the mean of the first half of their rises to that of the second half. */
+static double mean_period(const infrared *self) {
+  const uint32_t all = self->carrier_cycles + 1;
+  const uint32_t rises = all < CYCLES_TO_SETTLE ? all : CYCLES_TO_SETTLE;
+  const uint32_t half = rises / 2;
+  uint64_t sum = 0;
+  for (uint32_t i = 0; i < half; i++) {
+    sum += self->rises[(all - half + i) % CYCLES_TO_SETTLE] - self->rises[(all - rises + i) % CYCLES_TO_SETTLE];
+  }
+  return (double)sum / (double)(half * (rises - half));
+}
+
+static void look(infrared *self, uint64_t cycle, noise_source *noise) {
   const viewpoint from = part_view(&self->part, cycle);
-  self->seen = (uint8_t)infrared_pair_look(&self->pair, &from, frequency_of(self->period), &self->part.noise).seen;
+  self->seen = (uint8_t)infrared_pair_look(&self->pair, &from, frequency_of(self->period), noise).seen;
+}
+
+/* The first rise of a train. */
+static void begin(infrared *self, uint64_t cycle) {
+  self->carrier_cycles = 0;
+  self->rises[0] = cycle;
+  self->seen = 0;
 }
 
 static void edge(part *base, uint64_t cycle, uint8_t pin, uint8_t level) {
   infrared *self = (infrared *)base;
   if (level != BOARD_HIGH) return;
-  if (cycle - self->last_rise > GAP) {
-    self->carrier_cycles = 0;
-    self->seen = 0;
-  } else {
-    self->carrier_cycles++;
-  }
+  const int is_new = cycle - self->last_rise > GAP;
   self->last_rise = cycle;
-  uint64_t *first = &self->rises[self->carrier_cycles % CYCLES_TO_HEAR];
-  const uint64_t span = cycle - *first; /* of the last CYCLES_TO_HEAR cycles, once there are as many */
-  *first = cycle;
-  if (self->carrier_cycles < CYCLES_TO_HEAR) return;
-  if (span < CYCLES_TO_HEAR * PERIOD_MINIMUM || span > CYCLES_TO_HEAR * PERIOD_MAXIMUM) {
-    self->carrier_cycles = 0;
-    self->seen = 0;
+  if (is_new) {
+    begin(self, cycle);
     return;
   }
-  self->period = (uint32_t)(span / CYCLES_TO_HEAR);
-  if (self->carrier_cycles == CYCLES_TO_HEAR) look(self, cycle);
+  self->carrier_cycles++;
+  self->rises[self->carrier_cycles % CYCLES_TO_SETTLE] = cycle;
+  if (self->carrier_cycles < CYCLES_TO_HEAR) return;
+  self->period = mean_period(self);
+  if (self->period < PERIOD_MINIMUM || self->period > PERIOD_MAXIMUM) {
+    begin(self, cycle);
+    return;
+  }
+  if (self->carrier_cycles == CYCLES_TO_HEAR) {
+    self->drawn = self->part.noise;
+    look(self, cycle, &self->part.noise);
+  } else if (self->carrier_cycles == CYCLES_TO_SETTLE) {
+    look(self, cycle, &self->drawn);
+  }
   if (self->sent_from == self->sent_until) self->sent_from = cycle;
   self->sent_until = cycle + 1;
   if (self->seen) { /* low from now on takes back the end that was queued a period ago */

@@ -59,6 +59,26 @@ TEST_CASE("pulse = centre + gain * angle, to a cycle, within 600 to 2400 us, in 
   }
 }
 
+TEST_CASE("switched on and turned at once, in any slot, it has whole pulses from the next frame on") {
+  for (uint64_t slots = 0; slots < 8; slots++) {
+    turret_bench bench;
+    bench.set(PARAMETER_DEVICES, DEVICES_SERVO);
+    bench.run_in_session(4 * TICK + slots * TICK / 4);
+    bench.set(PARAMETER_DEVICES, DEVICES_SERVO | DEVICES_TURRET);
+    bench.turn(0);
+    const uint64_t from = bench.machine.now;
+    bench.run_in_session(8 * TICK);
+    const auto pulse = bench.last_pulse(from);
+    CAPTURE(slots);
+    CHECK(pulse.width == 24000);
+    CHECK(bench.devices().turret_pulse == 24000);
+    for (const pin_edge &edge : bench.edges_of(PIN_TURRET)) {
+      const bool rises = edge.cycle > from && edge.level == NATIVE_HIGH;
+      CHECK((!rises || (edge.cycle - bench.slot(4)) % (2 * TICK) == 10000));
+    }
+  }
+}
+
 TEST_CASE("what stops the motors releases it, and it does not move while they are latched") {
   turret_bench bench;
   bench.turn(1000);

@@ -21,11 +21,12 @@ BEYOND = {("everything", "receive")}  # docs/reference/timing.md, "What is promi
 
 @pytest.mark.parametrize("image", ["boebot", "shieldbot-quad"])
 @pytest.mark.parametrize("name", LOADS)
-def test_no_interrupt_comes_oftener_than_its_load_admits(name: str, image: str) -> None:
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_interrupt_comes_oftener_than_its_load_admits(seed: int, name: str, image: str) -> None:
     """In windows of every length: n + 1 requests that lie d cycles apart, first to last, are in one of d + 1 cycles."""
     elf = avr_image(image)
     seconds = 0.4 + (SILENCE / CLOCK_HZ if name == "everything" else 0.0)
-    found = run(elf, load_robot(image), name, seconds, 1, losses=False)
+    found = run(elf, load_robot(image), name, seconds, seed, losses=False)
     spans = found.spans[found.spans["begin"] >= found.loaded_from]
     above, requests = set(), 0
     for row in read_table(elf).interrupts:

@@ -25,7 +25,10 @@ pytestmark = pytest.mark.unsanitized
 LEFT, RIGHT = 13, 12
 G = 9.81
 EDGES = 64  # in a turn
-FLICKERS_SEEN = 0.99  # two edges nearer than an interrupt takes are none: of 0 to 0.4 ms that is about 1 %
+# Two edges are none if the second comes before the interrupt of the first has read the port. That takes 45 cycles, and
+# some 100 on average, as it waits for others, above all those of servos' edges: 1.5 % of each of a flicker's two gaps,
+# which last up to 0.4 ms. The native board takes no time.
+FLICKERS_SEEN = {"native": 1.0, "avr": 0.97}
 
 
 def wheel_speed(robot: RobotDescription, share: float, force: float) -> float:
@@ -151,15 +154,15 @@ def test_brown_out_switches_the_motors_off_and_the_link_comes_back(board_url: st
 
 
 def edges_shown_and_true(
-    url: str, missed: float, extra: float, *, every_edge: bool = False
+    url: str, missed: float, extra: float, *, seconds: float = 20.0, every_edge: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of both wheels, over 20 s at full speed. `every_edge`: also such as follow each other faster than a wheel's."""
+    """Of both wheels, at full speed. `every_edge`: also such as follow each other faster than a wheel's."""
     chances = {"encoder_missed": missed, "encoder_extra": extra}
     with circle(url, arena_of(), load_robot("shieldbot"), noise=True, seed=5, imperfections=chances) as rig:
         if every_edge:
             rig.set("encoder_gap", 0)
         before = rig.latest()
-        rig.drive_for(1.0, 1.0, 20.0)
+        rig.drive_for(1.0, 1.0, seconds)
         rig.listen(1.0)
         after, body = rig.latest(), rig.robot.body()
         shown = after.encoder_left - before.encoder_left, after.encoder_right - before.encoder_right
@@ -173,14 +176,14 @@ def test_encoders_count_each_edge(board_url: str) -> None:
 
 def test_encoders_with_missed_edges_count_less(board_url: str) -> None:
     """A pulse is lost with probability p for each edge that would begin it: a share 2 p / (1 + p) of the edges."""
-    shown, true = edges_shown_and_true(board_url, 0.1, 0.0)
+    shown, true = edges_shown_and_true(board_url, 0.1, 0.0, seconds=60.0)
     assert shown.sum() / true.sum() == pytest.approx(1 - 2 * 0.1 / 1.1, abs=0.03)
 
 
 def test_extra_edges_of_encoders_count_if_every_edge_does(board_url: str) -> None:
-    """Each flicker adds two edges."""
-    shown, true = edges_shown_and_true(board_url, 0.0, 0.1, every_edge=True)
-    assert shown.sum() / true.sum() == pytest.approx(1 + 2 * 0.1 * FLICKERS_SEEN, abs=0.03)
+    """Each flicker adds two edges. Of 6,400 edges: 0.0075 is the standard deviation of their share."""
+    shown, true = edges_shown_and_true(board_url, 0.0, 0.1, seconds=60.0, every_edge=True)
+    assert shown.sum() / true.sum() == pytest.approx(1 + 2 * 0.1 * FLICKERS_SEEN[board_url], abs=0.03)
     shown, true = edges_shown_and_true(board_url, 0.0, 0.1)
     assert np.all(np.abs(shown - true) <= 1.0)
 

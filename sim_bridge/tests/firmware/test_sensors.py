@@ -168,3 +168,23 @@ def test_infrared_burst_is_38_khz_for_a_millisecond(rig: SessionRig, phase_s: fl
             assert 0.9e-3 <= duration / CYCLES_PER_S <= 1.1e-3
             frequency = (len(burst) - 1) * CYCLES_PER_S / duration
             assert abs(frequency - 38_000) <= 300
+
+
+def test_infrared_burst_ends_with_its_led_off_when_its_last_toggle_waits(rig: SessionRig) -> None:
+    """Edges of both encoders at the end of a burst keep the interrupt of its last toggle waiting, until one more is
+    requested while that runs."""
+    ticks = rig.request(messages.GetParameter, messages.PARAMETERS["infrared_period"].id).value
+    period = ticks * round(TICK_S * CYCLES_PER_S)
+    rig.listen(2 * period / CYCLES_PER_S)
+    for early in range(0, 400, 8):
+        log = rig.board.pin_log()
+        end = int(log["cycle"][log["pin"] == 9][-1]) + period
+        for edge in range(4):
+            rig.board.drive(16 + edge % 2, edge < 2, end - early + 100 * edge)
+        rig.listen(period / CYCLES_PER_S)
+    log = rig.board.pin_log()
+    cycles, levels = (log[name][log["pin"] == 9] for name in ("cycle", "level"))
+    ends = np.flatnonzero(np.diff(cycles, append=rig.board.cycle) > period // 2)[1:]  # the first is the start's
+    assert len(ends) >= 50
+    assert not levels[ends].any()
+    assert set(np.diff(ends)) == {76}

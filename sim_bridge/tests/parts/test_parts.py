@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
 from typing import Any
@@ -281,8 +282,8 @@ def test_whisker_bounces_and_settles() -> None:
 # ---- IR pair ---------------------------------------------------------------------------------------------
 
 
-def seen_from(distance: float, period: int = 421, cycles: int = 38, noise: bool = False, seed: int = 1) -> Scripted:
-    """A burst of the left LED with a wall across its beam at that distance from the pair."""
+def before_wall(distance: float, noise: bool = False, seed: int = 1) -> Scripted:
+    """A wall across the left pair's beam at that distance from the pair."""
     robot = load_robot("shieldbot")
     pair = robot.device["infrared_left"]
     assert isinstance(pair, InfraredPair)
@@ -292,7 +293,12 @@ def seen_from(distance: float, period: int = 421, cycles: int = 38, noise: bool 
     heading = math.pi / 2 - pair.heading_rad
     px = x * math.cos(heading) - y * math.sin(heading)
     py = x * math.sin(heading) + y * math.cos(heading)
-    scene = scripted(arena, pose=(-px, y - py, heading), noise=noise, seed=seed)
+    return scripted(arena, pose=(-px, y - py, heading), noise=noise, seed=seed)
+
+
+def seen_from(distance: float, period: int = 421, cycles: int = 38, noise: bool = False, seed: int = 1) -> Scripted:
+    """A burst of the left LED with a wall across its beam at that distance from the pair."""
+    scene = before_wall(distance, noise, seed)
     scene.burst(1 * MS, LED, period, cycles)
     scene.run(0.01)
     return scene
@@ -333,6 +339,37 @@ def test_infrared_zones_by_frequency(kilohertz: float, distance: float, expected
     """Half the sensitivity at 40 kHz, a fifth at 42: light falls with the square of the distance."""
     period = round(16_000 / kilohertz)
     assert (len(seen_from(distance, period=period).inputs(RECEIVER)) > 1) == expected
+
+
+def filtered(edges: list[int]) -> float:
+    """What a receiver's filter is left with at the last edge: two poles at 38.5 kHz, half of the peak at 40 kHz."""
+    detuning = 40 / 38.5 - 38.5 / 40
+    quality = math.sqrt(3) / detuning  # |1 + i quality detuning| = 2
+    pole = 2 * math.pi * 38_500 / 16e6 * complex(-0.5 / quality, 1)
+    state = 0j
+    for i, (begin, end) in enumerate(itertools.pairwise(edges)):
+        decay = cmath.exp(pole * (end - begin))
+        state = state * decay + (i % 2 == 0) * (decay - 1) / pole
+    return abs(state)
+
+
+@pytest.mark.parametrize(
+    ("late", "cycles"),
+    [(range(i, i + 1), 90) for i in range(76)] + [(range(i, 76, 8), 65) for i in range(8)],
+    ids=str,
+)
+def test_infrared_hears_a_carrier_whose_toggles_come_late_as_a_filter_does(late: range, cycles: int) -> None:
+    """At 40 kHz, when the burst ends. Nearer to the reach of such a filter than 4 % it may be either."""
+    on_time = [200 * i for i in range(76)]
+    edges = [at + cycles * (i in late) for i, at in enumerate(on_time)]
+    reach = 0.2 * math.sqrt(0.5 / 0.97 * filtered(edges) / filtered(on_time))
+    for distance in (0.96 * reach, 1.04 * reach):
+        scene = before_wall(distance)
+        for i, at in enumerate(edges):
+            scene.edge(1 * MS + at, LED, 1 - i % 2)
+        scene.run(0.01)
+        at_end = [level for cycle, level in scene.inputs(RECEIVER) if cycle <= 1 * MS + edges[-1]][-1]
+        assert at_end == (0 if distance < reach else 1)
 
 
 def test_infrared_beam_is_narrow() -> None:

@@ -10,7 +10,7 @@ ISR(TIMER2_COMPA_vect) {
   const uint8_t left = (uint8_t)(toggles_left - 1u);
   toggles_left = left;
   if (left == 0) {
-    TCCR2B = 0;
+    TIMSK2 = 0; /* not the timer alone: a match may have come while this toggle waited */
   }
   if (side_on == LEFT) {
     HAL_PIN_TOGGLE(INFRARED_LEFT_LED);

@@ -1,7 +1,7 @@
 /* hal_avr.h: the ATmega328P's part of hal.h that is small enough for inline functions: pins, time, edges.
  *
  *   Timer1  clk/1, free-running; capture for the Ping, compare A for edges, compare B for slots (timers.c)
- *   Timer2  clk/1, CTC, runs during IR bursts only: the carrier (carrier.c)
+ *   Timer2  clk/1, CTC: the carrier of the IR bursts (carrier.c)
  *   Timer0  CTC, runs during tones only: the buzzer (tone.c)
  *   PCINT1  port C: stamped changes      PCINT2  port D: the right light sensor or the line sensors
  *   TWI     100 kHz      ADC  clk/128, against the supply */

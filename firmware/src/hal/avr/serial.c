@@ -53,10 +53,10 @@ bool hal_serial_stopped(void) { return (UCSR0B & _BV(RXCIE0)) == 0; }
 /* What the UART has kept meanwhile is the middle of something. */
 void hal_serial_resume(void) {
   HAL_ATOMIC {
+    UCSR0B = (uint8_t)(UCSR0B | _BV(RXCIE0)); /* first: a byte that comes now asks when it comes, not later */
     (void)UDR0;
     (void)UDR0;
     (void)UDR0;
-    UCSR0B = (uint8_t)(UCSR0B | _BV(RXCIE0));
   }
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from boebot.boards import BoardRequest
@@ -10,6 +12,7 @@ from boebot.errors import BoardError, CallError
 from sim_bridge.boards.board import Level, ResetCause
 from sim_bridge.sessions.world import AVR, NATIVE, open_on
 from sim_bridge.tests.boards.avr.avr_program import Machine, assemble
+from sim_bridge.tests.boards.native.native_program import FIRMWARE
 from sim_bridge.tests.boards.symbols import entry_of
 
 
@@ -197,15 +200,25 @@ def test_the_first_one_is_a_fault() -> None:
 # ---- in the world ----
 
 
+def reads_what_survived_a_reset(note: str) -> bool:
+    """As the firmware does on purpose, in reset.c. The linker, which shortens calls, leaves some lines of the debugging
+    information two bytes late: the first such read may name the statement before its own, that before reset_start()."""
+    where = re.search(r"reads RAM that was never written .* \((\w+\.c):(\d+)\)", note)
+    if where is None:
+        return False
+    file, line = where[1], int(where[2])
+    return file == "reset.c" or "reset_start()" in (FIRMWARE / file).read_text().splitlines()[line]
+
+
 def test_a_run_with_notes_is_the_run_without_and_the_kits_firmware_has_one() -> None:
-    """It reads at its start what survived a reset, on purpose (reset.c)."""
+    """It reads at its start what survived a reset."""
     states = []
     for notes in (False, True):
         session = open_on(AVR, BoardRequest(robot=load_robot("shieldbot"), arena="room", notes=notes))
         session.transport.read(0.2, 0.2)
         states.append((session.sim.hash(), session.counters(), session.board.read_memory(0, 0x900)))
-        assert {"RAM that was never written" in note and "reset.c" in note for note in session.notes()} <= {notes}
         assert bool(session.notes()) == notes
+        assert all(reads_what_survived_a_reset(note) for note in session.notes())
         session.close()
     assert states[0] == states[1]
 
