@@ -154,6 +154,7 @@ def test_traffic_resumes_within_a_second_of_any_reset(uno: Uno, at_s: float) -> 
             link.poll(TICK_S)
             assert line.now() - begun < 1.0
         assert link.session.hello is not None
-        assert link.session.hello.reset_cause == messages.ResetCause[cause.upper()]
+        told = messages.ResetCause(link.session.hello.reset_cause).name
+        assert told.partition("_IN_")[0] == cause.upper()  # the watchdog's may say in which task
         assert messages.Telemetry.unpack(link.telemetry.latest).latch == messages.Latch.START
     assert link.counts.board_resets == link.counts.sessions_lost == 3
