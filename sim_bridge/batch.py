@@ -72,14 +72,14 @@ class Batch:
         self.arenas = self._arenas(arenas)
         self.handle = worlds.make_worlds("batch", model, self.count, state_bytes)
         self.state_bytes = int(state_bytes)
-        for index, (arena, pose, seed) in enumerate(zip(self.arenas, starts.tolist(), keys.tolist(), strict=True)):
-            pose = arena.free_start(model.radius, seed) if is_random else pose
-            worlds.place(f"batch, world {index}", self.handle, index, model, arena, seed, 1, pose)
+        self._poses = [None] * self.count if is_random else starts.tolist()
+        self._seeds: list[int] = keys.tolist()
+        for index, seed in enumerate(self._seeds):
+            self._place(index, seed)
         size = 8 * self.count * model.readings
         room = ffi.buffer(worlds.kept(self.handle.readings, self.handle), size) if size else b""
         self.readings: Floats = np.frombuffer(room, dtype=np.float64).reshape(self.count, model.readings)
         self.readings.flags.writeable = False
-        self._seeds: list[int] = keys.tolist()
         self._brains: Brains | None = None
         self._coasts = np.zeros(self.count, dtype=np.bool_)
         self._closed = False
@@ -97,6 +97,11 @@ class Batch:
         if len(around) != self.count:
             raise RobotError(f"batch: {len(around)} arenas for {self.count} poses; expected one, or as many")
         return around
+
+    def _place(self, index: int, seed: int) -> None:
+        arena, pose = self.arenas[index], self._poses[index]
+        pose = arena.free_start(self.model.radius, seed) if pose is None else pose
+        worlds.place(f"batch, world {index}", self.handle, index, self.model, arena, seed, 1, pose)
 
     # ---- threads -----------------------------------------------------------------------------------------------------
 
@@ -117,6 +122,10 @@ class Batch:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _expect_open(self) -> None:
+        if self._closed:
+            raise RobotError("batch: it is closed; expected no steps after close()")
 
     def _shares(self) -> list[tuple[int, int]]:
         """First world and number of worlds of each thread."""
@@ -139,8 +148,7 @@ class Batch:
     def _advance(self, work: Callable[[int, int, int], int | None], steps: int) -> bool:
         """`steps` steps of all worlds, in portions. Whether all went well."""
         left = arguments.whole("batch: steps", steps, RobotError, least=0, most=worlds.STEPS_MAXIMUM)
-        if self._closed:
-            raise RobotError("batch: it is closed; expected no steps after close()")
+        self._expect_open()
         portion, well = max(1, PORTION_FIRST // max(1, self.count)), True
         while left > 0:
             portion = min(portion, left)
@@ -187,6 +195,20 @@ class Batch:
         for index in np.flatnonzero(coasts != self._coasts).tolist():
             lib.vehicles_coast(self.handle, index, not self._coasts[index])
         self._coasts[:] = coasts
+
+    def restart(self, index: int, seed: int) -> None:
+        """World `index` begins anew with that seed and a new brain, at its own pose; a "random" one is drawn by the
+        seed. The others stay as they are.
+
+        Raises:
+            ArenaError: no start is free.
+            RobotError: there is no such world or seed, or it is closed.
+        """
+        self._expect_open()
+        self._place(self._index(index), seed)
+        self._seeds[index], self._coasts[index] = int(seed), False
+        if self._brains is not None:
+            self._brains.begin(index, seed)
 
     def run(
         self,

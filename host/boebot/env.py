@@ -14,19 +14,14 @@ docs/how-to/learn.md leads through it.
 from __future__ import annotations
 
 import math
-import typing
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from boebot.arguments import number
 from boebot.description.robots import RobotDescription
-from boebot.devices.whisker import Whisker
 from boebot.errors import BoebotError, CallError
-from boebot.missing import imported
+from boebot.learners import FlatView, Numbers, action_space, forward, gymnasium
 from boebot.pausable_thread import DONE, PausableThread
 from boebot.record.interventions import Fault
 from boebot.result import RunResult
@@ -34,25 +29,10 @@ from boebot.robot import Command, Observation, Robot
 from boebot.running.loop import execute
 from boebot.running.tasks import Request
 
-if TYPE_CHECKING:
-    import gymnasium
-else:
-    gymnasium = imported("gymnasium", "boebot.env", "gymnasium", "learn")
-
-AGE_MAXIMUM = 10.0  # s; what is older, or was never measured, is so old
-NUMBER_MAXIMUM = 1e6  # of any other number, either way
-PENALTY = 1.0  # of a step that ends with a touch
 _END_S = 5.0  # by the wall clock, for a run to end that is cut
 
 
-def forward(seen: Observation, command: Command) -> float:
-    """The reward of a step unless another one is given: the drive forward, -1 to 1, less PENALTY at a touch."""
-    readings = (getattr(seen, name) for name in seen.equipment.readers)
-    touched = any(one.pressed for one in readings if isinstance(one, Whisker))
-    return (command.left + command.right) / 2 - PENALTY * touched
-
-
-class BoardEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class BoardEnv(gymnasium.Env[Numbers, Numbers]):
     """A robot in its arena; an episode is one run.
 
     Attributes:
@@ -75,14 +55,14 @@ class BoardEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         imperfections: Mapping[str, float] | None = None,
         faults: Sequence[str | Fault] = (),
         reward: Callable[[Observation, Command], float] = forward,
-        final: Callable[[RunResult], float] | None = None,
+        final: Callable[[Mapping[str, Any]], float] | None = None,
     ) -> None:
         """Begins a run, to see what the robot's devices say, and ends it.
 
         Args:
             robot, arena, on, seconds, period, pose, without, imperfections, faults: as of `boebot.run`.
             reward: of a step, by what the robot sees after it and what it was commanded.
-            final: what is added at the end of an episode, by the figures of its run.
+            final: what is added at the end of an episode, by the run's figures as `info` has them.
 
         Raises:
             BoebotError: no such run can begin.
@@ -94,30 +74,23 @@ class BoardEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._reward, self._final = reward, final
         self.result: RunResult | None = None
         self._episode: _Episode | None = _Episode({**self._asked, "seed": 1})
-        said = _said(self._episode.robot.observation)
+        self._flat = FlatView(self._episode.robot.observation)
         self.close()
-        self.names = tuple(
-            name if len(numbers) == 1 else f"{name}.{index}"
-            for name, _, numbers in said
-            for index in range(len(numbers))
-        )
-        high = np.array([limit for _, limit, numbers in said for _ in numbers], np.float32)
-        self._limits = (np.where(high == NUMBER_MAXIMUM, -high, 0).astype(np.float32), high)
-        self.observation_space = gymnasium.spaces.Box(*self._limits)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
+        self.names, self.observation_space = self._flat.names, self._flat.space
+        self.action_space = action_space()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[Numbers, dict[str, Any]]:
         """Begins an episode; one that goes on is cut. The run has the seed that is given, or else one drawn by the
         environment's own stream, which is in `info`. Raises BoebotError if it cannot begin."""
         super().reset(seed=seed)
         self.close()
         seed = int(self.np_random.integers(2**31)) if seed is None else seed
         self._episode = _Episode({**self._asked, "seed": seed})
-        return self._seen(self._episode), {"seed": seed}
+        return self._flat(self._episode.robot.observation), {"seed": seed}
 
-    def step(self, action: Any) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
         """Motor signals, left and right, for one period of the brain. With the episode's end, by time (`truncated`),
         `info` has the run's "figures" by name (docs/reference/run-files.md); there is nothing new to be seen then.
 
@@ -139,22 +112,18 @@ class BoardEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         finally:
             if episode.thread.is_done:
                 self._episode = None
-        reward = float(self._reward(episode.robot.observation, command))
+        reward = number("reward", self._reward(episode.robot.observation, command), CallError)
         if over:
             self.result = episode.result
-            info["figures"] = episode.result.table()
-            reward += 0.0 if self._final is None else float(self._final(episode.result))
-        return self._seen(episode), reward, False, over, info
+            info["figures"] = figures = episode.result.table()
+            reward += 0.0 if self._final is None else number("final", self._final(figures), CallError)
+        return self._flat(episode.robot.observation), reward, False, over, info
 
     def close(self) -> None:
         """Ends the run that goes on, if there is one."""
         if self._episode is not None:
             self._episode.thread.end(_END_S)
             self._episode = None
-
-    def _seen(self, episode: _Episode) -> NDArray[np.float32]:
-        numbers = np.array([one for _, _, some in _said(episode.robot.observation) for one in some], np.float32)
-        return np.clip(numbers, *self._limits)
 
 
 class _Episode:
@@ -184,31 +153,3 @@ class _Episode:
         if (error := self.thread.error or self.result.error) is not None:
             raise error
         return True
-
-
-def _said(seen: Observation) -> list[tuple[str, float, Sequence[float]]]:
-    """What the devices say: name of each field of their readings, the greatest that its numbers may be, the numbers."""
-    found: list[tuple[str, float, Sequence[float]]] = []
-    for device in seen.equipment.readers:
-        reading = getattr(seen, device)
-        for field, optional in _fields(reading.__class__).items():
-            value, name = getattr(reading, field), f"{device}.{field}"
-            limit = AGE_MAXIMUM if field == "age" else 1.0 if isinstance(value, bool) else NUMBER_MAXIMUM
-            found.append((name, limit, (0.0,) * optional if value is None else _flat(value)))
-            if optional:
-                found.append((f"{name}.known", 1.0, (float(value is not None),)))
-    return found
-
-
-def _flat(value: Any) -> Sequence[float]:
-    return value if isinstance(value, tuple) else (value,)
-
-
-@cache
-def _fields(reading: type) -> dict[str, int]:
-    """The fields of a kind of reading; of one that may be None how many numbers it else is, or 0."""
-    found = {}
-    for field, hint in typing.get_type_hints(reading).items():
-        kinds = typing.get_args(hint)
-        found[field] = (len(typing.get_args(kinds[0])) or 1) if type(None) in kinds else 0
-    return found

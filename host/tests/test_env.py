@@ -9,6 +9,7 @@ import threading
 import time
 import warnings
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ from gymnasium.utils.env_checker import check_env
 
 import boebot
 from boebot.boards import board_kinds
-from boebot.env import AGE_MAXIMUM, BoardEnv
+from boebot.env import BoardEnv
 from boebot.errors import BoebotError, BrainError, CallError
+from boebot.learners import AGE_MAXIMUM
 from boebot.robot import Robot
 from boebot.running.stepping import AT_LEISURE
 
@@ -160,7 +162,7 @@ def test_rewards_are_of_what_is_seen_commanded_and_of_the_runs_figures() -> None
     own = BoardEnv(
         seconds=0.2,
         reward=lambda seen, command: seen.time + command.right,
-        final=lambda result: 100.0 * result.steps,
+        final=lambda figures: 100.0 * figures["steps"],
     )
     seconds = [0.05, 0.10, 0.15, 0.15]  # nothing new is seen after the last step
     expected = [time_s + signals(step)[1] for step, time_s in enumerate(seconds)]
@@ -208,8 +210,16 @@ def test_bad_input_is_a_sentence() -> None:
     env.close()
 
 
+@pytest.mark.parametrize("asked", [{"reward": lambda *_: None}, {"final": lambda _: float("nan")}])
+def test_a_reward_that_is_no_number_is_a_sentence(asked: dict[str, Any]) -> None:
+    env = BoardEnv(seconds=0.05, **asked)
+    env.reset(seed=1)
+    with pytest.raises(CallError, match=r"(reward is None|final is nan); expected a finite number"):
+        env.step((0.0, 0.0))
+
+
 def test_without_gymnasium_the_extra_is_named() -> None:
     code = "import sys; sys.modules['gymnasium'] = None; import boebot.env"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    sentence = r"boebot.env needs gymnasium, which is not installed: pip install .boebot\[learn\]."
+    sentence = r"an environment for learners needs gymnasium, which is not installed: pip install .boebot\[learn\]."
     assert re.search(sentence, done.stderr), done.stderr

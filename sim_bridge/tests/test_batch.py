@@ -220,6 +220,35 @@ def test_where_no_start_is_free_or_poses_are_none_is_one_sentence() -> None:
         Batch(arsim(), arena, "free", [1])
 
 
+@pytest.mark.parametrize("robot", ["arsim", "shieldbot"])
+def test_a_world_that_begins_anew_is_a_new_one_and_disturbs_no_other(robot: str) -> None:
+    """With its brain and its servos, at its pose, or at that of the seed."""
+    model, arena = vehicle_model(robot), load_arena("room")
+    own = [arena.free_start(model.radius, seed) for seed in range(3)]
+    for poses in ("random", own):
+        batch, other = (Batch(model, arena, poses, [1, 2, 3]) for _ in range(2))
+        fresh = Batch(model, arena, poses if poses == "random" else own[1:2], [9])
+        for each in (batch, other):
+            each.run("wander", 230)
+        batch.restart(1, 9)
+        for each in (batch, other, fresh):
+            each.run("wander", 230)
+        assert batch.hashes()[[0, 2]].tolist() == other.hashes()[[0, 2]].tolist()
+        assert batch.hashes()[1] == fresh.hashes()[0] != other.hashes()[1]
+        assert batch.steps.tolist() == [460, 230, 460] and batch.figures()["seed"].tolist() == [1, 9, 3]
+    for index, seed, text in (
+        (3, 1, "there is no world 3"),
+        (0, 1.5, "the seed is 1.5"),
+        (0, None, "the seed is None"),
+    ):
+        with pytest.raises(RobotError, match=text):
+            batch.restart(index, seed)  # type: ignore[arg-type]
+    batch.close()
+    with pytest.raises(RobotError, match="it is closed"):
+        batch.restart(0, 1)
+    assert batch.figures()["seed"].tolist() == [1, 9, 3]
+
+
 def test_an_empty_batch() -> None:
     batch = Batch(model(), load_arena("arsim"), np.zeros((0, 3)), np.zeros(0, dtype=int))
     assert batch.step(np.zeros((0, 2)), 5).shape == (0, 7) and batch.hashes().size == 0

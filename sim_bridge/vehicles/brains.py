@@ -8,11 +8,12 @@ from typing import Any
 
 from boebot.arguments import shown
 from boebot.brains import LoadedBrain
+from boebot.description.robots import RobotDescription
 from boebot.errors import BoebotError, BrainError
 from boebot.running.board_robot import BoardRobot
 from boebot.running.brain_parameters import set_parameters
 from boebot.running.direct_driver import DirectRobot
-from boebot.running.driver import TICK_S, whole_ticks
+from boebot.running.driver import whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
 from boebot.running.tasks import prepare
 from sim_bridge.compiled import lib
@@ -39,37 +40,30 @@ class Brains:
             BoebotError: it is no brain, does not fit the robot, or cannot be made several times; no such period or
                 parameter; a list of another length; brains with different periods.
         """
-        robot = model.robot
-        if robot is None:
-            raise BrainError("batch: brains in Python need a robot's description; expected a model of vehicle_model()")
         self.made_of = (source, period, copy.deepcopy(parameters))
         self.loaded: list[LoadedBrain] = []
         self.coasts = [False] * len(seeds)
         self.period_steps = 1
-        self._direct: list[DirectRobot | BoardRobot] = []
+        self._model, self._period = model, period
+        self._direct: list[BoardRobot | DirectRobot] = []
         self._times = StepTimes()
-        tick_s = TICK_S if robot.has_board else model.dt
-        self._steps_a_tick = round(tick_s / model.dt)
-        layout = {name: where for name, where in model.names.items() if name in robot.device}
-
-        def pulses(*signals: float) -> list[int]:
-            return [lib.motion_pulse_of(*one) for one in zip(model.motion_maps, signals, strict=True)]
-
-        sources, values = _each("brains", source, len(seeds)), _each("parameters", parameters, len(seeds))
+        self._sources, self._values = _each("brains", source, len(seeds)), _each("parameters", parameters, len(seeds))
         for world, seed in enumerate(seeds):
-            loaded, _, own_s = prepare(_another(sources[world]), robot, period)
-            steps = whole_ticks(own_s, tick_s) * self._steps_a_tick
-            if self.loaded and steps != self.period_steps:
-                raise BrainError(f"batch, world {world}: its brain has another period; expected one for all")
-            self.period_steps, period_s = steps, steps * model.dt
-            if values[world] is not None:
-                _set(f"batch, world {world}", loaded, values[world])
-            self.loaded.append(loaded)
-            self._direct.append(
-                BoardRobot(robot, layout, period_s, seed, pulses)
-                if robot.has_board
-                else DirectRobot(robot, layout, model.readings, model.dt, period_s, seed)
-            )
+            self.begin(world, seed)
+
+    def begin(self, world: int, seed: int) -> None:
+        """A new brain and a new robot in that world, or in the next one. Raises as above."""
+        model = self._model
+        loaded, _, own_s = prepare(_another(self._sources[world]), described(model), self._period)
+        steps = steps_of(model, own_s)
+        if self.loaded and steps != self.period_steps:
+            raise BrainError(f"batch, world {world}: its brain has another period; expected one for all")
+        if self._values[world] is not None:
+            _set(f"batch, world {world}", loaded, self._values[world])
+        self.period_steps = steps
+        self.loaded[world : world + 1] = [loaded]
+        self._direct[world : world + 1] = [robot_of(model, steps * model.dt, seed)]
+        self.coasts[world] = False
 
     def step(self, steps: list[int], readings: list[list[float]], runs: list[bool]) -> list[tuple[float, float]]:
         """One step of the brain of each world that `runs`, after that many steps and with these readings there. Returns
@@ -83,17 +77,39 @@ class Brains:
             for world, direct in enumerate(self._direct):
                 if not runs[world]:
                     continue
-                if isinstance(direct, BoardRobot):
-                    direct.see(steps[world] // self._steps_a_tick, readings[world])
-                else:
-                    direct.show(direct.sample(steps[world], tuple(readings[world])))
+                direct.see(steps[world] // self._model.steps_a_tick, readings[world])
                 try:
                     step_once(direct.robot, self.loaded[world], watch, self._times)
                 except BoebotError as error:
                     raise type(error)(f"batch, world {world}: {error}") from error.__cause__
                 signals[world] = direct.signals()
-                self.coasts[world] = isinstance(direct, BoardRobot) and direct.coasts
+                self.coasts[world] = direct.coasts
         return signals
+
+
+def described(model: VehicleModel) -> RobotDescription:
+    """The robot whose model it is. Raises BrainError where it was built by hand."""
+    if model.robot is None:
+        raise BrainError("batch: brains in Python need a robot's description; expected a model of vehicle_model()")
+    return model.robot
+
+
+def steps_of(model: VehicleModel, period_s: float) -> int:
+    """Steps of the world in a brain's period. Raises BoebotError where it does not fit the robot's clock."""
+    return whole_ticks(period_s, model.dt * model.steps_a_tick) * model.steps_a_tick
+
+
+def robot_of(model: VehicleModel, period_s: float, seed: int) -> BoardRobot | DirectRobot:
+    """The robot in one world, as a brain meets it that is asked every `period_s` seconds."""
+    robot = described(model)
+    layout = {name: where for name, where in model.names.items() if name in robot.device}
+    if not robot.has_board:
+        return DirectRobot(robot, layout, model.readings, model.dt, period_s, seed)
+
+    def pulses(*signals: float) -> list[int]:
+        return [lib.motion_pulse_of(*one) for one in zip(model.motion_maps, signals, strict=True)]
+
+    return BoardRobot(robot, layout, period_s, seed, pulses)
 
 
 def _each(what: str, given: Any, count: int) -> Sequence[Any]:

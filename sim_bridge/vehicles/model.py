@@ -14,6 +14,7 @@ from typing import Any, Final
 from boebot.arguments import shown, switch
 from boebot.description.robots import RobotDescription
 from boebot.errors import RobotError
+from boebot.running.driver import TICK_S
 from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices.catalogue import SensorKind, sensor_kinds
 from sim_bridge.reading_table import ReadingTable
@@ -103,6 +104,11 @@ class VehicleModel:
     def readings(self) -> int:
         """How many readings it gives."""
         return int(self.handle.readings)
+
+    @property
+    def steps_a_tick(self) -> int:
+        """Steps of the world in a tick of the robot's clock."""
+        return 1 if self.unit is None else round(TICK_S / self.dt)
 
     @property
     def radius(self) -> float:

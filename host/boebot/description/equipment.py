@@ -12,6 +12,7 @@ from boebot.devices.device import Place, Reader, kinds
 from boebot.devices.latest import MESSAGE_TICKS
 from boebot.devices.led import BOARD_LED_PIN, Led
 from boebot.devices.readings import Layout
+from boebot.devices.whisker import Whisker
 from boebot.errors import BoebotError, BrainError, did_you_mean, expected_one
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class Equipment:
     Attributes:
         readers: by the device's name, what makes its reading of an observation's `sample` and `slow`.
         dimensions: lengths and speed of the robot.
+        whiskers: names of those among them.
         needs_messages: the board sends messages of slow devices.
     """
 
@@ -60,6 +62,7 @@ class Equipment:
         )
         found = places(robot, tick_s, layout, message_ticks)
         self.readers: dict[str, Reader] = {name: robot.device[name].reader(place) for name, place in found.items()}
+        self.whiskers = [name for name in found if robot.device[name].READING is Whisker]
         self.needs_messages = robot.has_board and needs_messages(robot)
 
     def has(self, name: str) -> bool:

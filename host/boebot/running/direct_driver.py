@@ -7,7 +7,7 @@ Time stands still while the brain thinks.
 from __future__ import annotations
 
 import time as wall
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from boebot.boards import VehicleSession
 from boebot.description.equipment import Equipment
@@ -26,7 +26,10 @@ class DirectRobot:
 
     Attributes:
         robot: what the brain meets.
+        coasts: as of a robot with a board; its motors always have a signal.
     """
+
+    coasts = False
 
     def __init__(
         self, description: RobotDescription, layout: Layout, readings: int, tick_s: float, period_s: float, seed: int
@@ -58,6 +61,10 @@ class DirectRobot:
         """The robot's new observation."""
         time_s = sample.tick * self._tick_s
         self.robot.observation = Observation(sample, self._equipment, time_s, time_s, time_s, 0.0, sample)
+
+    def see(self, tick: int, values: Sequence[float]) -> None:
+        """The robot's new observation, of these readings after that many steps of the world."""
+        self.show(self.sample(tick, tuple(values)))
 
     def signals(self) -> tuple[float, float]:
         """What the motors get by the robot's command, left and right, in [-1, 1]."""
