@@ -23,6 +23,7 @@ from boebot_course.experiments import (
     evolution,
     kinesis,
     predator,
+    snapshot,
     utility_theory,
 )
 from boebot_course.tests.mutants import Mutant
@@ -122,6 +123,13 @@ def humid_or_not_alike(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(kinesis, "SLOW", kinesis.FAST)
 
 
+def snapshot_from_elsewhere(patch: pytest.MonkeyPatch) -> None:
+    taken_at = snapshot.taken_at
+    patch.setattr(
+        snapshot, "taken_at", lambda home, seed, look, **terms: taken_at((0.8, 0.8, 0.0), seed, look, **terms)
+    )
+
+
 # ---- section 8.2: utility functions ----------------------------------------------------------------------------------
 
 
@@ -198,6 +206,7 @@ OLD = [
     Mutant("E68", "readings", wall_unheeded),
     Mutant("robot-economics", "what charging is good for", station_without_current),
     Mutant("robot-economics", "the way to the station", station_not_sought),
+    Mutant("snapshot", "what was seen at home", snapshot_from_elsewhere),
     Mutant("deciding", "the way to the station", station_not_sought),
 ]
 """Of the experiments E17 to E35 and E56 to E68, and of those that have a name only."""
