@@ -10,12 +10,15 @@ import math
 import random
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
 from boebot.behaviors import Avoid, ChargeBattery, FollowWall, Phototaxis, RunAndTumble, Wander
 from boebot.brain import leaky, utility
 from boebot.cognition import PathIntegration
+from boebot.navigation.frames import Pose
 from boebot.robot import Robot
+from boebot_course.experiment import Floats
 from boebot_course.experiments import (
     all_experiments,
     chemotaxis,
@@ -28,6 +31,7 @@ from boebot_course.experiments import (
 )
 from boebot_course.tests.mutants import Mutant
 from boebot_course.tests.mutants_of_navigation import NAVIGATION
+from boebot_course.trials import Trial
 
 pytestmark = pytest.mark.soak
 
@@ -124,10 +128,13 @@ def humid_or_not_alike(patch: pytest.MonkeyPatch) -> None:
 
 
 def snapshot_from_elsewhere(patch: pytest.MonkeyPatch) -> None:
-    taken_at = snapshot.taken_at
-    patch.setattr(
-        snapshot, "taken_at", lambda home, seed, look, **terms: taken_at((0.8, 0.8, 0.0), seed, look, **terms)
-    )
+    way_home, home_and_start = snapshot.way_home, snapshot.home_and_start
+
+    def misled(home: Pose, start: Pose, seed: int) -> tuple[Trial, Floats]:
+        trial, _ = way_home(home_and_start(seed + 1)[0], start, seed)
+        return trial, np.hypot(*(trial.path - home[:2]).T)
+
+    patch.setattr(snapshot, "way_home", misled)
 
 
 # ---- section 8.2: utility functions ----------------------------------------------------------------------------------
