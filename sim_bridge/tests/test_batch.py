@@ -249,6 +249,15 @@ def test_a_world_that_begins_anew_is_a_new_one_and_disturbs_no_other(robot: str)
     assert batch.figures()["seed"].tolist() == [1, 9, 3]
 
 
+def test_a_world_that_begins_anew_has_pulses_until_it_shall_coast() -> None:
+    batch = Batch(vehicle_model("shieldbot"), load_arena("room"), "random", [1, 2])
+    for coasts, moves in (([True, True], False), ([True, False], False), ([False, True], True)):
+        batch.restart(0, 1)
+        start = batch.true_poses[0]
+        batch.step(np.full((2, 2), 0.5), 100, coasts=coasts)
+        assert (np.abs(batch.true_poses[0] - start).max() > 0.01) == moves
+
+
 def test_an_empty_batch() -> None:
     batch = Batch(model(), load_arena("arsim"), np.zeros((0, 3)), np.zeros(0, dtype=int))
     assert batch.step(np.zeros((0, 2)), 5).shape == (0, 7) and batch.hashes().size == 0

@@ -186,7 +186,7 @@ def test_a_world_that_goes_no_further_is_terminated_and_begins_anew() -> None:
     assert terminated.tolist() == [True, False] and not truncated.any()
     assert infos["figures"]["ended"].tolist() == ["collision", None]
     assert rewards[0] < -90 and rewards[1] == 1.0
-    _, rewards, terminated, truncated, infos = env.step([[1.0, 1.0]] * 2)
+    _, rewards, terminated, truncated, infos = env.step([[float("nan"), 2.0], [1.0, 1.0]])
     assert rewards.tolist() == [0.0, 1.0] and not terminated.any() and infos["_seed"].tolist() == [True, False]
 
 

@@ -63,7 +63,6 @@ class Brains:
         self.period_steps = steps
         self.loaded[world : world + 1] = [loaded]
         self._direct[world : world + 1] = [robot_of(model, steps * model.dt, seed)]
-        self.coasts[world] = False
 
     def step(self, steps: list[int], readings: list[list[float]], runs: list[bool]) -> list[tuple[float, float]]:
         """One step of the brain of each world that `runs`, after that many steps and with these readings there. Returns
