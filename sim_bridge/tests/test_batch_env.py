@@ -57,7 +57,7 @@ def expect_equal(one: Any, other: Any) -> None:
 
 
 def row(said: Any, world: int, count: int) -> Any:
-    """Of what an environment of so many worlds says, what is of one of them; infos without those of others."""
+    """What an environment of `count` worlds says of one of them; infos without those of others."""
     if isinstance(said, dict):
         masks = {name: mask for name, mask in said.items() if name.startswith("_") and mask[world]}
         return {name[1:]: row(said[name[1:]], world, count) for name in masks}
