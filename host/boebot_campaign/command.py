@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import os
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,9 +18,10 @@ from boebot.cli import options, output
 from boebot.errors import InterruptedRunError
 from boebot.record import figures
 from boebot.running.loop import Progress
-from boebot_campaign import plan
+from boebot_campaign import kept, plan
 from boebot_campaign.kept import PARTS
 from boebot_campaign.report import MEANS, words
+from boebot_campaign.rows import run_case
 from boebot_campaign.sweep import Sweep, run_plan
 
 if TYPE_CHECKING:
@@ -31,7 +35,10 @@ Scheduler = Annotated[
     str | None, typer.Option(metavar="URL", help="Of a Dask cluster, tcp://HOST:PORT. Else workers of this computer.")
 ]
 Workers = Annotated[int | None, typer.Option(metavar="N", min=1, help="Of this computer; else one a processor.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Check all, say how many runs it is, and run none.")]
+DryRun = Annotated[
+    bool,
+    typer.Option("--dry-run", help="Check all, say how many runs it is and, by a trial, how long they take."),
+]
 
 
 def sweep(
@@ -51,9 +58,13 @@ def sweep(
         counts = dict(
             zip(("arenas", "brains", "robots", "points", "faults", "starts", "seeds"), asked.sizes, strict=True)
         )
-        output.print_json({"runs": asked.count, **counts}) if json else output.line(
-            f"{asked.count:,} runs: {', '.join(f'{name} {count:,}' for name, count in counts.items())}"
-        )
+        took_s = _took_s(asked)
+        if json:
+            output.print_json({"runs": asked.count, **counts, "one_worker_s": round(took_s, 3)})
+            return
+        output.line(f"{asked.count:,} runs: {', '.join(f'{name} {count:,}' for name, count in counts.items())}")
+        count = workers or os.cpu_count() or 1
+        output.line(f"about {_time(took_s)} of one processor, {_time(took_s / count)} with {count} workers")
         return
     folder = out or Path(file.stem)
     with shown("sweep", folder, asked.count, quiet or json) as told:
@@ -65,6 +76,21 @@ def sweep(
         output.line(f"{asked.count:,} runs: {', '.join(f'{count:,} {status}' for status, count in statuses.items())}")
         output.line(f"rows in {done.path}")
         _say_errors(done)
+
+
+def _took_s(asked: plan.Plan) -> float:
+    """Of one worker, for all runs: by the second of two runs of each brain in the first arena."""
+    each = math.prod(asked.sizes[2:])
+    with tempfile.TemporaryDirectory() as name, kept.locked(Path(name) / "sweep", asked) as folder:
+        cases = [asked.case(number * each, folder.points) for number in range(len(asked.brains))]
+        took: list[float] = [[run_case(folder, case)["wall_time_s"] for _ in range(2)][1] for case in cases]
+    return asked.count * sum(took) / len(took)
+
+
+def _time(seconds: float) -> str:
+    """In the largest unit of which there is one."""
+    large = next((one for one in (("h", 3600), ("min", 60)) if seconds >= one[1]), ("s", 1))
+    return f"{seconds / large[1]:,.1f} {large[0]}"
 
 
 def _say_errors(done: Sweep) -> None:

@@ -29,7 +29,7 @@ from boebot_campaign.tasks import do_part
 PART_S = 1.0  # that a task should take
 MOST_ROWS = 10_000  # of a task
 AHEAD = 3  # tasks a worker that are submitted
-POLL_S = 0.02
+POLL_S = 0.05
 LOOK_S = 1.0  # from look to look at how many workers there are
 BACK_S = 60.0  # wait for a scheduler that has gone
 DEATHS = 5  # more of a task than its rows can account for

@@ -34,6 +34,7 @@ def main(workers: int) -> None:
     if FORKS:
         multiprocessing.set_forkserver_preload(IMPORTED)
         forkserver.ensure_running()  # while this process imports, too
+        sys.modules["pandas"] = None  # type: ignore[assignment]  # Dask would import it here, for nothing
     import dask
     from distributed import LocalCluster
 

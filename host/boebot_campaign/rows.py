@@ -199,6 +199,11 @@ def _run(folder: Folder, case: Case) -> dict[str, Any]:
         row["error"] = str(error).replace(f"{folder.path}{os.sep}", "")
     if result is not None and status in (OK, RAISED):
         row |= {name: value for name, value in result.robots[0].table().items() if name not in row}
-    if not gc.get_freeze_count():
-        gc.freeze()
+    _freeze()
     return row
+
+
+@lru_cache(maxsize=1)
+def _freeze() -> None:
+    """Once, after the first run: what it has imported and loaded stays, and need not be looked through again."""
+    gc.freeze()

@@ -82,8 +82,6 @@ def _no_death(markers: Path) -> Iterator[None]:
 
 
 def _mark(markers: Path, row: int, who: str) -> None:
-    if (row, who) in _lines(markers):
-        return
     try:
         with markers.open("a") as file:
             file.write(f"{row} {who}\n")

@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 import boebot
+import command
 from boebot.cli import output
 from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
@@ -164,8 +165,8 @@ def test_a_full_disk_ends_the_sweep_in_a_sentence_and_loses_no_row(undisturbed: 
     def small() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
 
-    command = [*COMMAND, str(file), "--out", str(out), "--workers", "1"]
-    done = subprocess.run(command, preexec_fn=small, capture_output=True, text=True)
+    words = [*COMMAND, str(file), "--out", str(out), "--workers", "1"]
+    done = subprocess.run(words, preexec_fn=small, capture_output=True, text=True)
     assert (
         done.returncode == 1 and "the sweep's files cannot be written" in done.stderr and "Traceback" not in done.stderr
     )
@@ -174,19 +175,19 @@ def test_a_full_disk_ends_the_sweep_in_a_sentence_and_loses_no_row(undisturbed: 
 
 
 def test_a_full_disk_leaves_no_half_part(undisturbed: Path, tmp_path: Path) -> None:
-    file, out = saved(tmp_path, PLAN), tmp_path / "out"
-    code = (
-        "import sys; from boebot_campaign import kept, tasks; from pathlib import Path; "
-        "tasks.do_part(sys.argv[1], kept.Folder(Path(sys.argv[1])).stamp, 0, 40)"
-    )
-
-    def small() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
-
+    file, out, said = saved(tmp_path, PLAN), tmp_path / "out", tmp_path / "said"
     with kept.locked(out, plan.read(file)) as folder:
-        command = [sys.executable, "-c", code, str(out)]
-        done = subprocess.run(command, preexec_fn=small, capture_output=True, text=True)
-        assert done.returncode == 1 and "BoebotError: the sweep's files cannot be written to" in done.stderr
+        code = f"""
+import resource, sys
+from boebot_campaign import tasks
+sys.stderr = open({str(said)!r}, "w")
+resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
+tasks.do_part({str(out)!r}, {folder.stamp!r}, 0, 40)
+"""
+        worker = FORKED.Process(target=exec, args=(code,))
+        worker.start()
+        worker.join()
+        assert worker.exitcode == 1 and "BoebotError: the sweep's files cannot be written to" in said.read_text()
         assert not list(folder.parts.iterdir())
     assert by_hand(out, file) == rows_of(undisturbed / "out")
 
@@ -234,9 +235,9 @@ def test_after_a_change_it_is_refused_and_the_file_named(undisturbed: Path, tmp_
 
 def test_a_kept_row_is_run_again(undisturbed: Path) -> None:
     row = rows_of(undisturbed / "out")[27]
-    command = [sys.executable, "-m", "boebot", "run", "--sweep", str(undisturbed / "out"), "--row", "27", "--json"]
+    words = [sys.executable, "-m", "boebot", "run", "--sweep", str(undisturbed / "out"), "--row", "27", "--json"]
     (undisturbed / "odd.py").write_text("raise OSError('the kept one is meant')\n")
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(words, capture_output=True, text=True)
     assert json.loads(done.stdout)["hash"] == row["hash"]
 
 
@@ -279,6 +280,18 @@ def test_the_newest_rows_are_shown_while_a_sweep_runs(tmp_path: Path) -> None:
     assert len(lines) == NEWEST_ROWS and "509" in lines[-1] and "row" in caught.get()
 
 
+def test_a_dry_run_says_how_long_all_runs_take_and_keeps_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = saved(tmp_path, PLAN.replace('"odd.py", ', "").replace("to = 10", "to = 1_000_000"))
+    before = time.perf_counter()
+    code, said, _ = command.boebot(capsys, "sweep", str(file), "--dry-run", "--json")
+    took_s = time.perf_counter() - before
+    found = json.loads(said)
+    assert code == 0 and found["runs"] == 2_000_000 and 1e-3 < found["one_worker_s"] / 2_000_000 < took_s
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["odd.py", "sweep.toml"]
+
+
 def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:
     file = saved(tmp_path, PLAN)
     with kept.locked(tmp_path / "out", plan.read(file)) as folder:
@@ -286,6 +299,47 @@ def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:
         assert tasks.do_part(str(folder.path), folder.stamp, 0, 3) < 1.0
         assert list(folder.parts.iterdir()) == [folder.part(0, 3)]
         assert folder.part(0, 3).read_bytes() == b"not looked at"
+
+
+STRANGE = """\
+import sys
+import boebot, distributed
+with distributed.LocalCluster(
+    n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1", dashboard_address=None
+) as cluster:
+    print(cluster.scheduler_address, flush=True)
+    for line in sys.stdin:
+        exec(line)
+        print("done", flush=True)
+"""
+
+
+def test_a_cluster_that_does_not_fit_is_refused_before_the_first_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, elsewhere, out = saved(tmp_path, PLAN), tmp_path / "elsewhere", tmp_path / "out"
+    elsewhere.mkdir()
+    monkeypatch.chdir(tmp_path)
+    words = [sys.executable, "-c", STRANGE]
+    with subprocess.Popen(
+        words, cwd=elsewhere, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+    ) as cluster:
+        assert cluster.stdin is not None and cluster.stdout is not None
+        url = cluster.stdout.readline().strip()
+        other_disk = Path("/proc/self/cwd/out")  # the cluster's process has another folder there
+        with pytest.raises(BoebotError, match=r"^worker tcp://\S+ does not see /proc/self/cwd/out; expected a folder"):
+            boebot.sweep(file, out=other_disk, scheduler=url)
+        changes = {
+            "boebot.__version__ = '0.0.1'": "^worker tcp://.* has boebot 0.0.1 .*; expected boebot ",
+            "distributed.versions._version_cached = lambda _: '9.9'": "^the scheduler has distributed 9.9; expected ",
+        }
+        for change, sentence in changes.items():
+            cluster.stdin.write(change + "\n")
+            assert cluster.stdout.readline() == "done\n"
+            with pytest.raises(BoebotError, match=sentence):
+                boebot.sweep(file, out=out, scheduler=url)
+        cluster.stdin.close()
+    assert not list((out / "parts").iterdir()) and not list(out.glob(".probe*"))
 
 
 @pytest.mark.soak

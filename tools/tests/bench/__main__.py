@@ -23,7 +23,19 @@ from tools.tests.printed import reprint
 
 RESULT = Path("build/bench.json")
 MODULES = (
-    *("codec", "round_trip", "speed", "record", "live", "can_bus", "world", "navigation", "precision", "timing"),
+    *(
+        "codec",
+        "round_trip",
+        "speed",
+        "record",
+        "live",
+        "can_bus",
+        "world",
+        "navigation",
+        "precision",
+        "timing",
+        "sweeps",
+    ),
     "setup_time",
 )
 
