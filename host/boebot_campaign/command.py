@@ -17,11 +17,11 @@ from boebot import missing
 from boebot.cli import options, output
 from boebot.errors import InterruptedRunError
 from boebot.record import figures
-from boebot.running.loop import Progress
+from boebot.running.loop import Progress, execute
 from boebot_campaign import kept, plan
 from boebot_campaign.kept import PARTS
 from boebot_campaign.report import MEANS, words
-from boebot_campaign.rows import run_case
+from boebot_campaign.rows import request_of
 from boebot_campaign.sweep import Sweep, run_plan
 
 if TYPE_CHECKING:
@@ -80,11 +80,14 @@ def sweep(
 
 def _took_s(asked: plan.Plan) -> float:
     """Of one worker, for all runs: by the second of two runs of each brain in the first arena."""
-    each = math.prod(asked.sizes[2:])
+    each, took_s = math.prod(asked.sizes[2:]), 0.0
     with tempfile.TemporaryDirectory() as name, kept.locked(Path(name) / "sweep", asked) as folder:
-        cases = [asked.case(number * each, folder.points) for number in range(len(asked.brains))]
-        took: list[float] = [[run_case(folder, case)["wall_time_s"] for _ in range(2)][1] for case in cases]
-    return asked.count * sum(took) / len(took)
+        for number in range(len(asked.brains)):
+            for _ in range(2):
+                begun_s = time.perf_counter()
+                execute(request_of(folder, asked.case(number * each, folder.points)))
+            took_s += time.perf_counter() - begun_s
+    return asked.count * took_s / len(asked.brains)
 
 
 def _time(seconds: float) -> str:
