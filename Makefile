@@ -129,6 +129,8 @@ pictures:
 	@$(VENV)/bin/boebot show robot rover --out docs/images/robot-rover.svg
 	@sed -n '/^# sweep.py/,/^```$$/{/^```$$/!p}' docs/how-to/thousands-of-runs.md >build/pictures/sweep.py
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
+	@sed -n '/^# matters.toml/,/^```$$/{/^```$$/!p}' docs/how-to/what-matters.md >build/pictures/matters.toml
+	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot matters matters.toml && cp matters/matters.png $(CURDIR)/docs/images
 	@$(VENV)/bin/boebot run wander --arena room --seconds 30 --out build/pictures/can
 	@$(VENV)/bin/boebot report build/pictures/can --as can.log --quiet
 	@$(VENV)/bin/boebot can dbc build/pictures/boebot.dbc

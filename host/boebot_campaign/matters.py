@@ -214,6 +214,7 @@ def _drawn(path: Path, title: str, found: list[dict[str, Any]], indices: list[di
     figure.suptitle(title)
     left, right = figure.subplots(1, 2, width_ratios=[3, 2])
     at_one_seed = np.array([one["at_one_seed"] for one in found])
+    left.use_sticky_edges = False
     left.barh(range(len(found)), 2 * at_one_seed, left=-at_one_seed, color="#d5deec", label="at one seed")
     left.set_xlabel("effect on the figure, from the first value to the second")
     right.set_xlabel("share of the variance (Sobol index)")
@@ -223,7 +224,7 @@ def _drawn(path: Path, title: str, found: list[dict[str, Any]], indices: list[di
             at, ends = np.arange(len(rows)) + 0.2 * shift, [middle - least, most - middle]
             panel.errorbar(middle, at, xerr=ends, fmt="o", ms=4, capsize=2, label=name)
         panel.set_yticks(range(len(rows)), [one["name"] for one in rows], fontsize=8)
-        panel.invert_yaxis()
+        panel.set_ylim(len(rows) - 0.4, -0.6)
         panel.axvline(0, color="#9aa1ad")
         panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, frameon=False)
     return saved(figure, path)
