@@ -40,27 +40,50 @@ Told = Callable[[int], object]
 """Is called with how many rows are done."""
 
 
-def run(folder: Folder, scheduler: str | None, workers: int, told: Told) -> None:
-    """Runs all rows that are not done.
+class Workers:
+    """Those of this computer, or of a scheduler. They begin with the first rows, and stay until the block ends."""
 
-    Raises:
-        BoebotError: in one sentence; what is done stays, and the next sweep goes on there.
-    """
-    with contextlib.ExitStack() as ends:
-        helper = None if scheduler else ends.enter_context(_helper(folder, workers))
+    def __init__(self, scheduler: str | None, count: int, log: Path) -> None:
+        """`log`: file of what those of this computer print."""
+        self._scheduler, self._count, self._log = scheduler, count, log
+        self._ends = contextlib.ExitStack()
+        self._client: Any = None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ends.close()
+
+    def run(self, folder: Folder, told: Told) -> None:
+        """Runs all rows of a sweep that are not done.
+
+        Raises:
+            BoebotError: in one sentence; what is done stays, and the next sweep goes on there.
+        """
+        if not folder.undone():
+            return
+        if self._client is None:
+            self._client = self._begun(folder)
+        _Work(self._client, folder, told, self._log, is_local=self._scheduler is None).all()
+
+    def _begun(self, folder: Folder) -> Any:
+        """The client of workers that fit."""
+        helper = None if self._scheduler else self._ends.enter_context(_helper(self._log, self._count))
         distributed = missing.imported("distributed", "a sweep", "dask.distributed", "sweep")
         missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
-        address = scheduler or _address(helper, folder)
-        client = ends.enter_context(_client(distributed, address))
+        address = self._scheduler or _address(helper, self._log)
+        client = self._ends.enter_context(_client(distributed, address))
         _check(client, folder, distributed)
-        _Work(client, folder, told, is_local=scheduler is None).all()
+        return client
 
 
 class _Work:
     """The rows on their way."""
 
-    def __init__(self, client: Any, folder: Folder, told: Told, *, is_local: bool) -> None:
+    def __init__(self, client: Any, folder: Folder, told: Told, log: Path, *, is_local: bool) -> None:
         self._client, self._folder, self._told, self._is_local = client, folder, told, is_local
+        self._log = log
         self._gaps = deque(folder.undone())
         self._count = folder.plan.count
         self._done = self._count - sum(end - first for first, end in self._gaps)
@@ -88,7 +111,7 @@ class _Work:
             self._workers = len(self._client.nthreads())
         self._seen_s = now if self._workers else self._seen_s
         if self._is_local and now - self._seen_s > BACK_S:
-            raise BoebotError(f"the workers of this computer have ended; {self._folder.path / LOG} may say why")
+            raise BoebotError(f"the workers of this computer have ended; {self._log} may say why")
 
     def _submit(self) -> None:
         most = AHEAD * max(self._workers, 1)
@@ -124,7 +147,7 @@ class _Work:
             raise BoebotError(f"a worker of the sweep has failed: {type(error).__name__}: {error}")
         deaths = self._deaths[first, end] = self._deaths.get((first, end), 0) + 1
         if deaths > DEATHS + 2 * (end - first):
-            raise BoebotError(f"workers die before they begin; {self._folder.path / LOG} may say why")
+            raise BoebotError(f"workers die before they begin; {self._log} may say why")
         if error is None:
             self._wait_for_scheduler()
         self._send(first, end)
@@ -143,11 +166,11 @@ class _Work:
 
 
 @contextlib.contextmanager
-def _helper(folder: Folder, workers: int) -> Iterator[subprocess.Popen[bytes]]:
+def _helper(log: Path, workers: int) -> Iterator[subprocess.Popen[bytes]]:
     """A process with a cluster of this computer, which ends with the block, or with this process."""
     command = [sys.executable, "-m", "boebot_campaign.local", str(workers)]
-    with (folder.path / LOG).open("wb") as log:
-        helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, **NEW_GROUP)
+    with log.open("wb") as file:
+        helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, **NEW_GROUP)
     assert helper.stdin is not None
     try:
         yield helper
@@ -160,11 +183,11 @@ def _helper(folder: Folder, workers: int) -> Iterator[subprocess.Popen[bytes]]:
         helper.wait()
 
 
-def _address(helper: subprocess.Popen[bytes] | None, folder: Folder) -> str:
+def _address(helper: subprocess.Popen[bytes] | None, log: Path) -> str:
     """Of its cluster, as soon as that has begun."""
     assert helper is not None and helper.stdout is not None
     if not (address := helper.stdout.readline().decode().strip()):
-        raise BoebotError(f"the workers of this computer do not begin; {folder.path / LOG} says why")
+        raise BoebotError(f"the workers of this computer do not begin; {log} says why")
     return address
 
 

@@ -121,7 +121,7 @@ class Folder:
         """Makes rows.parquet of the parts, some rows at a time; a row that two parts have is taken once."""
         parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
         if not self.is_whole:
-            _write_whole(self.path / ROWS, lambda path: self._merge(path, parquet))
+            write_whole(self.path / ROWS, lambda path: self._merge(path, parquet))
         shutil.rmtree(self.parts, ignore_errors=True)
         return self.path / ROWS
 
@@ -165,8 +165,9 @@ def opened(path: Path, stamp: str) -> Folder:
 
 
 @contextlib.contextmanager
-def locked(path: Path, plan: Plan) -> Iterator[Folder]:
-    """The folder of that plan, made or taken up again; no other sweep writes there in the block.
+def locked(path: Path, plan: Plan, points: np.ndarray | None = None) -> Iterator[Folder]:
+    """The folder of that plan, made or taken up again; no other sweep writes there in the block. `points`: of the plan,
+    in place of those of its design.
 
     Raises:
         BoebotError: another one does, or it holds other things, or a sweep of another plan, version or file.
@@ -185,7 +186,7 @@ def locked(path: Path, plan: Plan) -> Iterator[Folder]:
                 f"{path} holds {sorted(there)[0]!r} and no sweep ({NAME}); expected an empty folder or a new one"
             )
         try:
-            _make(path, plan) if NAME not in there else _take_up(path, plan)
+            _make(path, plan, points) if NAME not in there else _take_up(path, plan, points)
         except OSError as error:
             raise unwritable(path, error, _WHAT) from None
         yield Folder(path)
@@ -193,21 +194,22 @@ def locked(path: Path, plan: Plan) -> Iterator[Folder]:
         os.close(lock)
 
 
-def _make(path: Path, plan: Plan) -> None:
+def _make(path: Path, plan: Plan, points: np.ndarray | None) -> None:
     names, files = _sources(plan)
     shutil.rmtree(path / FILES, ignore_errors=True)
     for name, data in files.items():
         (path / name).parent.mkdir(parents=True, exist_ok=True)
-        _write_whole(path / name, lambda part, data=data: part.write_bytes(data))  # type: ignore[misc]
+        write_whole(path / name, lambda part, data=data: part.write_bytes(data))  # type: ignore[misc]
     (path / PARTS).mkdir(exist_ok=True)
-    points = designs.points(plan.design, plan.points, len(plan.axes), plan.first_seed % 2**32)
-    _write_whole(path / POINTS, lambda part: part.write_bytes(_npy(points)))
+    if points is None:
+        points = designs.points(plan.design, plan.points, len(plan.axes), plan.first_seed % 2**32)
+    write_whole(path / POINTS, lambda part: part.write_bytes(_npy(points)))
     hashes = {name: _digest(data) for name, data in files.items()}
     kept = Kept(version=version(), plan=plan, names=names, hashes=hashes)
-    _write_whole(path / NAME, lambda part: part.write_bytes(msgspec.json.format(msgspec.json.encode(kept))))
+    write_whole(path / NAME, lambda part: part.write_bytes(msgspec.json.format(msgspec.json.encode(kept))))
 
 
-def _take_up(path: Path, plan: Plan) -> None:
+def _take_up(path: Path, plan: Plan, points: np.ndarray | None) -> None:
     """Checks that it is the same sweep; removes what writers have left that died."""
     folder = Folder(path)
     expected = "expected it as it was when the sweep began, or another --out"
@@ -215,7 +217,9 @@ def _take_up(path: Path, plan: Plan) -> None:
         raise BoebotError(f"the sweep in {path} is of boebot {folder.kept.version}, this is {version()}; {expected}")
     for key in plan.__struct_fields__:
         if _portable(getattr(plan, key)) != _portable(getattr(folder.plan, key)):
-            raise BoebotError(f"sweep.toml has changed since the sweep in {path} began, in {key}; {expected}")
+            raise BoebotError(f"the plan has changed since the sweep in {path} began, in {key}; {expected}")
+    if points is not None and not np.array_equal(points, folder.points):
+        raise BoebotError(f"the points of the sweep in {path} were others when it began; {expected}")
     folder.check()
     _, files = _sources(plan)
     for name, digest in folder.kept.hashes.items():
@@ -272,10 +276,10 @@ def _read(parquet: Any, path: Path, columns: Sequence[str] | None = None) -> Any
 def write_part(path: Path, table: Any) -> None:
     """A part, whole or not at all. Raises BoebotError: the folder cannot be written to."""
     parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
-    _write_whole(path, lambda part: parquet.write_table(table, part))
+    write_whole(path, lambda part: parquet.write_table(table, part))
 
 
-def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Under a name that no other writer has; on the disk before it gets its own."""
     part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     try:

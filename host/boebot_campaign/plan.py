@@ -197,23 +197,31 @@ def read_as(path: Path, kind: type[_P]) -> _P:
     return _checked(_found(plan, path.parent).completed(at), at)
 
 
-def made(keys: Mapping[str, Any]) -> Plan:
-    """The plan of these keys, as a file could have them. Raises CallError."""
+def made(keys: Mapping[str, Any], folder: Path = Path(), name: str = "sweep") -> Plan:
+    """The plan of these keys, as a file of that name in that folder could have them. Raises CallError."""
+    plain = as_in_a_file(keys, name)
+    return _checked(_found(toml_files.convert(plain, Plan, name, CallError), folder), f"{name}: ")
+
+
+def as_in_a_file(keys: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The keys as TOML has them. Raises CallError."""
     try:
-        plain = msgspec.to_builtins(dict(keys))
+        return dict(msgspec.to_builtins(dict(keys)))
     except TypeError as error:
-        raise CallError(f"a sweep is made of what TOML can have: {error}; brains are names or files") from None
-    return _checked(_found(toml_files.convert(plain, Plan, "sweep", CallError), Path()), "sweep: ")
+        raise CallError(f"{name} is made of what TOML can have: {error}; brains are names or files") from None
 
 
 def _found(plan: _P, folder: Path) -> _P:
     """With whole paths of files."""
-
-    def whole(names: list[str]) -> list[str]:
-        return [str((folder / name).absolute()) if Path(name).suffix in (".py", ".toml") else name for name in names]
-
     kinds = ("brains", "robots", "arenas", "test_arenas")
-    return msgspec.structs.replace(plan, **{kind: whole(getattr(plan, kind)) for kind in kinds})
+    return msgspec.structs.replace(
+        plan, **{kind: [whole(one, folder) for one in getattr(plan, kind)] for kind in kinds}
+    )
+
+
+def whole(name: str, folder: Path) -> str:
+    """The whole path of a file that is named in a folder; a bundled name as it is."""
+    return str((folder / name).absolute()) if Path(name).suffix in (".py", ".toml") else name
 
 
 def length(axis: AnyAxis) -> int:

@@ -65,12 +65,7 @@ def sweep(
         BoebotError: in one sentence, before the first run where the plan or the cluster is wrong. What is done stays.
         KeyboardInterrupt: Ctrl-C; what is done stays, and the same call goes on.
     """
-    if (file is None) == (not keys):
-        raise CallError("a sweep is a file or keys by name; expected one of them")
-    if file is None and out is None:
-        raise CallError("a sweep by keys has no name; expected out, its folder")
-    if workers is not None and (scheduler is not None or workers < 1):
-        raise CallError(f"workers is {workers}; expected at least 1, and none with a scheduler")
+    check_call("a sweep", file, keys, out, scheduler, workers)
     asked = plan.made(keys) if file is None else plan.read(Path(file))
     path = Path(out if out is not None else Path(str(file)).stem)
     return run_plan(asked, path, scheduler, workers, progress)
@@ -85,10 +80,20 @@ def run_plan(
 ) -> Sweep:
     """The same of a plan, into the folder `path`."""
     with kept.locked(path, asked) as folder:
-        if folder.undone():
-            engine.run(folder, scheduler, workers or os.cpu_count() or 1, progress or (lambda _: None))
+        with engine.Workers(scheduler, workers or os.cpu_count() or 1, folder.path / engine.LOG) as ours:
+            ours.run(folder, progress or (lambda _: None))
         folder.merge()
     return Sweep(path)
+
+
+def check_call(what: str, file: object, keys: object, out: object, scheduler: object, workers: int | None) -> None:
+    """Raises CallError where they do not go together."""
+    if (file is None) == (not keys):
+        raise CallError(f"{what} is a file or keys by name; expected one of them")
+    if file is None and out is None:
+        raise CallError(f"{what} by keys has no name; expected out, its folder")
+    if workers is not None and (scheduler is not None or workers < 1):
+        raise CallError(f"workers is {workers}; expected at least 1, and none with a scheduler")
 
 
 def kept_request(path: Path, row: int) -> Request:

@@ -225,7 +225,7 @@ def test_after_a_change_it_is_refused_and_the_file_named(undisturbed: Path, tmp_
     file, out = tmp_path / "copy" / "sweep.toml", tmp_path / "copy" / "out"
     (out / "rows.parquet").unlink()
     file.write_text(PLAN.replace("to = 10", "to = 11"))
-    with pytest.raises(BoebotError, match=r"sweep.toml has changed .* in seeds"):
+    with pytest.raises(BoebotError, match=r"the plan has changed .* in seeds"):
         boebot.sweep(file, out=out)
     copy = next(out.glob("files/brain-0/odd.py"))
     copy.write_text(copy.read_text() + "\n")

@@ -1,0 +1,183 @@
+"""Evolution: the same however it was stopped, a best brain that runs as its file says, refusals in a sentence."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import boebot
+from boebot.brains import load_brain
+from boebot.errors import BoebotError
+from boebot.rates import Mean
+from boebot.running.brain_parameters import in_force
+from boebot_campaign import engine, evolution, evolve_file, kept, tasks, toml_brain
+
+KEYS: dict[str, Any] = {
+    "brain": "clearway",
+    "arenas": ["room"],
+    "seconds": 0.5,
+    "seeds": [1, 2],
+    "test_seeds": [11, 12],
+    "population": 3,
+    "generations": 2,
+    "restarts": 1,
+    "parameters": {"avoid.utility.b": {"from": -3, "to": 3}, "wander.forward": {}},
+    "fitness": {"true_distance_m": 1.0, "true_contacts": -0.5},
+}
+
+
+@pytest.fixture(scope="module")
+def ran() -> Iterator[list[tuple[str, int]]]:
+    """Rows are run here, the second half of each sweep first. Folder and number of rows of each part that was run."""
+    parts = []
+
+    def run(_: engine.Workers, folder: kept.Folder, told: Callable[[int], object]) -> None:
+        for first, end in folder.undone():
+            for part in (((first + end) // 2, end), (first, (first + end) // 2)):
+                tasks.do_part(str(folder.path), folder.stamp, *part)
+                parts.append((folder.path.name, part[1] - part[0]))
+        told(folder.plan.count)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(engine.Workers, "run", run)
+        patched.setattr(os, "fsync", lambda _: None)  # no power cut
+        yield parts
+
+
+@pytest.fixture(scope="module")
+def whole(ran: list[tuple[str, int]], tmp_path_factory: pytest.TempPathFactory) -> evolution.Evolution:
+    """One that was not stopped."""
+    told: list[int] = []
+    done: evolution.Evolution = boebot.evolve(out=tmp_path_factory.mktemp("whole"), progress=told.append, **KEYS)
+    assert told == sorted(told)
+    assert told[-1] == sum(count for _, count in ran) == (3 + 1 + 3 + 6 + 6) * 2 + 2 * 2
+    assert told[-1] == evolve_file.made(KEYS).most_runs
+    return done
+
+
+def test_stopped_evolution_goes_on_and_ends_as_one_that_was_not(
+    whole: evolution.Evolution, ran: list[tuple[str, int]], tmp_path: Path
+) -> None:
+    assert len(whole.curve) == 4 and whole.pairs == 2 and whole.picture.is_file()
+    shutil.copytree(whole.folder, tmp_path, dirs_exist_ok=True)
+    gone = ["generation-002", "generation-003", "test"]
+    for name in gone:
+        shutil.rmtree(tmp_path / name)
+    ran.clear()
+    np.random.rand()  # somebody else's chance
+    stopped = boebot.evolve(out=tmp_path, **KEYS)
+    assert {name for name, _ in ran} == set(gone)
+    assert stopped.curve == whole.curve and stopped.difference == whole.difference
+    assert stopped.brain.read_text() == whole.brain.read_text()
+
+    with pytest.raises(BoebotError, match=r"points of the sweep in .*generation-000 were others"):
+        boebot.evolve(out=tmp_path, **KEYS | {"seed": 2})
+    with pytest.raises(BoebotError, match=r"the plan has changed since .*generation-000 began, in seconds"):
+        boebot.evolve(out=tmp_path, **KEYS | {"seconds": 0.6})
+
+
+def test_best_is_the_candidate_whose_rows_say_so(whole: evolution.Evolution) -> None:
+    means: dict[tuple[float, float], float] = {}
+    for folder in sorted(whole.folder.glob("generation-*")):
+        frame = _rows(folder)
+        for point, rows in frame.groupby(["parameter.avoid.utility.b", "parameter.wander.forward"]):
+            means[point] = rows["fitness"].mean()
+    best = max(means, key=lambda point: means[point])
+    assert len(means) == 3 + 1 + 3 + 6 + 6 and means[-1.0, 0.5] == pytest.approx(whole.by_hand)
+    written = tomllib.loads(whole.brain.read_text())["process"]
+    assert (written["avoid"]["utility"]["b"], written["wander"]["forward"]) == best
+    assert whole.curve[-1].best_so_far == pytest.approx(means[best]) and whole.by_hand < means[best]
+    assert [one.best_so_far for one in whole.curve] == sorted(one.best_so_far for one in whole.curve)
+    frame = _rows(whole.folder / "test")
+    by_brain = frame.groupby("brain")["fitness"].mean()
+    assert whole.difference is not None
+    assert whole.difference.mean == pytest.approx(by_brain[whole.brain.name] - by_brain["clearway"], abs=1e-9)
+    assert set(frame["seed"]) == {11, 12}
+
+
+def _rows(folder: Path) -> Any:
+    frame = kept.Folder(folder).table().to_pandas()
+    return frame.assign(fitness=frame["true_distance_m"] - 0.5 * frame["true_contacts"])
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        ({"status": "ok", "battery_charge": 0.0}, 2 * 3.0 - 10),
+        ({"status": "ok", "battery_charge": 0.5}, 2 * 3.0),
+        ({"status": "raised", "battery_charge": 0.5}, 2 * 3.0 - 100),
+        ({"status": "raised", "battery_charge": None}, None),
+        ({"status": "killed", "battery_charge": None}, None),
+    ],
+)
+def test_fitness_weighs_figures_and_what_happened(row: dict[str, Any], expected: float | None) -> None:
+    asked = evolve_file.made(KEYS | {"fitness": {"true_distance_m": 2.0, "empty_battery": -10.0, "raised": -100.0}})
+    found = asked.fitness({"row": 1, "true_distance_m": 3.0, **row}, Path("out"))
+    assert np.isnan(found) if expected is None else found == expected
+    with pytest.raises(BoebotError, match="empty_battery is not known of row 1"):
+        asked.fitness({"row": 1, "true_distance_m": 3.0, "status": "ok", "battery_charge": None}, Path("out"))
+
+
+OWN = """\
+from boebot.behaviors import Wander
+from boebot.brain import Brain
+class Mine(Wander): pass
+brain = Brain([Mine()])
+"""
+
+
+@pytest.mark.parametrize(
+    ("changed", "sentence"),
+    [
+        ({"parameters": {"avoid.utility.bb": {}}}, "no parameter 'avoid.utility.bb'"),
+        ({"parameters": {"avoid.utility.b": {"from": 1, "to": -3}}}, "is from 1 to -3; expected from below to"),
+        ({"parameters": {"avoid.utility.b": {"from": 1, "to": 3}}}, "expected bounds around it"),
+        ({"parameters": {}}, "parameters is empty"),
+        ({"fitness": {}}, "fitness is empty"),
+        ({"fitness": {"true_distance": 1.0}}, "did you mean 'true_distance_m'"),
+        ({"fitness": {"hash": 1.0}}, "fitness has 'hash'; expected figures of a run"),
+        ({"seeds": []}, "seeds is empty"),
+        ({"test_seeds": []}, "seeds is empty"),
+        ({"test_seeds": [2]}, "test_seeds has 2, as seeds has"),
+        ({"population": 1}, "population is 1; expected at least 2"),
+        ({"restarts": 40}, "runs; expected at most"),
+        ({"arenas": ["nowhere"]}, "nowhere"),
+        ({"brain": "wander"}, "has no processes"),
+        ({"brain": "own.py"}, "cannot be written as a TOML file: process 'mine'"),
+    ],
+)
+def test_bad_input_is_a_sentence_before_the_first_run(
+    changed: dict[str, Any], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text(OWN)
+    with pytest.raises(BoebotError, match=sentence):
+        boebot.evolve(out="out", **KEYS | changed)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["demo", "clearway"])
+def test_brain_written_as_toml_runs_as_it_did(name: str, tmp_path: Path) -> None:
+    values = {"wander.forward": 0.37, "wander.utility.w.near": -1e-7}
+    loaded = load_brain(name)
+    with in_force(loaded, values):
+        text = toml_brain.text(loaded, "changed", loaded.robot, loaded.arena)
+    (tmp_path / "best.toml").write_text(text)
+    first, again = boebot.run(name, seconds=1, parameters=values), boebot.run(tmp_path / "best.toml", seconds=1)
+    assert first.hash == again.hash != boebot.run(name, seconds=1).hash
+    assert first.table()["arena"] == again.table()["arena"]
+
+
+def test_words_say_when_nothing_is_shown() -> None:
+    done = evolution.Evolution(folder=Path(), brain=Path(), picture=Path(), pairs=3)
+    assert evolution.in_words(done) == "no run of both has figures"
+    for bounds, verdict in (((-0.1, 0.5), "includes 0"), ((0.1, 0.5), "better"), ((-0.5, -0.1), "worse")):
+        done.difference = Mean(sum(bounds) / 2, *bounds)
+        assert evolution.in_words(done).endswith(verdict)
