@@ -131,6 +131,8 @@ pictures:
 	@cd build/pictures && $(CURDIR)/$(PYTHON_VENV) sweep.py && cp sweep.png $(CURDIR)/docs/images/sweep.png
 	@sed -n '/^# matters.toml/,/^```$$/{/^```$$/!p}' docs/how-to/what-matters.md >build/pictures/matters.toml
 	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot matters matters.toml && cp matters/matters.png $(CURDIR)/docs/images
+	@sed -n '/^# utilities.toml/,/^```$$/{/^```$$/!p}' docs/how-to/evolve.md >build/pictures/utilities.toml
+	@cd build/pictures && $(CURDIR)/$(VENV)/bin/boebot evolve utilities.toml && cp utilities/curve.png $(CURDIR)/docs/images/evolve.png
 	@$(VENV)/bin/boebot run wander --arena room --seconds 30 --out build/pictures/can
 	@$(VENV)/bin/boebot report build/pictures/can --as can.log --quiet
 	@$(VENV)/bin/boebot can dbc build/pictures/boebot.dbc
