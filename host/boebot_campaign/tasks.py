@@ -12,14 +12,12 @@ import contextlib
 import os
 import time
 import uuid
-from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from boebot.record.run_folder import unwritable
 from boebot_campaign.kept import Folder, opened, write_part
-from boebot_campaign.plan import Plan
 from boebot_campaign.rows import columns, killed, run_case, table_of
 
 
@@ -47,8 +45,11 @@ def _do(folder: Folder, first: int, end: int) -> None:
     markers = part.with_suffix(".begun")
     lines = _others(markers)
     if not lines or (end - first == 1 and len({who for _, who in lines}) == 1):
-        with _no_death(markers):
+        try:
             write_part(part, table_of(_rows(folder, first, end, markers), _columns(folder)))
+        except BaseException:  # such as of a full disk: this process has not died
+            markers.unlink(missing_ok=True)
+            raise
     elif end - first == 1:
         case = folder.plan.case(first, folder.points)
         write_part(part, table_of([killed(case)], _columns(folder)))
@@ -71,16 +72,6 @@ def _rows(folder: Folder, first: int, end: int, markers: Path) -> list[dict[str,
     return rows
 
 
-@contextlib.contextmanager
-def _no_death(markers: Path) -> Iterator[None]:
-    """Whatever is raised in the block, such as by a full disk, leaves no markers of this process."""
-    try:
-        yield
-    except BaseException:
-        markers.unlink(missing_ok=True)
-        raise
-
-
 def _mark(markers: Path, row: int, who: str) -> None:
     try:
         with markers.open("a") as file:
@@ -90,19 +81,13 @@ def _mark(markers: Path, row: int, who: str) -> None:
 
 
 def _others(markers: Path) -> list[tuple[int, str]]:
-    """Row and process of each line of another process, in order."""
-    return [(row, who) for row, who in _lines(markers) if who != _me()]
-
-
-def _lines(markers: Path) -> list[tuple[int, str]]:
-    with contextlib.suppress(FileNotFoundError):
-        parts = (line.split() for line in markers.read_text().splitlines())
-        return [(int(part[0]), part[1]) for part in parts if len(part) == 2]
+    """Row and process of each whole line of another process, in order."""
+    with contextlib.suppress(FileNotFoundError):  # also where another worker has just removed it
+        parts = map(str.split, markers.read_text().splitlines())
+        return [(int(part[0]), part[1]) for part in parts if len(part) == 2 and part[1] != _me()]
     return []
 
 
 @lru_cache(maxsize=2)
 def _columns(folder: Folder) -> dict[str, type]:
-    plan: Plan = folder.plan
-    names = [folder.place(name) or name for name in plan.brains]
-    return columns(plan, names)
+    return columns(folder.plan, [folder.place(name) or name for name in folder.plan.brains])
