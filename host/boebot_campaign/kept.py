@@ -128,19 +128,23 @@ class Folder:
     def _merge(self, path: Path, parquet: Any) -> None:
         arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
         writer: Any = None
-        waiting, at = [], 0
+        waiting, left = [], self.plan.count
+        for table in self._tables(parquet):
+            waiting.append(table)
+            left -= len(table)
+            if sum(map(len, waiting)) >= GROUP_ROWS or left == 0:
+                writer = writer or parquet.ParquetWriter(path, table.schema)
+                writer.write_table(arrow.concat_tables(waiting))
+                waiting = []
+        writer.close()
+
+    def _tables(self, parquet: Any, columns: Sequence[str] | None = None) -> Iterator[Any]:
+        """Of each part, in order, without the rows that one before it has."""
+        at = 0
         for first, end in self.done():
             if end > at:
-                waiting.append(_read(parquet, self.part(first, end)).slice(max(at - first, 0)))
+                yield _read(parquet, self.part(first, end), columns).slice(max(at - first, 0))
                 at = end
-            if sum(len(one) for one in waiting) >= GROUP_ROWS or at == self.plan.count:
-                table = arrow.concat_tables(waiting)
-                writer = writer or parquet.ParquetWriter(path, table.schema)
-                writer.write_table(table)
-                waiting = []
-                if at == self.plan.count:
-                    break
-        writer.close()
 
     def table(self, columns: Sequence[str] | None = None) -> Any:
         """The rows so far, with some of the columns or all: a pyarrow.Table."""
@@ -148,12 +152,8 @@ class Folder:
         arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
         if self.is_whole:
             return _read(parquet, self.path / ROWS, columns)
-        if not (done := self.done()):
+        if not (tables := list(self._tables(parquet, columns))):
             raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
-        tables, at = [], 0
-        for first, end in done:
-            tables.append(_read(parquet, self.part(first, end), columns).slice(max(at - first, 0)))
-            at = max(at, end)
         return arrow.concat_tables(tables)
 
 
@@ -245,12 +245,7 @@ def _sources(plan: Plan) -> tuple[dict[str, str], dict[str, bytes]]:
         for number, name in enumerate(given):
             if not Path(name).is_absolute():
                 continue
-            if kind == "brain":
-                request = Request.single(name, plan.all_robots[0])
-            elif kind == "robot":
-                request = Request.single(plan.brains[0], name)
-            else:
-                request = Request.single(plan.brains[0], plan.all_robots[0], arena=name)
+            request = Request.single(**{"brain": plan.brains[0], "robot": plan.all_robots[0], kind: name})
             found = sources(request, request.tasks())
             below = f"{FILES}/{kind}-{number}"
             names[name] = f"{below}/{Path(name).name}"
