@@ -124,12 +124,9 @@ class _Work:
             self._send(first, middle)
 
     def _send(self, first: int, end: int) -> None:
-        path = str(self._folder.path)
-        key = f"boebot-{first}-{end}-{uuid.uuid4().hex}"
-        self._pending[self._client.submit(do_part, path, self._folder.stamp, first, end, key=key, pure=False)] = (
-            first,
-            end,
-        )
+        work = do_part, str(self._folder.path), self._folder.stamp, first, end
+        future = self._client.submit(*work, key=f"boebot-{first}-{end}-{uuid.uuid4().hex}", pure=False)
+        self._pending[future] = first, end
 
     def _settle(self, future: Any, first: int, end: int) -> None:
         error: BaseException | None = None
