@@ -19,7 +19,7 @@ from boebot.cli import output
 from boebot.cli.ending import Detail
 from boebot.rates import Mean, mean_of
 from boebot.record import figures as figures_in_words
-from boebot.record.run_folder import unwritable
+from boebot.record.run_folder import write_whole
 from boebot_campaign.kept import Folder
 from boebot_campaign.rows import OK
 
@@ -214,11 +214,7 @@ def _drawn(path: Path, levels: list[Level], figures: dict[str, np.ndarray]) -> P
 
 def saved(figure: Any, path: Path) -> Path:
     """A picture, as a file. Raises BoebotError."""
-    try:
-        figure.savefig(path, dpi=120)
-    except OSError as error:
-        raise unwritable(path.parent, error, path.name) from None
-    return path
+    return write_whole(path, lambda part: figure.savefig(part, dpi=120), path.name)
 
 
 def saved_page(
@@ -233,8 +229,5 @@ def saved_page(
     for titles, rows in tables:
         cells = [titles, ["---"] * len(titles), *rows]
         parts.append("\n".join(f"| {' | '.join(one.replace('|', chr(92) + '|') for one in row)} |" for row in cells))
-    try:
-        path.write_text("\n\n".join([*parts, *lines]) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise unwritable(path.parent, error, path.name) from None
-    return path
+    text = "\n\n".join([*parts, *lines]) + "\n"
+    return write_whole(path, lambda part: part.write_text(text, encoding="utf-8"), path.name)
