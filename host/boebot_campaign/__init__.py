@@ -13,6 +13,4 @@ COMMAND = Command(
 )
 MATTERS = Command("Find out which imperfections a brain's result hangs on.", "boebot_campaign.matters:matters")
 FOLDER = Folder("boebot_campaign.report:report", "boebot_campaign.sweep:kept_request")
-EVOLVE = Command(
-    "Find parameters with which a brain does better, as a file says.", "boebot_campaign.evolve_command:evolve"
-)
+EVOLVE = Command("Find parameters with which a brain does better, as a file says.", "boebot_campaign.evolution:command")

@@ -15,18 +15,21 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
+import typer
 
 from boebot import missing
+from boebot.cli import options, output
 from boebot.errors import BoebotError
 from boebot.rates import Mean, mean_of
 from boebot.record.run_folder import make_folder
 from boebot.running.brain_parameters import in_force
 from boebot.running.loop import execute
 from boebot_campaign import engine, evolve_file, kept, rows, toml_brain
+from boebot_campaign.command import Out, Scheduler, Workers, shown
 from boebot_campaign.evolve_file import Evolve
 from boebot_campaign.plan import Plan
 from boebot_campaign.report import saved
@@ -221,3 +224,32 @@ def _draw(done: Evolution) -> None:
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.legend(fontsize=8)
     saved(figure, done.picture)
+
+
+def command(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="How to evolve: docs/how-to/evolve.md has its keys.")],
+    out: Out = None,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check all, say how many runs it is, and run none.")
+    ] = False,
+    json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Find parameters with which a brain does better, as a file says.
+
+    Stopped anywhere, the same command goes on where it was. The best brain is a TOML file that runs on any board."""
+    asked, folder = evolve_file.read(file), out or Path(file.stem)
+    if dry_run:
+        output.print_json({"runs": asked.most_runs}) if json else output.line(f"at most {asked.most_runs:,} runs")
+        return
+    with shown("evolve", folder, asked.most_runs, quiet or json) as told:
+        done = evolve(file, out=folder, scheduler=scheduler, workers=workers, progress=told)
+    if json:
+        output.print_json(msgspec.to_builtins(done, enc_hook=str))
+    elif not quiet:
+        output.line(f"fitness in training {done.curve[-1].best_so_far:.2f}, by hand {done.by_hand:.2f}")
+        output.line(f"in the test {in_words(done)}")
+        output.line(f"best brain: {done.brain}")
+        output.line(f"picture: {done.picture}")
