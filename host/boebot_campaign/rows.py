@@ -35,6 +35,14 @@ APART = ("status", "error", "wall_time_s", "worker")
 GRACE_S = 5.0  # after the limit, until a run that cannot be ended takes its process with it
 # Of the figures of a run: what the plan says already, what is the same for all rows, and what `status` and `error` say.
 _LEFT_OUT = {"without", "imperfections", "parameters", "compiler", "program_hash", "ended"}
+_POSE = ("start_x_m", "start_y_m", "start_heading_rad")
+_PLANNED = {
+    "row": int,
+    **dict.fromkeys(("set", "arena", "brain", "robot", "faults"), str),
+    "start": int,
+    **dict.fromkeys(_POSE, float),
+    "seed": int,
+}
 _one_run = threading.Lock()  # at a time: the process has one timer, and one handler of a signal
 
 
@@ -49,29 +57,9 @@ def columns(plan: Plan, brains: Sequence[str]) -> dict[str, type]:
     shares = dict.fromkeys(f"{name}{SHARE}" for names in made_of for name in names.behaviors)
     axes = {f"parameter.{name}": _kind(axis) for name, axis in plan.parameters.items()}
     axes |= {f"imperfection.{name}": float for name in plan.imperfections}
-    planned = {
-        "row": int,
-        "set": str,
-        "arena": str,
-        "brain": str,
-        "robot": str,
-        **axes,
-        "faults": str,
-        "start": int,
-        "start_x_m": float,
-        "start_y_m": float,
-        "start_heading_rad": float,
-        "seed": int,
-    }
-    return {
-        **planned,
-        **{name: kind for name, kind in FIGURES.items() if name not in planned.keys() | _LEFT_OUT},
-        **dict.fromkeys(shares, float),
-        "status": str,
-        "error": str,
-        "wall_time_s": float,
-        "worker": str,
-    }
+    figures = {name: kind for name, kind in FIGURES.items() if name not in _PLANNED.keys() | axes.keys() | _LEFT_OUT}
+    went = {"status": str, "error": str, "wall_time_s": float, "worker": str}
+    return {**_PLANNED, **axes, **figures, **dict.fromkeys(shares, float), **went}
 
 
 def _kind(axis: Any) -> type:
@@ -133,19 +121,10 @@ _arena = lru_cache(maxsize=8)(load_arena)
 
 def begun(case: Case) -> dict[str, Any]:
     """The columns that are known before the run."""
-    x, y, heading = case.pose or (None, None, None)
+    files, faults = map(_short, (case.arena, case.brain, case.robot)), ", ".join(case.faults) or None
+    planned = (case.row, case.set, *files, faults, case.start, *(case.pose or (None, None, None)), case.seed)
     return {
-        "row": case.row,
-        "set": case.set,
-        "arena": _short(case.arena),
-        "brain": _short(case.brain),
-        "robot": _short(case.robot),
-        "faults": ", ".join(case.faults) or None,
-        "start": case.start,
-        "start_x_m": x,
-        "start_y_m": y,
-        "start_heading_rad": heading,
-        "seed": case.seed,
+        **dict(zip(_PLANNED, planned, strict=True)),
         **{f"parameter.{name}": value for name, value in case.parameters.items()},
         **{f"imperfection.{name}": value for name, value in case.imperfections.items()},
     }
@@ -181,7 +160,7 @@ def _run(folder: Folder, case: Case) -> dict[str, Any]:
         try:
             request = request_of(folder, case)
             if (pose := request.members[0].pose) is not None:
-                row |= dict(zip(("start_x_m", "start_y_m", "start_heading_rad"), pose, strict=True))
+                row |= dict(zip(_POSE, pose, strict=True))
             result = execute(request, in_time)
             error = result.error
         except (BoebotError, _TimeIsUpError) as raised:
