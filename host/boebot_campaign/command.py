@@ -8,6 +8,7 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -113,34 +114,21 @@ def shown(what: str, folder: Path, total: int, quiet: bool) -> Iterator[Progress
         InterruptedRunError: Ctrl-C in the block.
     """
     try:
-        with output.progress_bar(what, total, quiet, unit=" runs", left=True, below=NewestRows(folder)) as progress:
+        below = lambda: newest_rows(folder, int(time.perf_counter()))  # noqa: E731
+        with output.progress_bar(what, total, quiet, unit=" runs", left=True, below=below) as progress:
             yield progress
     except KeyboardInterrupt:
         raise InterruptedRunError(f"interrupted; what is done is in {folder}, and the same command goes on") from None
 
 
-class NewestRows:
-    """The newest rows of a sweep's folder as a table: those of its newest part, read once in a second."""
-
-    def __init__(self, folder: Path) -> None:
-        self._parts, self._until_s = folder / PARTS, 0.0
-        self._table: RenderableType = ""
-
-    def __call__(self) -> RenderableType:
-        if time.perf_counter() > self._until_s:
-            with contextlib.suppress(OSError, ValueError):  # there is no part yet, or it has just been merged
-                self._table = self._read()
-            self._until_s = time.perf_counter() + 1.0
-        return self._table
-
-    def _read(self) -> RenderableType:
-        parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
-        newest = max(self._parts.glob("[0-9]*.parquet"), key=lambda part: part.stat().st_mtime)
-        table = output.empty_table()
-        for name in NEWEST:
-            table.add_column(words(name))
+@lru_cache(maxsize=1)
+def newest_rows(folder: Path, _second: int = 0) -> RenderableType:
+    """Of a sweep's folder, as a table: those of its newest part, read once in a second."""
+    parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
+    with contextlib.suppress(OSError, ValueError):  # there is no part yet, or it has just been merged
+        newest = max((folder / PARTS).glob("[0-9]*.parquet"), key=lambda part: part.stat().st_mtime)
         with parquet.ParquetFile(newest) as file:
-            rows = file.read(list(NEWEST)).to_pylist()
-        for row in rows[-NEWEST_ROWS:]:
-            table.add_row(*("" if value is None else figures.text(value) for value in row.values()))
-        return table
+            rows = file.read(list(NEWEST)).to_pylist()[-NEWEST_ROWS:]
+        texts = [["" if value is None else figures.text(value) for value in row.values()] for row in rows]
+        return output.columns([words(name) for name in NEWEST], texts)
+    return ""

@@ -24,7 +24,7 @@ from boebot.cli import output
 from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
 from boebot_campaign import kept, local, plan, tasks
-from boebot_campaign.command import NEWEST_ROWS, NewestRows
+from boebot_campaign.command import NEWEST_ROWS, newest_rows
 from boebot_campaign.report import report
 from boebot_campaign.rows import APART, columns, table_of
 
@@ -268,14 +268,13 @@ def test_a_picture_of_what_cannot_be_negative_begins_at_0_or_above(
 
 def test_the_newest_rows_are_shown_while_a_sweep_runs(tmp_path: Path) -> None:
     with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, PLAN))) as folder:
-        shown = NewestRows(folder.path)
-        assert shown() == ""
+        assert newest_rows(folder.path, 1) == ""
         rows = [{"row": row, "brain": "odd.py", "seed": row + 500, "status": "ok"} for row in range(10)]
         kept.write_part(folder.part(0, 10), table_of(rows, columns(folder.plan, ["clearway"])))
-        assert shown() == ""  # it looks once in a second
+        assert newest_rows(folder.path, 1) == ""  # it looks once in a second
         printed = output.console()
         with printed.capture() as caught:
-            printed.print(NewestRows(folder.path)())
+            printed.print(newest_rows(folder.path, 2))
     lines = [line for line in caught.get().splitlines() if "odd.py" in line]
     assert len(lines) == NEWEST_ROWS and "509" in lines[-1] and "row" in caught.get()
 
