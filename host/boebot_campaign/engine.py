@@ -64,18 +64,10 @@ class Workers:
         if not folder.undone():
             return
         if self._client is None:
-            self._client = self._begun(folder)
+            address = self._scheduler or self._ends.enter_context(_local(self._log, self._count))
+            self._client = self._ends.enter_context(_client(_distributed(), address))
+            _check(self._client, folder, _distributed())
         _Work(self._client, folder, told, self._log, is_local=self._scheduler is None).all()
-
-    def _begun(self, folder: Folder) -> Any:
-        """The client of workers that fit."""
-        helper = None if self._scheduler else self._ends.enter_context(_helper(self._log, self._count))
-        distributed = missing.imported("distributed", "a sweep", "dask.distributed", "sweep")
-        missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
-        address = self._scheduler or _address(helper, self._log)
-        client = self._ends.enter_context(_client(distributed, address))
-        _check(client, folder, distributed)
-        return client
 
 
 class _Work:
@@ -162,15 +154,23 @@ class _Work:
             time.sleep(POLL_S)
 
 
+def _distributed() -> Any:
+    missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+    return missing.imported("distributed", "a sweep", "dask.distributed", "sweep")
+
+
 @contextlib.contextmanager
-def _helper(log: Path, workers: int) -> Iterator[subprocess.Popen[bytes]]:
-    """A process with a cluster of this computer, which ends with the block, or with this process."""
+def _local(log: Path, workers: int) -> Iterator[str]:
+    """The address of a cluster of this computer, in a process that ends with the block, or with this process."""
     command = [sys.executable, "-m", "boebot_campaign.local", str(workers)]
     with log.open("wb") as file:
         helper = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, **NEW_GROUP)
-    assert helper.stdin is not None
+    assert helper.stdin is not None and helper.stdout is not None
     try:
-        yield helper
+        _distributed()  # while that begins
+        if not (address := helper.stdout.readline().decode().strip()):
+            raise BoebotError(f"the workers of this computer do not begin; {log} says why")
+        yield address
     finally:
         helper.stdin.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -178,14 +178,6 @@ def _helper(log: Path, workers: int) -> Iterator[subprocess.Popen[bytes]]:
         with contextlib.suppress(ProcessLookupError):
             end_group(helper, by_force=True)
         helper.wait()
-
-
-def _address(helper: subprocess.Popen[bytes] | None, log: Path) -> str:
-    """Of its cluster, as soon as that has begun."""
-    assert helper is not None and helper.stdout is not None
-    if not (address := helper.stdout.readline().decode().strip()):
-        raise BoebotError(f"the workers of this computer do not begin; {log} says why")
-    return address
 
 
 @contextlib.contextmanager
