@@ -21,7 +21,8 @@ import numpy as np
 import typer
 
 from boebot import missing
-from boebot.cli import options, output
+from boebot.cli import options
+from boebot.cli.ending import Detail
 from boebot.description.robots import RobotDescription, idle, magnitude
 from boebot.errors import BoebotError, CallError, did_you_mean
 from boebot.imperfections import imperfections
@@ -32,7 +33,7 @@ from boebot.running.tasks import prepare
 from boebot_campaign.command import Out, Scheduler, Workers, shown
 from boebot_campaign.kept import Folder
 from boebot_campaign.plan import AnyAxis, Axis, Plan, Range, length, listed, read_as
-from boebot_campaign.report import PAGE, said, saved, saved_page, words
+from boebot_campaign.report import said, saved, tell, words
 from boebot_campaign.rows import OK
 from boebot_campaign.sweep import run_plan
 
@@ -187,14 +188,8 @@ def matters(
     ]
     others = ", ".join(one["name"] for one in found if not one["counts"])
     lines = [*([f"No effect shows of {others}."] if others else []), LEGEND]
-    page = saved_page(path / PAGE, title, tables, lines, PICTURE)
-    if json:
-        files = [str(picture), str(page)]
-        output.print_json({"figure": asked.figure, "effects": found, "indices": indices, "files": files})
-    elif not quiet:
-        for table in tables:
-            output.print_columns(*table)
-        output.line("\n".join([*lines, f"picture: {picture}, page: {page}"]))
+    both = {"figure": asked.figure, "effects": found, "indices": indices}
+    tell(picture, title, tables, lines, both, Detail.JSON if json else Detail.NOTHING if quiet else Detail.FEW)
 
 
 def _in_words(one: dict[str, Any]) -> list[str]:

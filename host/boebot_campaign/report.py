@@ -59,8 +59,8 @@ def report(path: Path, wanted: Detail) -> None:
     folder = Folder(path)
     compute = missing.imported("pyarrow.compute", "a report", "pyarrow", "sweep")
     is_ok = compute.equal(folder.table(["status"])["status"], OK).to_numpy()
-    found = {name: np.where(is_ok, _numbers(folder, name), np.nan) for name in MEANS}
-    figures = {name: values for name, values in found.items() if not np.isnan(values).all()}
+    numbers = {name: np.where(is_ok, _numbers(folder, name), np.nan) for name in MEANS}
+    figures = {name: values for name, values in numbers.items() if not np.isnan(values).all()}
     levels = [_level("all", "", 0.0, np.ones(len(is_ok), dtype=bool), is_ok, figures)]
     axes = {"parameter": folder.plan.parameters, "imperfection": folder.plan.imperfections}
     for name in [*FACTORS, *(f"{kind}.{one}" for kind, own in axes.items() for one in own)]:
@@ -69,15 +69,8 @@ def report(path: Path, wanted: Detail) -> None:
     picture = _drawn(path / PICTURE, levels, figures)
     titles, rows = ["factor", "value", "ok", *map(words, figures)], [_in_words(level) for level in levels]
     lines = [*_differences(compared), _INTERVALS]
-    page = saved_page(path / PAGE, f"Sweep {path.name}", [(titles, rows)], lines, PICTURE)
-    if wanted is Detail.JSON:
-        said = [level.said() for level in levels]
-        output.print_json({"levels": said, "compared": compared, "files": [str(picture), str(page)]})
-    elif wanted is not Detail.NOTHING:
-        output.print_columns(titles, rows)
-        for line in lines:
-            output.line(line)
-        output.line(f"picture: {picture}, page: {page}")
+    found = {"levels": [level.said() for level in levels], "compared": compared}
+    tell(picture, f"Sweep {path.name}", [(titles, rows)], lines, found, wanted)
 
 
 def _numbers(folder: Folder, name: str) -> np.ndarray:
@@ -217,17 +210,24 @@ def saved(figure: Any, path: Path) -> Path:
     return write_whole(path, lambda part: figure.savefig(part, dpi=120), path.name)
 
 
-def saved_page(
-    path: Path,
+def tell(
+    picture: Path,
     title: str,
     tables: Sequence[tuple[Sequence[str], Sequence[Sequence[str]]]],
     lines: Sequence[str],
-    picture: str,
-) -> Path:
-    """Tables, sentences and a picture as Markdown. Raises BoebotError."""
-    parts = [f"# {title}", f"![{title}]({picture})"]
+    found: dict[str, Any],
+    wanted: Detail,
+) -> None:
+    """Tables and sentences beside a picture, as a page and as is wanted; `found`: for programs. Raises BoebotError."""
+    parts = [f"# {title}", f"![{title}]({picture.name})"]
     for titles, rows in tables:
         cells = [titles, ["---"] * len(titles), *rows]
         parts.append("\n".join(f"| {' | '.join(one.replace('|', chr(92) + '|') for one in row)} |" for row in cells))
     text = "\n\n".join([*parts, *lines]) + "\n"
-    return write_whole(path, lambda part: part.write_text(text, encoding="utf-8"), path.name)
+    page = write_whole(picture.with_name(PAGE), lambda part: part.write_text(text, encoding="utf-8"), PAGE)
+    if wanted is Detail.JSON:
+        output.print_json(found | {"files": [str(picture), str(page)]})
+    elif wanted is not Detail.NOTHING:
+        for table in tables:
+            output.print_columns(*table)
+        output.line("\n".join([*lines, f"picture: {picture}, page: {page}"]))

@@ -261,7 +261,12 @@ def test_a_picture_of_what_cannot_be_negative_begins_at_0_or_above(
     undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr("boebot_campaign.report.saved", lambda figure, _: drawn.append(figure))
+
+    def saved(figure: Any, path: Path) -> Path:
+        drawn.append(figure)
+        return path
+
+    monkeypatch.setattr("boebot_campaign.report.saved", saved)
     report(undisturbed / "out", Detail.NOTHING)
     assert all(panel.get_ylim()[0] >= 0 for panel in drawn[0].axes) and capsys.readouterr().out == ""
 
