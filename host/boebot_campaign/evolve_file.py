@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
 
 from boebot.brains import LoadedBrain, load_brain
 from boebot.description import toml_files
+from boebot.description.robots import Positive
 from boebot.errors import BoebotError, CallError, did_you_mean
 from boebot.record.run import FIGURES, SHARE
 from boebot.running import brain_parameters
 from boebot_campaign import plan, rows, toml_brain
-from boebot_campaign.plan import MOST_RUNS, Plan, Pose, Whole
+from boebot_campaign.plan import MOST_RUNS, SOME, Plan, Seeds, Starts, Whole
 
 EMPTY, RAISED = "empty_battery", "raised"
 EVENTS = (EMPTY, RAISED)  # of a run; 1 or 0
@@ -33,20 +34,20 @@ class Given(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
     brain: str
     seconds: float
-    seeds: list[int] | Whole
-    test_seeds: list[int] | Whole
-    parameters: dict[str, Box]
-    fitness: dict[str, float]
+    seeds: Seeds
+    test_seeds: Seeds
+    parameters: Annotated[dict[str, Box], SOME]
+    fitness: Annotated[dict[str, float], SOME]
     robot: str | None = None
     arenas: list[str] = []
     test_arenas: list[str] = []
     on: str | None = None
-    starts: list[Pose] | int = []
-    limit_s: float = 60.0
-    population: int = 10
-    generations: int = 20
-    restarts: int = 0
-    seed: int = 1
+    starts: Starts = []
+    limit_s: Positive = 60.0
+    population: Annotated[int, msgspec.Meta(ge=2)] = 10
+    generations: Annotated[int, msgspec.Meta(ge=1)] = 20
+    restarts: Annotated[int, msgspec.Meta(ge=0)] = 0
+    seed: Annotated[int, msgspec.Meta(ge=0)] = 1
 
 
 class Evolve(NamedTuple):
@@ -119,12 +120,6 @@ def made(keys: Mapping[str, Any]) -> Evolve:
 
 
 def _checked(given: Given, folder: Path, name: str) -> Evolve:
-    for key, least in (("population", 2), ("generations", 1), ("restarts", 0), ("seed", 0)):
-        if getattr(given, key) < least:
-            raise CallError(f"{name}: {key} is {getattr(given, key)}; expected at least {least}")
-    for key in ("parameters", "fitness"):
-        if not getattr(given, key):
-            raise CallError(f"{name}: {key} is empty; expected at least one")
     loaded = load_brain(plan.whole(given.brain, folder))
     toml_brain.check(loaded)
     boxes = {one: _box(loaded, one, box, name) for one, box in given.parameters.items()}

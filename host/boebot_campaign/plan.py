@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Annotated, Any, NamedTuple, Self, TypeVar
 
 import msgspec
 import numpy as np
@@ -19,7 +19,7 @@ from boebot.arenas import load_arena
 from boebot.boards import is_live
 from boebot.brains import load_brain
 from boebot.description import toml_files
-from boebot.description.robots import idle
+from boebot.description.robots import Positive, idle
 from boebot.errors import CallError
 from boebot.imperfections import checked, imperfections
 from boebot.running.brain_parameters import in_force
@@ -51,8 +51,11 @@ class Whole(
     high: int
 
 
-Axis = list[bool | int | float | str] | Range
+SOME = msgspec.Meta(min_length=1)
+Axis = Annotated[list[bool | int | float | str], SOME] | Range
 AnyAxis = list[Any] | Range | Whole
+Seeds = Annotated[list[int], SOME] | Whole
+Starts = list[Pose] | Annotated[int, msgspec.Meta(ge=0)]
 
 
 class Case(NamedTuple):
@@ -77,20 +80,20 @@ class Case(NamedTuple):
 class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
     """The keys of sweep.toml (docs/how-to/sweeps.md)."""
 
-    brains: list[str]
+    brains: Annotated[list[str], SOME]
     seconds: float
-    seeds: list[int] | Whole
+    seeds: Seeds
     robots: list[str] = []
     arenas: list[str] = []
     test_arenas: list[str] = []
     on: str | None = None
-    starts: list[Pose] | int = []
+    starts: Starts = []
     design: Design = "grid"
     points: int = 0
     parameters: dict[str, Axis] = {}
     imperfections: dict[str, Axis] = {}
     faults: list[list[str]] = []
-    limit_s: float = 60.0
+    limit_s: Positive = 60.0
 
     @cached_property
     def axes(self) -> list[tuple[str, AnyAxis]]:
@@ -237,9 +240,6 @@ def _at(axis: list[Any] | Whole, index: int) -> Any:
 
 def _checked(plan: _P, at: str) -> _P:
     """Raises CallError or another BoebotError, in one sentence, before anything is made."""
-    for key in ("brains", "seeds"):
-        if getattr(plan, key) == []:
-            raise CallError(f"{at}{key} is empty; expected at least one")
     for name, values in (
         ("arenas", [*plan.arenas, *plan.test_arenas]),
         ("seeds", plan.seeds),
@@ -253,10 +253,6 @@ def _checked(plan: _P, at: str) -> _P:
         raise CallError(f"{at}there are test_arenas and no arenas; expected arenas, too, to train in")
     if isinstance(plan.seeds, Whole) and plan.seeds.low > plan.seeds.high:
         raise CallError(f"{at}seeds are from {plan.seeds.low} to {plan.seeds.high}; expected no less than from")
-    if isinstance(plan.starts, int) and plan.starts < 0:
-        raise CallError(f"{at}starts is {plan.starts}; expected poses, or a number of free places")
-    if not plan.limit_s > 0:
-        raise CallError(f"{at}limit_s is {plan.limit_s:g}; expected more than 0")
     if plan.on is not None and is_live(plan.on):
         raise CallError(f"{at}on is {plan.on!r}, a port; expected an emulated board, native or avr, or direct")
     _check_design(plan, at)
@@ -268,8 +264,6 @@ def _checked(plan: _P, at: str) -> _P:
 
 def _check_design(plan: Plan, at: str) -> None:
     for name, axis in plan.axes:
-        if isinstance(axis, list) and not axis:
-            raise CallError(f"{at}{name} has no values; expected at least one")
         if isinstance(axis, Range) and plan.design == "grid" and axis.steps < 2:
             raise CallError(f"{at}{name} has {axis.steps} steps; expected 2 or more in a grid")
         if isinstance(axis, Range) and plan.design != "grid" and axis.steps:

@@ -53,7 +53,7 @@ def test_designs_fill_the_range_and_are_the_same_each_time(design: designs.Desig
 
 
 BAD = {
-    "no seeds": ({"seeds": []}, "seeds is empty"),
+    "no seeds": ({"seeds": []}, "seeds: expected array of length >= 1"),
     "too many runs": ({"seeds": {"from": 1, "to": 10**12}}, "1,000,000,000,000 runs"),
     "no such parameter": ({"parameters": {"avoid.trun": [0.1]}}, "no parameter 'avoid.trun'.*avoid.turn"),
     "parameter of a brain that has none": (
