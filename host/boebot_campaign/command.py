@@ -129,6 +129,10 @@ def newest_rows(folder: Path, _second: int = 0) -> RenderableType:
         newest = max((folder / PARTS).glob("[0-9]*.parquet"), key=lambda part: part.stat().st_mtime)
         with parquet.ParquetFile(newest) as file:
             rows = file.read(list(NEWEST)).to_pylist()[-NEWEST_ROWS:]
-        texts = [["" if value is None else figures.text(value) for value in row.values()] for row in rows]
-        return output.columns([words(name) for name in NEWEST], texts)
+        table = output.empty_table()
+        for name in NEWEST:
+            table.add_column(words(name))
+        for row in rows:
+            table.add_row(*("" if value is None else figures.text(value) for value in row.values()))
+        return table
     return ""

@@ -95,22 +95,14 @@ def print_columns(
     titles: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: Sequence[int] = (), whole: int = 0
 ) -> None:
     """A table with a header, if there are rows; which columns hold numbers, how many of the first are not wrapped."""
-    printed = columns(titles, rows, numbers=numbers, whole=whole)
-    if printed.rows:
-        console().print(printed)
-
-
-def columns(
-    titles: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: Sequence[int] = (), whole: int = 0
-) -> Table:
-    """The same, not yet printed."""
-    made = empty_table()
+    printed = empty_table()
     for index, title in enumerate(titles):
         justify: Any = "right" if index in numbers else "left"
-        made.add_column(title, justify=justify, overflow="fold", no_wrap=index < whole)
+        printed.add_column(title, justify=justify, overflow="fold", no_wrap=index < whole)
     for row in rows:
-        made.add_row(*row)
-    return made
+        printed.add_row(*row)
+    if printed.rows:
+        console().print(printed)
 
 
 @contextlib.contextmanager
