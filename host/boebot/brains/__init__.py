@@ -50,6 +50,7 @@ PYTHON, TOML = ".py", ".toml"  # what brains are written in
 PROGRAMS = (".elf", ".hex")  # for the board: they drive a robot in place of a brain
 SKETCHES = (".ino", ".pde", ".ini")  # of which one is built
 _executing: set[tuple[Path, int]] = set()  # files that are being loaded, each with its thread
+_beside: dict[Path, dict[str, ModuleType]] = {}  # what each brain's file has imported, as it was last loaded
 
 
 @dataclass(frozen=True)
@@ -302,7 +303,7 @@ def _execute(path: Path) -> ModuleType:
     try:
         process = os.getpid()
         _executing.add(loading)
-        with _neighbours(path.parent):
+        with _neighbours(path):
             code = compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
             exec(code, module.__dict__)
     except KeyboardInterrupt:
@@ -315,16 +316,33 @@ def _execute(path: Path) -> ModuleType:
     return module
 
 
+def beside(path: Path) -> list[Path]:
+    """The user's files that a brain's file has imported, as it was last loaded."""
+    return [Path(str(module.__file__)).resolve() for module in _beside.get(path, {}).values()]
+
+
 @contextlib.contextmanager
-def _neighbours(folder: Path) -> Iterator[None]:
-    """Lets a brain import files beside it, as a script may."""
-    entry = str(folder)
+def _neighbours(path: Path) -> Iterator[None]:
+    """Lets a brain import files beside it, as a script may, and as they are now: what another brain has imported, or
+    this one before, has no part in it."""
+    entry = str(path.parent)
+    for name, module in [item for modules in _beside.values() for item in modules.items()]:
+        if sys.modules.get(name) is module:
+            del sys.modules[name]
+    before = set(sys.modules)
     sys.path.insert(0, entry)
+    importlib.invalidate_caches()
     try:
         yield
     finally:
         with contextlib.suppress(ValueError):
             sys.path.remove(entry)
+        new = {name: module for name, module in sys.modules.items() if name not in before}
+        _beside[path] = {
+            name: module
+            for name, module in new.items()
+            if is_users(str(getattr(module, "__file__", None) or "<frozen ")) and not name.startswith("boebot_brain_")
+        }
 
 
 def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:

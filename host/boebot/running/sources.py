@@ -98,7 +98,7 @@ def _description(prefix: str, name: str | Path) -> dict[str, bytes]:
 
 def _brain(path: Path) -> dict[str, bytes]:
     """A brain's file, and what it has imported from its folder, by their names there."""
-    files = {path, *_imported(path.parent)}
+    files = {path, *_imported(path.parent), *(one for one in brains.beside(path) if one.is_relative_to(path.parent))}
     return {file.relative_to(path.parent).as_posix(): file.read_bytes() for file in sorted(files)}
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import boebot
-from boebot.brains import bundled, load_brain, program_state
+from boebot.brains import beside, bundled, load_brain, program_state
 from boebot.errors import BrainError
 from boebot.robot import Robot
 from boebot.running.tasks import Request
@@ -178,3 +178,18 @@ def test_function_that_would_never_run_is_refused() -> None:
     for brain in (later, Callable()):
         with pytest.raises(BrainError, match="step is an async function"):
             load_brain(brain)
+
+
+def test_what_a_brain_imports_is_what_lies_beside_it_now(tmp_path: Path) -> None:
+    """Not what another brain has imported by that name, nor what was there when it was loaded before."""
+    found = {}
+    for folder, speed in (("slow", 0.25), ("fast", 0.75)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "helper.py").write_text(f"SPEED = {speed}\n")
+        brain = tmp_path / folder / f"{folder}_one.py"
+        brain.write_text("from helper import SPEED\n\n\ndef step(robot):\n    pass\n\n\nPERIOD = SPEED\n")
+        found[folder] = brain
+    assert [load_brain(found[one]).period for one in ("slow", "fast", "slow")] == [0.25, 0.75, 0.25]
+    assert beside(found["fast"]) == [tmp_path / "fast" / "helper.py"]
+    (tmp_path / "slow" / "helper.py").write_text("SPEED = 1.125\n")
+    assert load_brain(found["slow"]).period == 1.125
