@@ -10,6 +10,8 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import contextlib
+import os
+import re
 import subprocess
 import sys
 import time
@@ -43,9 +45,11 @@ Told = Callable[[int], object]
 class Workers:
     """Those of this computer, or of a scheduler. They begin with the first rows, and stay until the block ends."""
 
-    def __init__(self, scheduler: str | None, count: int, log: Path) -> None:
-        """`log`: file of what those of this computer print."""
-        self._scheduler, self._count, self._log = scheduler, count, log
+    def __init__(self, scheduler: str | None, count: int | None, log: Path) -> None:
+        """`count`: of this computer, or one for each processor; `log`: file of what they print. Raises CallError."""
+        if count is not None and (scheduler is not None or count < 1):
+            raise CallError(f"workers is {count}; expected at least 1, and none with a scheduler")
+        self._scheduler, self._count, self._log = scheduler, count or os.cpu_count() or 1, log
         self._ends = contextlib.ExitStack()
         self._client: Any = None
 
@@ -182,6 +186,8 @@ def _local(log: Path, workers: int) -> Iterator[str]:
 
 @contextlib.contextmanager
 def _client(distributed: Any, address: str) -> Iterator[Any]:
+    if not re.fullmatch(r"(tcp|tls|ucx|wss?)://.+:\d+", address):
+        raise CallError(f"there is no scheduler at {address!r}; expected one as tcp://HOST:PORT")
     try:
         client = distributed.Client(address, timeout=10.0, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -11,7 +11,6 @@ beginning, and what its folders hold is not run twice.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -99,11 +98,11 @@ def evolve(
         BoebotError: in one sentence, before the first run where the file or the cluster is wrong. What is done stays.
         KeyboardInterrupt: Ctrl-C; what is done stays, and the same call goes on.
     """
-    check_call("an evolution", file, keys, out, scheduler, workers)
+    check_call("an evolution", file, keys, out)
     asked = evolve_file.made(keys) if file is None else evolve_file.read(Path(file))
     folder = Path(out if out is not None else Path(str(file)).stem)
     make_folder(folder)
-    with engine.Workers(scheduler, workers or os.cpu_count() or 1, folder / engine.LOG) as ours:
+    with engine.Workers(scheduler, workers, folder / engine.LOG) as ours:
         return _Work(asked, folder, ours, progress or (lambda _: None)).all()
 
 

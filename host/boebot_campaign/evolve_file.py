@@ -46,7 +46,7 @@ class Given(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     limit_s: Positive = 60.0
     population: Annotated[int, msgspec.Meta(ge=2)] = 10
     generations: Annotated[int, msgspec.Meta(ge=1)] = 20
-    restarts: Annotated[int, msgspec.Meta(ge=0)] = 0
+    restarts: Annotated[int, msgspec.Meta(ge=0, le=20)] = 0
     seed: Annotated[int, msgspec.Meta(ge=0)] = 1
 
 

@@ -42,19 +42,22 @@ class Range(
     steps: int = 0
 
 
+Seed = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # of a column
+
+
 class Whole(
     msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename={"low": "from", "high": "to"}
 ):
     """Whole numbers from `low` to `high`."""
 
-    low: int
-    high: int
+    low: Seed
+    high: Seed
 
 
 SOME = msgspec.Meta(min_length=1)
 Axis = Annotated[list[bool | int | float | str], SOME] | Range
 AnyAxis = list[Any] | Range | Whole
-Seeds = Annotated[list[int], SOME] | Whole
+Seeds = Annotated[list[Seed], SOME] | Whole
 Starts = list[Pose] | Annotated[int, msgspec.Meta(ge=0)]
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from boebot import missing
-from boebot.arenas import load_arena
+from boebot.arenas import Arena, load_arena
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
 from boebot.imperfections import imperfections
@@ -85,7 +85,7 @@ def request_of(folder: Folder, case: Case) -> Request:
     brain, robot = folder.place(case.brain), folder.place(case.robot)
     pose = case.pose
     if pose is None and isinstance(plan.starts, int) and plan.starts:
-        pose = _free(arena, brain, robot, (plan.first_seed << 32) + case.start)
+        pose = _free(folder.stamp, arena, brain, robot, (plan.first_seed << 32) + case.start)
     return Request.single(
         brain,
         robot,
@@ -108,15 +108,18 @@ def heard(given: Mapping[str, float]) -> dict[str, float]:
 
 
 @lru_cache(maxsize=4096)
-def _free(arena: str | None, brain: Any, robot: Any, seed: int) -> tuple[float, float, float]:
-    """A free start by chance, where that robot fits."""
+def _free(stamp: str, arena: str | None, brain: Any, robot: Any, seed: int) -> tuple[float, float, float]:
+    """A free start by chance, where that robot fits; each sweep has its stamp and files."""
     loaded, description, _ = prepare(brain, robot, None)
     if arena is None and robot is None:
         arena = loaded.arena
-    return _arena(arena).free_start(description.body.reach_m, seed % 2**64)
+    return _arena(stamp, arena).free_start(description.body.reach_m, seed % 2**64)
 
 
-_arena = lru_cache(maxsize=8)(load_arena)
+@lru_cache(maxsize=8)
+def _arena(stamp: str, name: str | None) -> Arena:
+    del stamp
+    return load_arena(name)
 
 
 def begun(case: Case) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,7 +64,7 @@ def sweep(
         BoebotError: in one sentence, before the first run where the plan or the cluster is wrong. What is done stays.
         KeyboardInterrupt: Ctrl-C; what is done stays, and the same call goes on.
     """
-    check_call("a sweep", file, keys, out, scheduler, workers)
+    check_call("a sweep", file, keys, out)
     asked = plan.made(keys) if file is None else plan.read(Path(file))
     path = Path(out if out is not None else Path(str(file)).stem)
     return run_plan(asked, path, scheduler, workers, progress)
@@ -80,20 +79,18 @@ def run_plan(
 ) -> Sweep:
     """The same of a plan, into the folder `path`."""
     with kept.locked(path, asked) as folder:
-        with engine.Workers(scheduler, workers or os.cpu_count() or 1, folder.path / engine.LOG) as ours:
+        with engine.Workers(scheduler, workers, folder.path / engine.LOG) as ours:
             ours.run(folder, progress or (lambda _: None))
         folder.merge()
     return Sweep(path)
 
 
-def check_call(what: str, file: object, keys: object, out: object, scheduler: object, workers: int | None) -> None:
+def check_call(what: str, file: object, keys: object, out: object) -> None:
     """Raises CallError where they do not go together."""
     if (file is None) == (not keys):
         raise CallError(f"{what} is a file or keys by name; expected one of them")
     if file is None and out is None:
         raise CallError(f"{what} by keys has no name; expected out, its folder")
-    if workers is not None and (scheduler is not None or workers < 1):
-        raise CallError(f"workers is {workers}; expected at least 1, and none with a scheduler")
 
 
 def kept_request(path: Path, row: int) -> Request:
