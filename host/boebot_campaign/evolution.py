@@ -24,6 +24,7 @@ from boebot import missing
 from boebot.cli import options, output
 from boebot.errors import BoebotError
 from boebot.rates import Mean, mean_of
+from boebot.record.figures import counted
 from boebot.record.run_folder import make_folder
 from boebot.running.brain_parameters import in_force
 from boebot.running.loop import execute
@@ -198,9 +199,11 @@ def in_words(done: Evolution) -> str:
     """What came of the test."""
     if done.difference is None:
         return "no run of both has figures"
-    mean, least, most = done.difference
+    (mean, least, most), pairs = done.difference, counted(done.pairs, "pair", "pairs")
+    if np.isinf(most):
+        return f"{mean:+.2f} beside by hand: nothing is shown by {pairs}"
     verdict = "nothing is shown: the interval includes 0" if least <= 0 <= most else "better" if mean > 0 else "worse"
-    return f"{mean:+.2f} beside by hand ({least:+.2f} to {most:+.2f} at 95 %, {done.pairs} pairs): {verdict}"
+    return f"{mean:+.2f} beside by hand ({least:+.2f} to {most:+.2f} at 95 %, {pairs}): {verdict}"
 
 
 def _folder(generation: int) -> str:

@@ -38,20 +38,10 @@ class Level(NamedTuple):
     at: float
     """where it is drawn"""
     runs: int
-    ok: int
+    ok: str
+    """how many of them are, in words"""
     means: dict[str, Mean | None]
-
-    def said(self) -> dict[str, Any]:
-        """For programs."""
-        interval = list(rates.interval(self.ok, self.runs)) if self.runs else None
-        counts = {"runs": self.runs, OK: self.ok, "ok_interval": interval}
-        return {"factor": self.factor, "value": self.value, **counts, **self.means}
-
-    def mean(self, name: str) -> Mean | None:
-        """Of a figure, or of whether runs are ok."""
-        if name != OK:
-            return self.means[name]
-        return Mean(self.ok / self.runs, *rates.interval(self.ok, self.runs)) if self.runs else None
+    """of each figure, and of whether runs are ok"""
 
 
 def report(path: Path, wanted: Detail) -> None:
@@ -67,9 +57,11 @@ def report(path: Path, wanted: Detail) -> None:
         levels += [_level(name, *level, is_ok, figures) for level in _values(folder, name)]
     compared = [] if not figures else _compared(folder, *next(iter(figures.items())))
     picture = _drawn(path / PICTURE, levels, figures)
-    titles, rows = ["factor", "value", "ok", *map(words, figures)], [_in_words(level) for level in levels]
+    titles = ["factor", "value", "ok", *map(words, figures)]
+    rows = [[one.factor, one.value, one.ok, *(said(one.means[name]) for name in figures)] for one in levels]
     lines = [*_differences(compared), _INTERVALS]
-    found = {"levels": [level.said() for level in levels], "compared": compared}
+    by_level = [{"factor": one.factor, "value": one.value, "runs": one.runs} | one.means for one in levels]
+    found = {"levels": by_level, "compared": compared}
     tell(picture, f"Sweep {path.name}", [(titles, rows)], lines, found, wanted)
 
 
@@ -106,12 +98,13 @@ def _values(folder: Folder, name: str) -> Iterator[tuple[str, float, np.ndarray]
 def _level(
     factor: str, value: str, at: float, rows: np.ndarray, is_ok: np.ndarray, figures: dict[str, np.ndarray]
 ) -> Level:
-    means: dict[str, Mean | None] = {}
+    runs, ok, means = int(np.count_nonzero(rows)), int(np.count_nonzero(rows & is_ok)), dict[str, Mean | None]()
     for name, values in figures.items():
         there = values[rows]
         there = there[~np.isnan(there)]
         means[name] = mean_of(there) if len(there) else None
-    return Level(factor, value, at, int(np.count_nonzero(rows)), int(np.count_nonzero(rows & is_ok)), means)
+    means[OK] = Mean(ok / runs, *rates.interval(ok, runs)) if runs else None
+    return Level(factor, value, at, runs, rates.in_words(ok, runs) if runs else "0", means)
 
 
 def cliffs_delta(one: np.ndarray, other: np.ndarray) -> float:
@@ -132,14 +125,10 @@ def _compared(folder: Folder, name: str, values: np.ndarray) -> list[dict[str, A
     for one, other in combinations(sorted(by_brain), 2):
         both = ~np.isnan(by_brain[one]) & ~np.isnan(by_brain[other])
         first, second = by_brain[one][both], by_brain[other][both]
-        found.append({"brains": [one, other]})
+        found.append({"brains": [one, other], "figure": name, "pairs": len(first)})
+        found[-1]["difference"] = mean_of(first - second) if len(first) else None
         if len(first) > 1:
-            found[-1][name] = {
-                "pairs": len(first),
-                "difference": mean_of(first - second),
-                "cliffs_delta": cliffs_delta(first, second),
-                "wilcoxon_p": _wilcoxon(first - second),
-            }
+            found[-1] |= {"cliffs_delta": cliffs_delta(first, second), "wilcoxon_p": _wilcoxon(first - second)}
     return found
 
 
@@ -151,7 +140,7 @@ def _wilcoxon(differences: np.ndarray) -> float:
     return float(stats.wilcoxon(differences).pvalue)
 
 
-_INTERVALS = "Intervals hold 95 %: Wilson's of rates, by bootstrap of means, which are of runs that are ok."
+_INTERVALS = "95 % intervals: Wilson's of rates; of means (of ok runs) Student's t, by bootstrap of 20 values or more."
 
 
 def words(name: str) -> str:
@@ -161,22 +150,19 @@ def words(name: str) -> str:
 
 
 def said(mean: Mean | None) -> str:
-    """With its interval."""
-    return "" if mean is None else f"{mean.mean:.3g} ({mean.least:.3g} to {mean.most:.3g})"
-
-
-def _in_words(level: Level) -> list[str]:
-    good = rates.in_words(level.ok, level.runs) if level.runs else "0"
-    return [level.factor, level.value, good, *map(said, level.means.values())]
+    """With its interval, if it has one."""
+    if mean is None:
+        return ""
+    return f"{mean.mean:.3g}" + ("" if np.isinf(mean.most) else f" ({mean.least:.3g} to {mean.most:.3g})")
 
 
 def _differences(compared: list[dict[str, Any]]) -> Iterator[str]:
-    for pair in compared:
-        for name, two in ((name, two) for name, two in pair.items() if name != "brains"):
-            yield (
-                f"{' less '.join(pair['brains'])}, {words(name)}: {said(two['difference'])} over "
-                f"{two['pairs']} pairs; Cliff's delta {two['cliffs_delta']:.2f}, Wilcoxon p = {two['wilcoxon_p']:.2g}"
-            )
+    for one in compared:
+        mean, pairs = said(one["difference"]) or "none", figures_in_words.counted(one["pairs"], "pair", "pairs")
+        tests = ": nothing is shown"
+        if one["pairs"] > 1:
+            tests = f"; Cliff's delta {one['cliffs_delta']:.2f}, Wilcoxon p = {one['wilcoxon_p']:.2g}"
+        yield f"{' less '.join(one['brains'])}, {words(one['figure'])}: {mean} over {pairs}{tests}"
 
 
 def _drawn(path: Path, levels: list[Level], figures: dict[str, np.ndarray]) -> Path:
@@ -190,10 +176,10 @@ def _drawn(path: Path, levels: list[Level], figures: dict[str, np.ndarray]) -> P
     for column, factor in enumerate(factors):
         own = [level for level in levels if level.factor == factor]
         for panel, name in zip(panels[:, column], [*figures, OK], strict=True):
-            drawn = [(level.at, mean) for level in own if (mean := level.mean(name)) is not None]
-            middle = np.array([mean.mean for _, mean in drawn])
-            ends = np.array([[mean.mean - mean.least, mean.most - mean.mean] for _, mean in drawn]).reshape(-1, 2).T
-            panel.errorbar([at for at, _ in drawn], middle, np.maximum(ends, 0), fmt="o", capsize=3, clip_on=False)
+            drawn = [(level.at, *mean) for level in own if (mean := level.means[name]) is not None]
+            at, middle, least, most = np.array(drawn).reshape(-1, 4).T
+            ends = np.maximum([middle - least, most - middle], 0)
+            panel.errorbar(at, middle, ends, fmt="o", capsize=3, clip_on=False)
             panel.set_xticks([level.at for level in own], [level.value for level in own], rotation=20, fontsize=7)
             panel.margins(x=0.2)
             panel.grid(axis="y", color="#dfe2ea")

@@ -61,8 +61,9 @@ class _Escaped:
 
 
 def print_json(values: Mapping[str, Any], indent: int | None = 1) -> None:
-    """One JSON object on standard output, at once: a program may be waiting for it."""
-    line(json.dumps(values, indent=indent))
+    """One JSON object on standard output, at once: a program may be waiting for it. What is no finite number is null,
+    as JSON has none."""
+    line(json.dumps(json.loads(json.dumps(values), parse_constant=lambda name: None), indent=indent))
 
 
 def empty_table(**options: Any) -> Table:

@@ -15,7 +15,7 @@ import pytest
 import boebot
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
-from boebot.rates import Mean
+from boebot.rates import Mean, mean_of
 from boebot.running.brain_parameters import in_force
 from boebot_campaign import engine, evolution, evolve_file, kept, tasks, toml_brain
 
@@ -182,3 +182,5 @@ def test_words_say_when_nothing_is_shown() -> None:
     for bounds, verdict in (((-0.1, 0.5), "includes 0"), ((0.1, 0.5), "better"), ((-0.5, -0.1), "worse")):
         done.difference = Mean(sum(bounds) / 2, *bounds)
         assert evolution.in_words(done).endswith(verdict)
+    done.pairs, done.difference = 1, mean_of(np.array([0.5]))
+    assert evolution.in_words(done) == "+0.50 beside by hand: nothing is shown by 1 pair"

@@ -249,12 +249,22 @@ def test_a_report_has_intervals_and_compares_the_brains(undisturbed: Path, capsy
     for level in (one for one in said["levels"] if one["factor"] == "brain"):
         mean, least, most = level["true_distance_m"]
         assert least < mean < most and mean == pytest.approx(sum(ways[level["value"]]) / 20)
-    pair = said["compared"][0]["true_distance_m"]
-    assert pair["pairs"] == 20
+    (pair,) = said["compared"]
+    assert pair["figure"] == "true_distance_m" and pair["pairs"] == 20
     assert pair["difference"][0] == pytest.approx(sum(ways["clearway"]) / 20 - sum(ways["odd.py"]) / 20)
     picture, page = map(Path, said["files"])
     assert picture.read_bytes().startswith(b"\x89PNG") and f"({picture.name})" in page.read_text()
     assert page.read_text().count("\n| ") == len(said["levels"]) + 2 and "clearway less odd.py" in page.read_text()
+
+
+def test_a_report_of_one_pair_says_that_it_shows_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    by_hand(tmp_path / "out", saved(tmp_path, PLAN.replace("to = 10", "to = 1").replace("starts = 2\n", "")))
+    report(tmp_path / "out", Detail.JSON)
+    said, page = json.loads(capsys.readouterr().out), (tmp_path / "out" / "index.md").read_text()
+    (pair,) = said["compared"]
+    assert pair["pairs"] == 1 and pair["difference"][1:] == [None, None] and "wilcoxon_p" not in pair
+    assert said["levels"][0]["ok"][0] == 1 and None in said["levels"][1]["true_distance_m"]
+    assert " over 1 pair: nothing is shown\n" in page and "Wilcoxon" not in page and "inf" not in page
 
 
 def test_a_picture_of_what_cannot_be_negative_begins_at_0_or_above(

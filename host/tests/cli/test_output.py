@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import io
+import json
+import math
 import sys
 import unicodedata
 from collections.abc import Callable
@@ -49,6 +51,11 @@ def test_each_way_to_print_shows_them_as_escapes(
     printed = "".join(capsys.readouterr())
     assert "[31mred" in printed
     assert all(char.isprintable() for char in printed if char != "\n")
+
+
+def test_json_has_only_numbers_that_json_has(capsys: pytest.CaptureFixture[str]) -> None:
+    output.print_json({"mean": (1.5, -math.inf, math.inf), "none": math.nan})
+    assert json.loads(capsys.readouterr().out) == {"mean": [1.5, None, None], "none": None}
 
 
 def test_bars_show_names_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
