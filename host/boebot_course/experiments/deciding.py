@@ -18,7 +18,7 @@ were then counted, too. Starts and seeds are the same for all ways.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,49 +38,69 @@ WEIGHTS = {name: 2.0**-place for place, name in enumerate(ORDER)}  # of votes
 SIGNALS = np.round(np.arange(-0.7, 0.71, 0.05), 2)  # of each wheel, that are voted on
 WIDTH = 0.25  # σ of a vote over motor signals: commands nearer than two of them have one best between them
 FARTHEST_WITHOUT = 1.1 * 48.5 * 0.152  # m, of a robot that never charges (robot-economics)
-Rule = Callable[["Arbiter", Mapping[str, float]], str]
-"""The name of the one that drives, of those that call, with their utilities, in ORDER."""
-FIGURES = {"way": "m", "touches": "", "charging": "s"}
+FIGURES = {
+    "way_m": ("way driven", "m", FARTHEST_WITHOUT),
+    "touches": ("touches of whiskers", "", -math.inf),
+    "charging_s": ("time on the charger", "s", -math.inf),
+}
+"""Those of a run that are compared: in words, unit, and the least mean that is expected."""
+Rule = Callable[["Arbiter", Sequence[str]], Sequence[str]]
+"""Who drives, of those that call, in ORDER."""
 
 
 @dataclass(kw_only=True)
 class Arbiter(MotorBehavior):
-    """Has the motors all the time, and lets others drive, one at a time by `rule`; by default the first in ORDER.
+    """Has the motors all the time, and lets others drive by `rule`: one alone, or several by their votes.
 
     Its own utility, tanh 20 = 1, is above all others: by the brain's own rule it is always active.
     """
 
-    rule: Rule = field(default=lambda arbiter, calls: next(iter(calls)))
+    rule: Rule
     utility: Utility = field(default_factory=lambda: Utility(b=20.0))
 
     def govern(self, demo: Brain) -> Brain:
         """That brain, with this above it."""
         self.brain = Brain([self, *demo.given], demo.variables)
-        self.behaviors = {each.name: each for each in self.brain.processes if isinstance(each, MotorBehavior)}
+        self.behaviors = {each.name: each for each in demo.given}
         return self.brain
 
+    def useful(self, name: str) -> float:
+        """The present utility of a behavior."""
+        return self.brain.utility(self.behaviors[name])
+
     def enter(self, robot: Robot) -> None:
-        self.said: dict[str, Command] = {}  # by those that are active, last
+        self.said: dict[str, Command] = {}  # by those that drive, last
 
     def step(self, robot: Robot) -> None:
-        utilities = {name: self.brain.utility(self.behaviors[name]) for name in ORDER}
-        self.decide({name: utility for name, utility in utilities.items() if utility >= utilities["wander"]}, robot)
-
-    def decide(self, calls: Mapping[str, float], robot: Robot) -> None:
-        """One drives."""
-        name = self.rule(self, calls)
-        self.activate([name], robot)
-        self.behaviors[name].step(robot)
-
-    def activate(self, names: Collection[str], robot: Robot) -> None:
-        """These, and no others. What one drives that is active no more is over."""
-        for name in [name for name in self.said if name not in names]:
+        least = self.useful("wander")
+        driving = self.rule(self, [name for name in ORDER if self.useful(name) >= least])
+        for name in [name for name in self.said if name not in driving]:
             self.behaviors[name].exit(robot)
             del self.said[name]
-        for name in [name for name in names if name not in self.said]:
-            robot.stop()
-            self.behaviors[name].enter(robot)
+        for name in driving:
+            if name in self.said:
+                robot.command = self.said[name]  # what it does not say anew holds on
+            else:
+                robot.stop()
+                self.behaviors[name].enter(robot)
+            self.behaviors[name].step(robot)
             self.said[name] = robot.command
+        if len(driving) > 1:
+            left, right = voted(self.said)
+            if left or right:
+                robot.drive(left, right)
+            else:
+                robot.stop()
+
+
+def voted(said: Mapping[str, Command]) -> tuple[float, float]:
+    """Motor signals of the highest sum of votes."""
+    votes = np.zeros((len(SIGNALS), len(SIGNALS)))
+    for name, command in said.items():
+        left, right = (np.exp(-(((SIGNALS - own) / WIDTH) ** 2) / 2) for own in command[1:])
+        votes += WEIGHTS[name] * np.outer(left, right)
+    left, right = SIGNALS[list(np.unravel_index(votes.argmax(), votes.shape))]
+    return float(left), float(right)
 
 
 def tree() -> Rule:
@@ -90,84 +110,50 @@ def tree() -> Rule:
         BoebotError: py-trees is not installed.
     """
     trees = missing.imported("py_trees", "a behavior tree", "py-trees", "learn")
-    status = trees.common.Status
-    calls: dict[str, float] = {}
+    status, leaf = trees.common.Status, trees.meta.create_behaviour_from_function
+    calls: Sequence[str] = ()
     is_full = False
+    asked = leaf(lambda node: status.SUCCESS if node.name in calls else status.FAILURE)
+    drives = leaf(lambda node: status.SUCCESS if node.name == "charge" and is_full else status.RUNNING)
+    branches = [
+        trees.composites.Sequence(f"{name} if called", memory=name == "charge", children=[asked(name), drives(name)])
+        for name in ORDER
+    ]
+    root = trees.composites.Selector("robot", memory=False, children=branches)
 
-    def leaf(name: str, says: Callable[[], object]) -> object:
-        return trees.meta.create_behaviour_from_function(lambda node: says())(name)
-
-    def branch(name: str) -> object:
-        def asked() -> object:
-            return status.SUCCESS if name in calls else status.FAILURE
-
-        def driving() -> object:
-            return status.SUCCESS if name == "charge" and is_full else status.RUNNING
-
-        leaves = [leaf(f"{name}?", asked), leaf(name, driving)]
-        return trees.composites.Sequence(f"{name} if called", memory=name == "charge", children=leaves)
-
-    root = trees.composites.Selector("robot", memory=False, children=list(map(branch, ORDER)))
-
-    def rule(arbiter: Arbiter, called: Mapping[str, float]) -> str:
+    def rule(arbiter: Arbiter, called: Sequence[str]) -> Sequence[str]:
         nonlocal calls, is_full
-        calls = dict(called)
-        is_full = arbiter.other(ChargeBattery).charging and "charge" not in calls
+        calls, is_full = called, arbiter.other(ChargeBattery).charging and "charge" not in called
         root.tick_once()
-        return str(root.tip().name)
+        return [str(root.tip().name)]
 
     return rule
 
 
-@dataclass(kw_only=True)
-class Voting(Arbiter):
-    """Lets all that call step, and drives by their votes on commands."""
-
-    def decide(self, calls: Mapping[str, float], robot: Robot) -> None:
-        self.activate(calls.keys(), robot)
-        votes = np.zeros((len(SIGNALS), len(SIGNALS)))
-        for name, said in self.said.items():
-            robot.command = said  # what it does not say anew holds on
-            self.behaviors[name].step(robot)
-            self.said[name] = robot.command
-            left, right = (np.exp(-(((SIGNALS - own) / WIDTH) ** 2) / 2) for own in robot.command[1:])
-            votes += WEIGHTS[name] * np.outer(left, right)
-        signals = [float(SIGNALS[index]) for index in np.unravel_index(votes.argmax(), votes.shape)]
-        if any(signals):
-            robot.drive(*signals)
-        else:
-            robot.stop()
-
-
-def demo() -> Brain:
-    """The demonstration brain."""
-    return economics.sweeper(economics.BY_HAND)
-
-
-WAYS: dict[str, Callable[[], Brain]] = {
-    "utilities": demo,
-    "priorities": lambda: Arbiter().govern(demo()),
-    "tree": lambda: Arbiter(rule=tree()).govern(demo()),
-    "voting": lambda: Voting().govern(demo()),
+WAYS: dict[str, Callable[[Brain], Brain]] = {
+    "utilities": lambda demo: demo,
+    "priorities": lambda demo: Arbiter(rule=lambda arbiter, calls: calls[:1]).govern(demo),
+    "tree": lambda demo: Arbiter(rule=tree()).govern(demo),
+    "voting": lambda demo: Arbiter(rule=lambda arbiter, calls: calls).govern(demo),
 }
 
 
-def figures_of(brain: Brain, seed: int, seconds: float = SECONDS) -> dict[str, float]:
-    """Of one run from a free place by chance; "low": 1 where the battery ran down."""
+def figures_of(brain: Brain, seed: int) -> dict[str, float]:
+    """Of one run from a free place by chance."""
     described = economics.robot()
     pose = load_arena("station").free_start(described.body.reach_m, seed)
-    trial, low_after = economics.until_low(brain, described, seed, seconds, pose)
+    trial, low_after = economics.until_low(brain, described, seed, SECONDS, pose)
     record = decisions(trial.result)
     charging = record.values[:, record.names.variables.index("charging")] > 0
     utilities = np.column_stack([record.utility_of(name) for name in ORDER])
-    first = (utilities >= utilities[:, -1:]).argmax(axis=1)
+    called = (utilities >= utilities[:, -1:]).argmax(axis=1)
     return {
-        "way": trial.way,
-        "touches": float(trial.result.whisker_touches or 0),
-        "contacts": float(trial.result.true_contacts or 0),
-        "charging": float(charging.sum()) * brain.PERIOD,
-        "low": float(low_after < math.inf),
-        "otherwise": float((first != utilities.argmax(axis=1)).mean()),
+        "way_m": trial.way,
+        "touches": trial.result.whisker_touches or 0,
+        "contacts": trial.result.true_contacts or 0,
+        "charging_s": charging.sum() * brain.PERIOD,
+        "battery_low": low_after < math.inf,
+        "otherwise": (called != utilities.argmax(axis=1)).mean(),
     }
 
 
@@ -187,38 +173,24 @@ def deciding(seed: int) -> Outcome:
     any difference at least one of nine misses 0 in about a third of such sets of runs.
     """
     seeds = trial_seeds(seed, PAIRS)
-    runs = {name: [figures_of(brain(), one) for one in seeds] for name, brain in WAYS.items()}
-    found = {
-        name: {figure: np.array([run[figure] for run in those]) for figure in those[0]} for name, those in runs.items()
-    }
-    demo_runs = found["utilities"]
-    otherwise = 100 * float(demo_runs["otherwise"].mean())
+    runs = {way: [figures_of(made(economics.sweeper()), one) for one in seeds] for way, made in WAYS.items()}
+    found = {way: {name: np.array([run[name] for run in own], float) for name in own[0]} for way, own in runs.items()}
+    by_utility = found["utilities"]
+    otherwise = 100 * by_utility["otherwise"].mean()
     measured = [
         Measured("utilities: share of steps at which priorities would choose otherwise", otherwise, "%"),
-        Measured("contacts of the body, in all runs", sum(float(own["contacts"].sum()) for own in found.values())),
+        Measured("contacts of the body, in all runs", sum(own["contacts"].sum() for own in found.values())),
     ]
-    for name, own in found.items():
-        least = {"way": FARTHEST_WITHOUT}
-        measured += [
-            _said(f"{name}: {figure}", own[figure], unit, least.get(figure, -math.inf))
-            for figure, unit in FIGURES.items()
-        ]
-        low = int(own["low"].sum())
-        measured.append(Measured(f"{name}: runs whose battery ran down ({rates.in_words(low, PAIRS)})", low))
-        if name != "utilities":
-            measured += [
-                _said(f"{name} less utilities: {figure}", own[figure] - demo_runs[figure], unit, compared=True)
-                for figure, unit in FIGURES.items()
-            ]
+    for way, own in found.items():
+        low = int(own["battery_low"].sum())
+        measured.append(Measured(f"{way}: runs whose battery ran down ({rates.in_words(low, PAIRS)})", low))
+        for name, (what, unit, least) in FIGURES.items():
+            measured.append(_said(f"{way}: {what}", own[name], unit, least))
+            if way != "utilities":
+                less = own[name] - by_utility[name]
+                measured.append(_said(f"{way} less utilities: {what}", less, unit, compared=True))
     data = {"way_to_decide": np.repeat(list(WAYS), PAIRS), "seed": np.tile(seeds, len(WAYS))}
-    columns = {
-        "way": "way_m",
-        "touches": "touches",
-        "contacts": "contacts",
-        "charging": "charging_s",
-        "low": "battery_low",
-    }
-    data |= {column: np.concatenate([own[figure] for own in found.values()]) for figure, column in columns.items()}
+    data |= {name: np.concatenate([own[name] for own in found.values()]) for name in by_utility}
     return Outcome(measured, data, lambda figure: _draw(figure, found))
 
 
@@ -231,17 +203,16 @@ def _said(what: str, values: Floats, unit: str, least: float = -math.inf, *, com
 
 
 def _draw(figure: Figure, found: Mapping[str, Mapping[str, Floats]]) -> None:
-    words = {"way": "way driven (m)", "touches": "touches of whiskers", "charging": "time on the charger (s)"}
     panels = figure.subplots(2, len(FIGURES), sharex=True)
-    for column, (key, label) in enumerate(words.items()):
+    for (upper, lower), (name, (what, unit, _)) in zip(panels.T, FIGURES.items(), strict=True):
         for place, own in enumerate(found.values()):
-            for axes, values in zip(panels[:, column], (own[key], own[key] - found["utilities"][key]), strict=True):
+            for axes, values in (upper, own[name]), (lower, own[name] - found["utilities"][name]):
                 mean = rates.mean_of(values)
                 axes.plot(place + np.linspace(-0.3, -0.1, PAIRS), values, ".", color="0.75", markersize=4)
                 ends = [[mean.mean - mean.least], [mean.most - mean.mean]]
                 axes.errorbar([place + 0.1], [mean.mean], ends, fmt="o", color=f"C{place}", capsize=4)
-        panels[0, column].set_title(label, fontsize=10)
-        panels[1, column].axhline(0, color="0.5", linewidth=0.8)
-        panels[1, column].set_xticks(range(len(found)), list(found), rotation=30, fontsize=8)
+        upper.set_title(f"{what} ({unit})" if unit else what, fontsize=10)
+        lower.axhline(0, color="0.5", linewidth=0.8)
+        lower.set_xticks(range(len(found)), list(found), rotation=30, fontsize=8)
     panels[0, 0].set_ylabel("each")
     panels[1, 0].set_ylabel("less utilities, same seed")

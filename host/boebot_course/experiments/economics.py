@@ -16,9 +16,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from boebot.behaviors import Avoid, ChargeBattery, Wander, Withdraw
 from boebot.brain import Brain, Utility
-from boebot.cognition import BatteryLevel, contact, near
+from boebot.brains import load_brain
 from boebot.description.robots import RobotDescription, load_robot
 from boebot.errors import BoardError
 from boebot.running.loop import execute
@@ -28,27 +27,21 @@ from boebot_course.trials import Trial, decisions
 
 SECONDS = 300.0
 FARADS = 25.0 / 3  # three capacitors in a row
-FULL_V, EMPTY_V = 7.8, 5.0  # of the battery's level E; below, there is some way left to 4.73 V
+FULL_V = 7.8  # where the battery's level E is 1; it is 0 at 5 V, and below there is some way left to 4.73 V
 BEGIN_V, LOWEST_V = 6.68, 3.5  # as a run begins; as low as the world lets the capacitors run
 
-NEVER, ALWAYS = Utility(b=-9.0), Utility(b=9.0)
-BY_HAND = Utility(b=-1.7, w={"low": 3.2, "charging": 1.9})  # 1.5 - 3.2 E + 1.9 charging, low = 1 - E
-NAMES = {"never": NEVER, "always": ALWAYS, "by utility": BY_HAND}
+NEVER = Utility(b=-9.0)
+CHARGING = {"never": NEVER, "always": Utility(b=9.0), "by utility": None}
 
 
-def sweeper(charge: Utility) -> Brain:
-    """The demonstration brain with that utility of charging."""
-    battery = BatteryLevel(empty=EMPTY_V, full=FULL_V, tau=0.5)
-    return Brain(
-        [
-            Wander(turn_probability=0.002, utility=Utility(b=0.5)),
-            Avoid(utility=Utility(b=-1.0, w={"near": 3.0, "contact": 4.0})),
-            ChargeBattery(name="charge", utility=charge),
-            Withdraw(utility=Utility(b=-1.0)),
-            battery,
-        ],
-        [near(), contact(), battery.variable(), battery.charging_variable()],
-    )
+def sweeper(charge: Utility | None = None) -> Brain:
+    """The demonstration brain; with that utility of charging in place of its own."""
+    brain = load_brain("demo").brain
+    assert brain is not None
+    if charge is not None:
+        (own,) = [one for one in brain.given if one.name == "charge"]
+        brain.change(own, {"utility": charge})
+    return brain
 
 
 def robot(*, contacts: bool = True) -> RobotDescription:
@@ -108,7 +101,7 @@ def until_low(
     return Trial(result, brain), result.run_time if is_low else math.inf
 
 
-def live(charge: Utility, seed: int) -> Life:
+def live(charge: Utility | None, seed: int) -> Life:
     """A sweeper's run. Raises as `until_low`."""
     trial, low_after = until_low(sweeper(charge), robot(contacts=charge is not NEVER), seed)
     record = decisions(trial.result)
@@ -142,7 +135,7 @@ def economics(seed: int) -> Outcome:
     notices all but the first second of some 7.5 s: 0.109 ± 0.02. The other 262 s it works, 5.4 times 48.5 s: with a
     quarter off for turns and searches 4 times. Standing earns nothing but some millimetres.
     """
-    never, always, utility = (live(charge, seed) for charge in NAMES.values())
+    never, always, utility = (live(charge, seed) for charge in CHARGING.values())
     stands = utility.stands
     earned = float(np.diff(utility.work, prepend=0.0)[stands].sum())
     measured = [
@@ -162,7 +155,7 @@ def economics(seed: int) -> Outcome:
             "m",
         ),
     ]
-    lives = dict(zip(NAMES, (never, always, utility), strict=True))
+    lives = dict(zip(CHARGING, (never, always, utility), strict=True))
 
     def draw(figure: Figure) -> None:
         upper, lower = figure.subplots(2, sharex=True, height_ratios=(3, 1))
