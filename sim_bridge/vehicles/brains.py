@@ -15,7 +15,7 @@ from boebot.running.brain_parameters import set_parameters
 from boebot.running.direct_driver import DirectRobot
 from boebot.running.driver import whole_ticks
 from boebot.running.stepping import AT_LEISURE, StepTimes, StepWatch, step_once
-from boebot.running.tasks import prepare
+from boebot.running.tasks import expect, prepare
 from sim_bridge.compiled import lib
 from sim_bridge.vehicles.model import VehicleModel
 
@@ -58,8 +58,11 @@ class Brains:
         steps = steps_of(model, own_s)
         if self.loaded and steps != self.period_steps:
             raise BrainError(f"batch, world {world}: its brain has another period; expected one for all")
-        if self._values[world] is not None:
-            _set(f"batch, world {world}", loaded, self._values[world])
+        try:
+            expect("parameters", self._values[world], "values by name", Mapping, type(None))
+            set_parameters(loaded, self._values[world] or {})
+        except BoebotError as error:
+            raise BrainError(f"batch, world {world}: {error}") from None
         self.period_steps = steps
         self.loaded[world : world + 1] = [loaded]
         self._direct[world : world + 1] = [robot_of(model, steps * model.dt, seed)]
@@ -117,15 +120,6 @@ def _each(what: str, given: Any, count: int) -> Sequence[Any]:
     if len(each) != count:
         raise BrainError(f"batch: {len(each)} {what} for {count} worlds; expected one for all, or as many")
     return each
-
-
-def _set(who: str, brain: LoadedBrain, values: Any) -> None:
-    if not isinstance(values, Mapping):
-        raise BrainError(f"{who}: parameters are {shown(values)}; expected them by name")
-    try:
-        set_parameters(brain, values)
-    except BrainError as error:
-        raise BrainError(f"{who}: {error}") from None
 
 
 def _another(source: Any) -> Any:

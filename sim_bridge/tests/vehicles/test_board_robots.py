@@ -385,7 +385,7 @@ def test_each_world_has_its_own_brain_and_parameters(field: Path) -> None:
         batch_of(wandering, [{}] * 3)
     with pytest.raises(BrainError, match="batch: 1 brains for 2 worlds"):
         batch_of([wandering])
-    with pytest.raises(BrainError, match="batch, world 0: parameters are 3; expected them by name"):
+    with pytest.raises(BrainError, match="batch, world 0: parameters is 3; expected values by name"):
         batch_of(wandering, 3)
 
 
