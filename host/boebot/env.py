@@ -67,10 +67,7 @@ class BoardEnv(gymnasium.Env[Numbers, Numbers]):
         Raises:
             BoebotError: no such run can begin.
         """
-        self._asked = {
-            "robot": robot, "arena": arena, "on": on, "seconds": seconds, "period": period, "pose": pose,
-            "without": without, "imperfections": imperfections, "faults": faults,
-        }  # fmt: skip
+        self._asked = {name: value for name, value in locals().items() if name not in ("self", "reward", "final")}
         self._reward, self._final = reward, final
         self.result: RunResult | None = None
         self._episode: _Episode | None = _Episode({**self._asked, "seed": 1})
