@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 BOARDS_GROUP = "boebot.boards"  # kind, or "direct" -> WorldFactory
 DIRECT = "direct"  # what a robot without a board runs on
+DIRECT_ARENA = "arsim"  # and where, unless somebody says otherwise
 DEFAULT_BAUD = 500_000  # of a robot whose description names no serial line
 RESET_CAUSES = ("external", "watchdog")  # that a fault can have
 SERVERS_GROUP = "boebot.servers"  # any name -> Server
@@ -41,7 +42,7 @@ class BoardRequest:
     """The request for a board. Real boards heed `robot` only."""
 
     robot: RobotDescription
-    arena: str | None = None  # bundled name or .toml file; None: the simulator's default
+    arena: str | None = None  # bundled name or .toml file; None: that of `load_arena`, or DIRECT_ARENA
     seed: int = 1
     realtime: bool = False  # pace simulated time by the wall clock
     pose: tuple[float, float, float] | None = None  # x (m), y (m), heading (rad); None: the arena's own

@@ -7,23 +7,27 @@ start, seed. Brains are compared at equal seeds and starts, so their differences
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import cached_property
+import uuid
+from collections.abc import Iterable, Mapping
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self, TypeVar
 
 import msgspec
 import numpy as np
 
-from boebot.arenas import load_arena
-from boebot.boards import is_live
+from boebot.arenas import Arena, load_arena
+from boebot.boards import DIRECT_ARENA, is_live
 from boebot.brains import load_brain
 from boebot.description import toml_files
-from boebot.description.robots import Positive, idle
-from boebot.errors import CallError
+from boebot.description.robots import idle
+from boebot.errors import BoebotError, CallError
 from boebot.imperfections import checked, imperfections
+from boebot.record.interventions import Deed
 from boebot.running.brain_parameters import in_force
-from boebot.running.tasks import Member, Request, prepare
+from boebot.running.hands import Onlooker
+from boebot.running.loop import execute
+from boebot.running.tasks import Request, prepare
 from boebot_campaign import designs
 from boebot_campaign.designs import Design
 
@@ -96,7 +100,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     parameters: dict[str, Axis] = {}
     imperfections: dict[str, Axis] = {}
     faults: list[list[str]] = []
-    limit_s: Positive = 60.0
+    limit_s: Annotated[float, msgspec.Meta(gt=0, le=1e9)] = 60.0
 
     @cached_property
     def axes(self) -> list[tuple[str, AnyAxis]]:
@@ -180,6 +184,41 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
                 index = min(int(share * length(axis)), length(axis) - 1)
             values[name] = axis.low + share * (axis.high - axis.low) if isinstance(axis, Range) else _at(axis, index)
         return values
+
+    def request(self, case: Case, stamp: str) -> Request:
+        """The run of a case; `stamp`: another one where its files may be others."""
+        pose = case.pose
+        if pose is None and isinstance(self.starts, int) and self.starts:
+            arena, reach_m = _where(stamp, case.brain, case.robot, case.arena)
+            pose = arena.free_start(reach_m, ((self.first_seed << 32) + case.start) % 2**64)
+        return Request.single(
+            case.brain,
+            case.robot,
+            pose=pose,
+            parameters=dict(case.parameters) or None,
+            imperfections=heard(case.imperfections) or None,
+            arena=case.arena,
+            on=self.on,
+            seconds=self.seconds,
+            seed=case.seed,
+            step_timeout=self.limit_s,
+            faults=list(case.faults),
+        )
+
+
+@lru_cache(maxsize=8)
+def _where(stamp: str, brain: str, robot: str | None, arena: str | None) -> tuple[Arena, float]:
+    """The arena of such runs, and the radius of their robot (m)."""
+    del stamp
+    board = Request.single(brain, robot, arena=arena).tasks()[0].board
+    default = None if board.robot.has_board else DIRECT_ARENA
+    return load_arena(board.arena or default), board.robot.body.reach_m
+
+
+def heard(given: Mapping[str, float]) -> dict[str, float]:
+    """Without those that another one needs, which is 0 here: of a run alone they are refused."""
+    table = imperfections()
+    return {name: value for name, value in given.items() if given.get(table[name].needs, 1)}
 
 
 _P = TypeVar("_P", bound=Plan)
@@ -287,17 +326,15 @@ def _check_design(plan: Plan, at: str) -> None:
 
 
 def _check_runs(plan: Plan, at: str) -> None:
-    """Each brain with each robot, arena and choice of faults, and each value that is listed, is one that can run."""
+    """Each value that is listed is one that can be, and at the first point of the design and the first seed a run can
+    begin: of each brain with each robot in each arena, from each start and with each choice of faults."""
     for one, axis in plan.imperfections.items():
         for value in listed(axis):
             checked({one: value})
         if isinstance(axis, Range) and imperfections()[one].whole:
             raise CallError(f"{at}{one} takes whole numbers; expected a list of them, no range")
-    for name in [*plan.arenas, *plan.test_arenas]:
-        load_arena(name)
     for brain in plan.brains:
         loaded = load_brain(brain)
-        first = {name: listed(axis)[0] for name, axis in plan.parameters.items()}
         for name, axis in plan.parameters.items():
             for value in listed(axis):
                 with in_force(loaded, {name: value}):
@@ -307,10 +344,30 @@ def _check_runs(plan: Plan, at: str) -> None:
             for one in plan.imperfections:
                 if imperfections()[one].needs not in plan.imperfections and (fault := idle(one, description)):
                     raise CallError(f"{at}imperfections: {one} changes nothing: {fault}")
-            for faults in plan.faults or [[]]:
-                for arena in plan.all_arenas:
-                    member = Member(brain=loaded, robot=robot, parameters=first)
-                    Request(members=[member], arena=arena, on=plan.on, seconds=plan.seconds, faults=faults).tasks()
+    *most, points, faults, starts, seeds = plan.sizes
+    each, stamp = 1 if isinstance(plan.starts, int) else starts, uuid.uuid4().hex
+    for number in range(math.prod(most)):
+        for one in sorted({*range(each), *range(0, faults * starts, starts)}):
+            row = (number * points * faults * starts + one) * seeds
+            _begin(plan.request(plan.case(row, np.zeros((1, len(plan.axes)))), stamp))
+
+
+def _begin(request: Request) -> None:
+    """Begins a run, and ends it before the first step of its brain. Raises BoebotError: it cannot begin."""
+    error = execute(request, onlooker=_NoStep()).error
+    if error is not None and not isinstance(error, _BegunError):
+        raise error
+
+
+class _BegunError(BoebotError):
+    """The run has begun."""
+
+
+class _NoStep(Onlooker):
+    """Ends a run with that."""
+
+    def before_step(self, number: int, time_s: float) -> Iterable[Deed]:
+        raise _BegunError
 
 
 def listed(axis: AnyAxis) -> list[Any]:

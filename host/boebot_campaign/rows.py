@@ -19,14 +19,12 @@ from pathlib import Path
 from typing import Any
 
 from boebot import missing
-from boebot.arenas import Arena, load_arena
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
-from boebot.imperfections import imperfections
 from boebot.record.brain_record import BrainNames
 from boebot.record.run import FIGURES, SHARE
 from boebot.running.loop import execute
-from boebot.running.tasks import Request, prepare
+from boebot.running.tasks import Request
 from boebot_campaign.kept import Folder
 from boebot_campaign.plan import Case, Plan
 
@@ -81,45 +79,8 @@ def table_of(rows: list[dict[str, Any]], kinds: Mapping[str, type]) -> Any:
 
 def request_of(folder: Folder, case: Case) -> Request:
     """The run of a row, from the files that the folder keeps."""
-    plan, arena = folder.plan, folder.place(case.arena)
-    brain, robot = folder.place(case.brain), folder.place(case.robot)
-    pose = case.pose
-    if pose is None and isinstance(plan.starts, int) and plan.starts:
-        pose = _free(folder.stamp, arena, brain, robot, (plan.first_seed << 32) + case.start)
-    return Request.single(
-        brain,
-        robot,
-        pose=pose,
-        parameters=dict(case.parameters) or None,
-        imperfections=heard(case.imperfections) or None,
-        arena=arena,
-        on=plan.on,
-        seconds=plan.seconds,
-        seed=case.seed,
-        step_timeout=plan.limit_s,
-        faults=list(case.faults),
-    )
-
-
-def heard(given: Mapping[str, float]) -> dict[str, float]:
-    """Without those that another one needs, which is 0 here: of a run alone they are refused."""
-    table = imperfections()
-    return {name: value for name, value in given.items() if given.get(table[name].needs, 1)}
-
-
-@lru_cache(maxsize=4096)
-def _free(stamp: str, arena: str | None, brain: Any, robot: Any, seed: int) -> tuple[float, float, float]:
-    """A free start by chance, where that robot fits; each sweep has its stamp and files."""
-    loaded, description, _ = prepare(brain, robot, None)
-    if arena is None and robot is None:
-        arena = loaded.arena
-    return _arena(stamp, arena).free_start(description.body.reach_m, seed % 2**64)
-
-
-@lru_cache(maxsize=8)
-def _arena(stamp: str, name: str | None) -> Arena:
-    del stamp
-    return load_arena(name)
+    brain, robot, arena = (folder.place(name) for name in (case.brain, case.robot, case.arena))
+    return folder.plan.request(case._replace(brain=brain or "", robot=robot, arena=arena), folder.stamp)
 
 
 def begun(case: Case) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from boebot.arenas import load_arena
-from boebot.boards import BoardRequest
+from boebot.boards import DIRECT_ARENA, BoardRequest
 from boebot.errors import BoardError, CallError
 from sim_bridge.boards import avr
 from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
@@ -27,7 +27,6 @@ from sim_bridge.sim import NEVER, Sim, SimRobot
 from sim_bridge.vehicles import STEP_S as DIRECT_STEP_S
 
 STEP_S = 0.001  # of a world with boards
-DEFAULT_ARENA = "arsim"  # of robots without boards
 
 
 class Pace:
@@ -173,7 +172,7 @@ def avr_world(requests: Sequence[BoardRequest]) -> SimWorld:
 def direct_world(requests: Sequence[BoardRequest]) -> SimWorld:
     """Robots without boards, which motor signals drive. Raises as `SimWorld`."""
     first = requests[0]
-    return SimWorld([replace(first, arena=first.arena or DEFAULT_ARENA), *requests[1:]], None)
+    return SimWorld([replace(first, arena=first.arena or DIRECT_ARENA), *requests[1:]], None)
 
 
 def open_on(board: BoardKind, request: BoardRequest) -> SimSession:

@@ -15,8 +15,7 @@ from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
 from boebot_campaign import designs, kept, local, matters, tasks
 from boebot_campaign.matters import Matters, effects, shares
-from boebot_campaign.plan import Plan, Range, read_as
-from boebot_campaign.rows import heard
+from boebot_campaign.plan import Plan, Range, heard, read_as
 from boebot_campaign.sweep import Sweep
 from command import boebot
 from sim_bridge.robots.imperfections import applied

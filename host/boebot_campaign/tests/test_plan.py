@@ -10,6 +10,7 @@ import pytest
 
 import boebot
 from boebot.errors import BoebotError
+from boebot.running.loop import execute
 from boebot_campaign import designs, plan
 
 ONE = {"brains": ["demo"], "seconds": 1.0, "seeds": [1]}
@@ -43,6 +44,14 @@ def test_rows_are_all_combinations_each_once_and_seeds_are_paired() -> None:
     assert pairs[0] == pairs[1]
 
 
+def test_free_starts_are_of_the_arena_that_the_run_is_in() -> None:
+    made = plan.made({**ONE, "brains": ["wander"], "robots": ["arsim"], "seconds": 0.01, "starts": 50})
+    none = designs.points(made.design, made.points, 0, 1)
+    requests = [made.request(made.case(row, none), "") for row in range(made.count)]
+    assert len({request.members[0].pose for request in requests}) == 50
+    assert [execute(request).error for request in requests] == [None] * 50
+
+
 @pytest.mark.parametrize("design", ["random", "latin", "sobol"])
 def test_designs_fill_the_range_and_are_the_same_each_time(design: designs.Design) -> None:
     once, again = (designs.points(design, 64, 3, seed=4) for _ in range(2))
@@ -66,6 +75,22 @@ BAD = {
     "no brain file": ({"brains": ["none_such.py"]}, "no brain file .*none_such.py"),
     "no such arena": ({"arenas": ["rom"]}, "no arena 'rom'"),
     "no such fault": ({"faults": [["ping.mising@1"]]}, "ping.mising"),
+    "no such board": ({"on": "foo"}, "no board 'foo'; expected an emulated board"),
+    "board of a robot without": ({"brains": ["wander"], "robots": ["arsim"], "on": "native"}, "'arsim' has no board"),
+    "no board for a robot with one": ({"on": "direct"}, "driven by its board: it cannot run 'direct'"),
+    "second start inside a box": (
+        {"arenas": ["room"], "starts": [[0.0, 0.0, 0.0], [0.5, -0.5, 0.0]]},
+        "arena room: the robot cannot start at x = 0.5 m, y = -0.5 m: no free space",
+    ),
+    "no place is free": ({"arenas": ["cell.toml"], "starts": 2}, "arena cell: of 10,000 places none is free"),
+    "nor the arena's start": ({"arenas": ["cell.toml"]}, "arena cell: the robot cannot start at x = 0 m, y = 0 m"),
+    "period that no step of the world has": (
+        {"brains": ["hasty.py"], "robots": ["arsim"]},
+        "a brain period of 33 ms does not fit",
+    ),
+    "second choice of faults is of no part": ({"faults": [[], ["sonar.missing@0s"]]}, "has no 'sonar.missing'"),
+    "no time": ({"seconds": 0}, "a run cannot last 0 s"),
+    "limit beyond a clock": ({"limit_s": 1e12}, "limit_s: expected float <= "),
     "a port": ({"on": "/dev/ttyACM0"}, "a port"),
     "design without points": ({"design": "latin", "parameters": {"avoid.utility.b": {"from": 0, "to": 1}}}, "0 points"),
     "sobol of odd points": (
@@ -77,10 +102,23 @@ BAD = {
 }
 
 
+CELL = """\
+name = "cell"
+title = "4 cm by 4 cm"
+start = { x_m = 0.0, y_m = 0.0, heading_rad = 0.0 }
+[[outline]]
+name = "walls"
+corners_m = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]]
+"""
+
+
 @pytest.mark.parametrize(("keys", "sentence"), BAD.values(), ids=BAD.keys())
 def test_what_cannot_be_run_is_one_sentence_and_no_folder(
-    keys: dict[str, object], sentence: str, tmp_path: Path
+    keys: dict[str, object], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cell.toml").write_text(CELL)
+    (tmp_path / "hasty.py").write_text("PERIOD = 0.033\n\n\ndef step(robot):\n    pass\n")
     with pytest.raises(BoebotError) as caught:
         boebot.sweep(out=tmp_path / "out", **{**ONE, **keys})
     assert re.search(sentence, str(caught.value)) and "\n" not in str(caught.value)
