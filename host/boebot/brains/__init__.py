@@ -12,9 +12,9 @@ or a TOML file that composes such processes (boebot.brain.composition). A Python
 processes knows both by itself. `ROBOT = "shieldbot-line"` and `ARENA = "office"`, in a TOML file `robot` and `arena`,
 name the bundled ones of a run that names neither.
 
-Files are read anew for each run and each robot. A Brain object that is handed over is run itself, so that its maker
-can read its `steps` and `switches` afterwards: with each new run it begins afresh, and it drives one robot at a
-time.
+Files are read anew for each run and each robot, with the modules beside them that they import as they are loaded; what
+a step imports is found as in the script. A Brain object that is handed over is run itself, so that its maker can read
+its `steps` and `switches` afterwards: with each new run it begins afresh, and it drives one robot at a time.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ _NOBODYS = ("<frozen ", *(f"{folder}{os.sep}" for folder in _OTHERS))  # what fi
 PYTHON, TOML = ".py", ".toml"  # what brains are written in
 PROGRAMS = (".elf", ".hex")  # for the board: they drive a robot in place of a brain
 SKETCHES = (".ino", ".pde", ".ini")  # of which one is built
+_loading = threading.RLock()  # a process has one table of modules, whatever its threads load
 _executing: set[tuple[Path, int]] = set()  # files that are being loaded, each with its thread
 _beside: dict[Path, dict[str, ModuleType]] = {}  # what each brain's file has imported, as it was last loaded
 
@@ -303,7 +304,7 @@ def _execute(path: Path) -> ModuleType:
     try:
         process = os.getpid()
         _executing.add(loading)
-        with _neighbours(path):
+        with _loading, _neighbours(path):
             code = compile(path.read_bytes(), str(path), "exec", dont_inherit=True)
             exec(code, module.__dict__)
     except KeyboardInterrupt:
@@ -316,19 +317,28 @@ def _execute(path: Path) -> ModuleType:
     return module
 
 
-def beside(path: Path) -> list[Path]:
-    """The user's files that a brain's file has imported, as it was last loaded."""
-    return [Path(str(module.__file__)).resolve() for module in _beside.get(path, {}).values()]
+def beside(path: Path) -> set[Path]:
+    """The user's Python files in a brain's folder, and below, that are loaded: by the brain's own file, as it was last
+    loaded, or by others of this process."""
+    modules = {**sys.modules, **_beside.get(path, {})}.items()
+    files = {Path(file).resolve() for name, module in modules if name != "__main__" and (file := _file(module))}
+    return {file for file in files if file.suffix == PYTHON and file.is_relative_to(path.parent) and file.is_file()}
 
 
 @contextlib.contextmanager
 def _neighbours(path: Path) -> Iterator[None]:
-    """Lets a brain import files beside it, as a script may, and as they are now: what another brain has imported, or
-    this one before, has no part in it."""
+    """Lets a brain import files beside it, as a script may, and as they are now. What other brains have imported, or
+    this one before, has no part in it; nor have the script's own modules of those names. They come back afterwards."""
     entry = str(path.parent)
-    for name, module in [item for modules in _beside.values() for item in modules.items()]:
-        if sys.modules.get(name) is module:
-            del sys.modules[name]
+    of = {id(module): brain.parent for brain, modules in _beside.items() for module in modules.values()}
+    scripts = {
+        name for name, module in [*sys.modules.items()] if id(module) not in of and _is_another(name, path.parent)
+    }
+    hidden = {
+        name: sys.modules.pop(name)
+        for name, module in [*sys.modules.items()]
+        if id(module) in of or name.partition(".")[0] in scripts
+    }
     before = set(sys.modules)
     sys.path.insert(0, entry)
     importlib.invalidate_caches()
@@ -337,12 +347,37 @@ def _neighbours(path: Path) -> Iterator[None]:
     finally:
         with contextlib.suppress(ValueError):
             sys.path.remove(entry)
-        new = {name: module for name, module in sys.modules.items() if name not in before}
-        _beside[path] = {
-            name: module
-            for name, module in new.items()
-            if is_users(str(getattr(module, "__file__", None) or "<frozen ")) and not name.startswith("boebot_brain_")
-        }
+        new = [item for item in [*sys.modules.items()] if item[0] not in before and _file(item[1])]
+        _beside[path] = {name: module for name, module in new if not name.startswith("boebot_brain_")}
+        for name, module in _beside[path].items():
+            _forget(module)
+            if name.partition(".")[0] in scripts:
+                del sys.modules[name]
+        for name, module in hidden.items():
+            if of.get(id(module)) != path.parent:
+                sys.modules.setdefault(name, module)
+
+
+def _file(module: object) -> str:
+    """Of a user's module, or of a package that has none its folder; of others ""."""
+    file = getattr(module, "__file__", None) or next(iter(getattr(module, "__path__", ())), None)
+    return file if isinstance(file, str) and is_users(file) else ""
+
+
+def _is_another(name: str, folder: Path) -> bool:
+    """A user's module, no part of a package, from elsewhere has the name of one in that folder."""
+    if "." in name or name == "__main__" or not (file := _file(sys.modules.get(name))):
+        return False
+    there = [folder / f"{name}.py", *(folder / name).glob("*.py")]
+    return any(map(Path.is_file, there)) and not any(Path(file).resolve() in (one, one.parent) for one in there)
+
+
+def _forget(module: ModuleType) -> None:
+    """Removes its .pyc where an edit within the same second would not show."""
+    with contextlib.suppress(AttributeError, OSError, TypeError):
+        source, made = Path(str(module.__file__)), Path(str(module.__cached__))
+        if made.stat().st_mtime - source.stat().st_mtime < 2.0:  # s
+            made.unlink()
 
 
 def _from_module(module: ModuleType, path: Path | None) -> LoadedBrain:

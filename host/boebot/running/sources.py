@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from boebot import brains
@@ -98,19 +97,8 @@ def _description(prefix: str, name: str | Path) -> dict[str, bytes]:
 
 def _brain(path: Path) -> dict[str, bytes]:
     """A brain's file, and what it has imported from its folder, by their names there."""
-    files = {path, *_imported(path.parent), *(one for one in brains.beside(path) if one.is_relative_to(path.parent))}
-    return {file.relative_to(path.parent).as_posix(): file.read_bytes() for file in sorted(files)}
-
-
-def _imported(folder: Path) -> Iterator[Path]:
-    """Python files of the user's own below a folder that have been imported."""
-    for name, module in list(sys.modules.items()):
-        file = getattr(module, "__file__", None)
-        if name == "__main__" or not isinstance(file, str) or not brains.is_users(file):
-            continue
-        path = Path(file).resolve()
-        if path.suffix == brains.PYTHON and path.is_relative_to(folder) and path.is_file():
-            yield path
+    files = sorted({path, *brains.beside(path)})
+    return {file.relative_to(path.parent).as_posix(): file.read_bytes() for file in files}
 
 
 def _is_same(path: Path, data: bytes) -> bool:

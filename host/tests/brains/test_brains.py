@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import os
 import re
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -190,6 +195,60 @@ def test_what_a_brain_imports_is_what_lies_beside_it_now(tmp_path: Path) -> None
         brain.write_text("from helper import SPEED\n\n\ndef step(robot):\n    pass\n\n\nPERIOD = SPEED\n")
         found[folder] = brain
     assert [load_brain(found[one]).period for one in ("slow", "fast", "slow")] == [0.25, 0.75, 0.25]
-    assert beside(found["fast"]) == [tmp_path / "fast" / "helper.py"]
+    assert beside(found["fast"]) == {found["fast"], tmp_path / "fast" / "helper.py"}
     (tmp_path / "slow" / "helper.py").write_text("SPEED = 1.125\n")
     assert load_brain(found["slow"]).period == 1.125
+
+
+STEP = "\n\ndef step(robot):\n    pass\n"
+
+
+def brain_beside(folder: Path, helper: str, speed: float) -> Path:
+    """A brain's file, whose period is the SPEED of that helper."""
+    (folder / helper).parent.mkdir(parents=True)
+    (folder / helper).write_text(f"import time\ntime.sleep(0.002)\nSPEED = {speed}\n")
+    module = helper.removesuffix(".py").replace("/", ".")
+    return write(folder, f"from {module} import SPEED as PERIOD\n{STEP}")
+
+
+@pytest.mark.parametrize("helper", ["helper.py", "parts/helper.py"])
+def test_a_script_and_a_brain_each_have_their_own_module_of_a_name(
+    helper: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    brain, script = brain_beside(tmp_path / "brain", helper, 0.25), brain_beside(tmp_path / "script", helper, 0.75)
+    monkeypatch.syspath_prepend(script.parent)
+    monkeypatch.delitem(sys.modules, helper.split("/")[0].removesuffix(".py"), raising=False)
+    module = helper.removesuffix(".py").replace("/", ".")
+    mine = importlib.import_module(module)
+    before = dict(sys.modules)
+    assert load_brain(brain).period == 0.25 and beside(brain) == {brain, brain.parent / helper}
+    assert mine.SPEED == 0.75 and importlib.import_module(module) is mine
+    assert {name for name in before if sys.modules.get(name) is not before[name]} <= {"boebot_brain_mine"}
+    assert not {name for name in sys.modules.keys() - before.keys() if name.startswith(("helper", "parts"))}
+    assert load_brain(script).period == 0.75 and beside(script) == {script, script.parent / helper}
+
+
+def test_what_a_brain_has_imported_is_there_while_another_one_is_run(tmp_path: Path) -> None:
+    one, other = brain_beside(tmp_path / "one", "of_one.py", 1), brain_beside(tmp_path / "other", "of_other.py", 2)
+    write(
+        other.parent, "try:\n    import of_one\nexcept ImportError:\n    from of_other import SPEED as PERIOD\n" + STEP
+    )
+    load_brain(one)
+    mine = sys.modules["of_one"]
+    assert load_brain(other).period == 2 and sys.modules["of_one"] is mine and "of_other" in sys.modules
+
+
+def test_brains_that_threads_load_have_their_own_modules(tmp_path: Path) -> None:
+    brains = [brain_beside(tmp_path / str(number), "helper.py", number) for number in range(1, 5)]
+    with ThreadPoolExecutor(4) as pool:
+        assert [loaded.period for loaded in pool.map(load_brain, brains * 5)] == [1, 2, 3, 4] * 5
+
+
+def test_an_edit_within_a_second_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    brain = brain_beside(tmp_path / "brain", "helper.py", 1)
+    now = time.time()
+    for speed in (2, 3, 4):
+        (brain.parent / "helper.py").write_text(f"SPEED = {speed}\n")
+        os.utime(brain.parent / "helper.py", (now, now))
+        assert load_brain(brain).period == speed

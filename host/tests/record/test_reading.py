@@ -164,7 +164,6 @@ def test_repetition_uses_the_recorded_files(
         Path(name).unlink()
     Path("one/one_speed.py").write_text("SPEED = 0.3\n")
     Path("two/brain.py").write_text("# another one\n" + brains["two/brain.py"])
-    sys.modules.pop("one_speed")  # as in a new process
     ran = Path("ran")
     Path("two/brain.py").write_text(f"open({str(ran)!r}, 'w')\n" + brains["two/brain.py"])
     code, out, err = boebot(capsys, "replay", "run", "--again")
