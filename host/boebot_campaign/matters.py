@@ -141,7 +141,7 @@ def _values(folder: Folder, figure: str) -> np.ndarray:
     table = folder.table(["status", figure])
     values: np.ndarray = np.where(table["status"].to_numpy() == OK, table[figure].to_numpy(), np.nan).astype(float)
     if len(gaps := np.flatnonzero(np.isnan(values))):
-        few = f"{len(gaps):,} of {len(values):,} runs are not ok or have no {figure}, the first is row {gaps[0]}"
+        few = f"not ok or without {figure}: {len(gaps):,} of {len(values):,} runs, the first is row {gaps[0]}"
         raise BoebotError(f"{few} of {folder.path}; expected it of each, as effects need all settings")
     return np.asarray(values.reshape(folder.plan.sizes).mean(axis=(0, 1, 2, 4, 5)))
 

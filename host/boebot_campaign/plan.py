@@ -23,6 +23,7 @@ from boebot.description import toml_files
 from boebot.description.robots import idle
 from boebot.errors import BoebotError, CallError
 from boebot.imperfections import checked, imperfections
+from boebot.record.figures import counted
 from boebot.record.interventions import Deed
 from boebot.running.brain_parameters import in_force
 from boebot.running.hands import Onlooker
@@ -307,22 +308,21 @@ def _checked(plan: _P, at: str) -> _P:
 def _check_design(plan: Plan, at: str) -> None:
     for name, axis in plan.axes:
         if isinstance(axis, Range) and plan.design == "grid" and axis.steps < 2:
-            raise CallError(f"{at}{name} has {axis.steps} steps; expected 2 or more in a grid")
+            raise CallError(f"{at}{name} has {counted(axis.steps, 'step', 'steps')}; expected 2 or more in a grid")
         if isinstance(axis, Range) and plan.design != "grid" and axis.steps:
             raise CallError(f"{at}{name} has steps, which only a grid takes; expected from and to")
         if isinstance(axis, list) and plan.design == "two-level" and len(axis) != 2:
-            raise CallError(f"{at}{name} has {len(axis)} values; expected two in a two-level design")
+            raise CallError(f"{at}{name} lists {len(axis)}; expected two values in a two-level design")
     is_counted = plan.design in ("grid", "two-level")
     axes = len(plan.parameters) + len(plan.imperfections)
+    what = f"a {plan.design} design has {counted(plan.points, 'point', 'points')}"
     if is_counted and plan.points:
-        what = f"a {plan.design} design has {plan.points} points"
         raise CallError(f"{at}{what}; it has as many as its values make: expected no points")
     if plan.design in ("sobol", "saltelli") and plan.points & (plan.points - 1):
-        near = 1 << plan.points.bit_length()
-        raise CallError(f"{at}a {plan.design} design has {plan.points} points; expected a power of two, such as {near}")
+        raise CallError(f"{at}{what}; expected a power of two, such as {1 << plan.points.bit_length()}")
     if plan.design != "grid" and (plan.points < 1 - is_counted or not axes):
         expected = f"expected {'' if is_counted else 'both points and '}values of parameters or imperfections"
-        raise CallError(f"{at}a {plan.design} design has {plan.points} points over {axes} axes; {expected}")
+        raise CallError(f"{at}{what} over {counted(axes, 'axis', 'axes')}; {expected}")
 
 
 def _check_runs(plan: Plan, at: str) -> None:

@@ -25,7 +25,7 @@ def rows(values: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 
 def counted(number: int, one: str, many: str) -> str:
     """ "1 contact", "2 contacts"."""
-    return f"{number} {one if number == 1 else many}"
+    return f"{number:,} {one if number == 1 else many}"
 
 
 def text(value: Any) -> str:

@@ -129,7 +129,7 @@ BAD = {
     "samples": (("samples = 4", "samples = 5"), "samples is 5; expected a power of two"),
     "a design": (("samples = 4", 'design = "grid"'), "design"),
     "idle": (("samples = 4", "[imperfections]\nservo_lag_s = [0, 0.1]"), "servo_lag_s changes nothing"),
-    "three values": (("samples = 4", "[imperfections]\ntyre_grip = [0.1, 0.5, 1]"), "3 values; expected two"),
+    "three values": (("samples = 4", "[imperfections]\ntyre_grip = [0.1, 0.5, 1]"), "lists 3; expected two"),
     "whole": (("samples = 4", "[imperfections]\ntyre_slip = { from = 0, to = 1 }"), "takes whole numbers"),
 }
 

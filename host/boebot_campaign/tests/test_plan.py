@@ -93,6 +93,7 @@ BAD = {
     "limit beyond a clock": ({"limit_s": 1e12}, "limit_s: expected float <= "),
     "a port": ({"on": "/dev/ttyACM0"}, "a port"),
     "design without points": ({"design": "latin", "parameters": {"avoid.utility.b": {"from": 0, "to": 1}}}, "0 points"),
+    "design without axes": ({"design": "latin", "points": 1}, "has 1 point over 0 axes"),
     "sobol of odd points": (
         {"design": "sobol", "points": 100, "parameters": {"avoid.utility.b": {"from": 0, "to": 1}}},
         "power of two",
