@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import contextlib
+import logging
 import os
 import re
 import subprocess
@@ -36,28 +37,24 @@ LOOK_S = 1.0  # from look to look at how many workers there are
 BACK_S = 60.0  # wait for a scheduler that has gone
 DEATHS = 5  # more of a task than its rows can account for
 LOG = ".workers.log"
+LOST = "the scheduler has gone; the same command goes on where it was"
 
 _GONE = (OSError, TimeoutError, asyncio.CancelledError, concurrent.futures.CancelledError)
 Told = Callable[[int], object]
 """Is called with how many rows are done."""
 
 
-class Workers:
+class Workers(contextlib.ExitStack):
     """Those of this computer, or of a scheduler. They begin with the first rows, and stay until the block ends."""
 
     def __init__(self, scheduler: str | None, count: int | None, log: Path) -> None:
         """`count`: of this computer, or one for each processor; `log`: file of what they print. Raises CallError."""
+        super().__init__()
         if count is not None and (scheduler is not None or count < 1):
             raise CallError(f"workers is {count}; expected at least 1, and none with a scheduler")
-        self._scheduler, self._count, self._log = scheduler, count or os.cpu_count() or 1, log
-        self._ends = contextlib.ExitStack()
+        self.is_local, self.log = scheduler is None, log
+        self._address, self._count = scheduler or "", count or os.cpu_count() or 1
         self._client: Any = None
-
-    def __enter__(self) -> Workers:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ends.close()
 
     def run(self, folder: Folder, told: Told) -> None:
         """Runs all rows of a sweep that are not done.
@@ -68,21 +65,32 @@ class Workers:
         if not folder.undone():
             return
         if self._client is None:
-            address = self._scheduler or self._ends.enter_context(_local(self._log, self._count))
-            self._client = self._ends.enter_context(_client(_distributed(), address))
-            _check(self._client, folder, _distributed())
-        _Work(self._client, folder, told, self._log, is_local=self._scheduler is None).all()
+            if self.is_local:
+                self._address = self.enter_context(_local(self.log, self._count))
+            try:
+                _check(self.client(), folder, _distributed())
+            except _GONE as error:
+                raise BoebotError(f"{LOST} ({error})") from None
+        _Work(self, folder, told).all()
+
+    def client(self) -> Any:
+        """Of the scheduler; another one when the last has closed, as it does 10 s after its scheduler has gone.
+
+        Raises:
+            CallError: there is no scheduler.
+        """
+        if self._client is None or self._client.status == "closed":
+            self._client = self.enter_context(_client(_distributed(), self._address))
+        return self._client
 
 
 class _Work:
     """The rows on their way."""
 
-    def __init__(self, client: Any, folder: Folder, told: Told, log: Path, *, is_local: bool) -> None:
-        self._client, self._folder, self._told, self._is_local = client, folder, told, is_local
-        self._log = log
+    def __init__(self, ours: Workers, folder: Folder, told: Told) -> None:
+        self._ours, self._folder, self._told = ours, folder, told
         self._gaps = deque(folder.undone())
-        self._count = folder.plan.count
-        self._done = self._count - sum(end - first for first, end in self._gaps)
+        self._done = folder.plan.count - sum(end - first for first, end in self._gaps)
         self._row_s: float | None = None
         self._workers, self._looks_s, self._seen_s = 1, 0.0, time.perf_counter()
         self._pending: dict[Any, tuple[int, int]] = {}
@@ -103,11 +111,13 @@ class _Work:
         if now < self._looks_s:
             return
         self._looks_s = now + LOOK_S
-        with contextlib.suppress(*_GONE):  # the scheduler has gone: its tasks say so
-            self._workers = len(self._client.nthreads())
+        try:
+            self._workers = len(self._ours.client().nthreads())
+        except _GONE:
+            self._wait_for_scheduler()
         self._seen_s = now if self._workers else self._seen_s
-        if self._is_local and now - self._seen_s > BACK_S:
-            raise BoebotError(f"the workers of this computer have ended; {self._log} may say why")
+        if self._ours.is_local and now - self._seen_s > BACK_S:
+            raise BoebotError(f"the workers of this computer have ended; {self._ours.log} may say why")
 
     def _submit(self) -> None:
         most = AHEAD * max(self._workers, 1)
@@ -121,7 +131,7 @@ class _Work:
 
     def _send(self, first: int, end: int) -> None:
         work = do_part, str(self._folder.path), self._folder.stamp, first, end
-        future = self._client.submit(*work, key=f"boebot-{first}-{end}-{uuid.uuid4().hex}", pure=False)
+        future = self._ours.client().submit(*work, key=f"boebot-{first}-{end}-{uuid.uuid4().hex}", pure=False)
         self._pending[future] = first, end
 
     def _settle(self, future: Any, first: int, end: int) -> None:
@@ -140,21 +150,21 @@ class _Work:
             raise BoebotError(f"a worker of the sweep has failed: {type(error).__name__}: {error}")
         deaths = self._deaths[first, end] = self._deaths.get((first, end), 0) + 1
         if deaths > DEATHS + 2 * (end - first):
-            raise BoebotError(f"workers die before they begin; {self._log} may say why")
+            raise BoebotError(f"workers die before they begin; {self._ours.log} may say why")
         if error is None:
             self._wait_for_scheduler()
         self._send(first, end)
 
     def _wait_for_scheduler(self) -> None:
         """After its end; of this computer there is no other."""
-        until = time.perf_counter() + (0.0 if self._is_local else BACK_S)
+        until = time.perf_counter() + (0.0 if self._ours.is_local else BACK_S)
         while True:
-            with contextlib.suppress(*_GONE):
-                if self._client.status == "running":
-                    self._client.wait_for_workers(1, timeout=1.0)
+            with contextlib.suppress(*_GONE, CallError):
+                if (client := self._ours.client()).status == "running":
+                    client.wait_for_workers(1, timeout=1.0)
                     return
             if time.perf_counter() > until:
-                raise BoebotError("the scheduler has gone; the same command goes on where it was")
+                raise BoebotError(LOST)
             time.sleep(POLL_S)
 
 
@@ -192,11 +202,14 @@ def _client(distributed: Any, address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=10.0, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise CallError(f"there is no scheduler at {address}: {error}; expected one as tcp://HOST:PORT") from None
+    logger = logging.getLogger("distributed.client")
+    logger.disabled = True  # that the scheduler has gone is said here, in one sentence
     try:
         yield client
     finally:
         with contextlib.suppress(Exception):  # it may have gone, and then all is said
             client.close(timeout=2.0)
+        logger.disabled = False
 
 
 def seen(probe: str) -> tuple[bool, str]:

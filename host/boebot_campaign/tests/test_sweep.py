@@ -13,6 +13,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -365,31 +366,46 @@ def test_a_sweep_outlives_a_scheduler_that_is_begun_anew(undisturbed: Path, tmp_
     url = f"tcp://127.0.0.1:{port}"
     dask = [sys.executable, "-m", "dask"]
     begun: list[subprocess.Popen[Any]] = []
-    log = (tmp_path / "log").open("w")
+    logs = {name: tmp_path / name for name in ("dask", "sweep")}
 
-    def begin(command: list[str]) -> subprocess.Popen[Any]:
-        begun.append(subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=log))
+    def begin(command: list[str], log: str = "dask") -> subprocess.Popen[Any]:
+        with logs[log].open("a") as file:
+            begun.append(subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=file))
         return begun[-1]
 
-    def cluster() -> subprocess.Popen[Any]:
-        scheduler = begin([*dask, "scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"])
-        begin([*dask, "worker", url, "--nthreads", "1", "--no-dashboard"])
-        return scheduler
+    def scheduler() -> subprocess.Popen[Any]:
+        return begin([*dask, "scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"])
 
-    try:
-        first = cluster()
-        sweep = begin([*COMMAND, str(file), "--out", str(out), "--scheduler", url])
+    def worker() -> None:
+        begin([*dask, "worker", url, "--nthreads", "1", "--no-dashboard"])
+
+    def wait_until(it_is: Callable[[], object]) -> None:
         until = time.perf_counter() + 60
-        while not list(out.glob("parts/*.parquet")) and time.perf_counter() < until:
+        while not it_is() and time.perf_counter() < until:
             time.sleep(0.02)
+
+    sweep = [*COMMAND, str(file), "--out", str(out), "--scheduler", url]
+    try:
+        first = scheduler()
+        waits = begin(sweep, "sweep")
+        wait_until(lambda: "Receive client connection" in logs["dask"].read_text())
+        time.sleep(2)  # it is connected, and waits for workers
+        first.kill()
+        assert waits.wait(60) == 1 and logs["sweep"].read_text().count("\n") == 1
+        first = scheduler()
+        worker()
+        goes_on = begin(sweep, "sweep")
+        wait_until(lambda: list(out.glob("parts/*.parquet")))
         first.kill()
         first.wait()
-        cluster()
-        assert sweep.wait(90) == 0, (tmp_path / "log").read_text()
+        time.sleep(12)  # after 10 s a client of Dask closes
+        scheduler()
+        worker()
+        assert goes_on.wait(90) == 0, logs["sweep"].read_text()
+        assert logs["sweep"].read_text().count("\n") == 1
         assert rows_of(out) == rows_of(undisturbed / "out")
     finally:
         for process in begun:
             process.terminate()
         for process in begun:
             process.wait(20)
-        log.close()
