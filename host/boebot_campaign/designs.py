@@ -4,14 +4,12 @@ random      by chance
 latin       a Latin hypercube (McKay, Beckman and Conover, Technometrics 21, 1979)
 sobol       Sobol's sequence, scrambled
 two-level   each axis at one of its ends: columns of a Hadamard matrix and their negative (Box and Hunter,
-            Technometrics 3, 1961). Resolution IV: no effect of one axis is mixed with one of two axes together; of nine
-            axes or fewer VI: nor with one of four or fewer
+            Technometrics 3, 1961). Resolution IV: no effect of one axis is mixed with one of two axes together
 saltelli    for Sobol indices (Saltelli et al., Computer Physics Communications 181, 2010)
 """
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -24,21 +22,13 @@ Design = Literal["grid", "random", "latin", "sobol", "two-level", "saltelli"]
 def length(design: Design, count: int, axes: int) -> int:
     """How many points a design has that is asked for with `count`; of a grid that is arithmetic."""
     if design == "two-level":
-        return 2 * _hadamard(axes)[0]
+        return 2 * _order(axes)
     return count * (axes + 2) if design == "saltelli" else count
 
 
-def _hadamard(axes: int) -> tuple[int, list[int]]:
-    """Order of the matrix, a power of two, and the column of each axis. Column a ^ b ^ c is the product of three; those
-    that are none of earlier ones are taken first."""
-    order, apart = 1, [0]
-    while len(apart) < axes and order < 64:
-        order, apart = 2 * order, []
-        for column in range(order):
-            if all(column != a ^ b ^ c for a, b, c in combinations(apart, 3)):
-                apart.append(column)
-    order = max(order, 1 << max(axes - 1, 0).bit_length())
-    return order, [*apart, *sorted(set(range(order)) - set(apart))][:axes]
+def _order(axes: int) -> int:
+    """Of the matrix: a power of two, with a column for each axis."""
+    return 1 << max(axes - 1, 0).bit_length()
 
 
 def points(design: Design, count: int, axes: int, seed: int) -> np.ndarray:
@@ -50,8 +40,7 @@ def points(design: Design, count: int, axes: int, seed: int) -> np.ndarray:
         return np.random.default_rng(seed).random((count, axes))
     what = f"a {design} design"
     if design == "two-level":
-        order, columns = _hadamard(axes)
-        signs = missing.imported("scipy.linalg", what, "scipy", "sweep").hadamard(order)[:, columns]
+        signs = missing.imported("scipy.linalg", what, "scipy", "sweep").hadamard(_order(axes))[:, :axes]
         return np.asarray(np.vstack([signs, -signs]) > 0, dtype=float)
     if design == "saltelli":
         sobol = missing.imported("SALib.sample.sobol", what, "SALib", "learn")

@@ -33,15 +33,13 @@ samples = 4
 """
 
 
-@pytest.mark.parametrize(("axes", "mixed_with"), [(3, 4), (6, 4), (9, 4), (10, 2), (34, 2), (65, 2)])
-def test_a_two_level_design_mixes_no_effect_with_that_of_as_many_axes_together(axes: int, mixed_with: int) -> None:
+@pytest.mark.parametrize(("axes", "runs"), [(1, 2), (4, 8), (5, 16), (34, 128), (65, 256)])
+def test_a_two_level_design_mixes_no_effect_with_that_of_two_axes_together(axes: int, runs: int) -> None:
     signs = 2 * designs.points("two-level", 0, axes, 1) - 1
-    assert len(signs) == designs.length("two-level", 0, axes) and set(signs.flat) == {-1, 1}
-    assert (signs.T @ signs == len(signs) * np.eye(axes)).all()
-    for count in range(2, mixed_with + 1):
-        for some in combinations(range(min(axes, 12)), count):
-            others = np.delete(signs, some, axis=1)
-            assert not (signs[:, some].prod(axis=1) @ others).any()
+    assert len(signs) == designs.length("two-level", 0, axes) == runs and set(signs.flat) == {-1, 1}
+    assert (signs.T @ signs == runs * np.eye(axes)).all() and not signs.sum(axis=0).any()
+    for some in combinations(range(min(axes, 12)), 2):
+        assert not (signs[:, some].prod(axis=1) @ signs).any()
 
 
 def test_in_a_saltelli_design_the_seed_is_an_axis() -> None:
@@ -167,7 +165,7 @@ def test_the_command_writes_a_page_and_goes_on_where_it_was(
     assert friction["counts"] and friction["effect"][2] < 0 and friction["ends"] == [0.0, 0.02]
     counting = [one["name"] for one in said["effects"] if one["counts"]]
     assert [one["name"] for one in said["indices"]] == [*counting[:5], "seed"]
-    assert ran == [("effects", 16 * 2), ("indices", 4 * (len(counting[:5]) + 3))]
+    assert ran == [("effects", 8 * 2), ("indices", 4 * (len(counting[:5]) + 3))]
     page = (out / "index.md").read_text()
     assert all(f"| {name} |" in page for name in counting) and (out / "matters.png").stat().st_size > 10_000
     code, text, errors = boebot(capsys, *command)
