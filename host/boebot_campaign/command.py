@@ -86,7 +86,9 @@ def _took_s(asked: plan.Plan) -> float:
         for number in range(len(asked.brains)):
             for _ in range(2):
                 begun_s = time.perf_counter()
-                execute(request_of(folder, asked.case(number * each, folder.points)))
+                error = execute(request_of(folder, asked.case(number * each, folder.points))).error
+                if isinstance(error, KeyboardInterrupt):
+                    raise error
             took_s += time.perf_counter() - begun_s
     return asked.count * took_s / len(asked.brains)
 

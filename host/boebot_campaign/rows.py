@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from boebot import missing
-from boebot.brains import load_brain
+from boebot.brains import explain, load_brain
 from boebot.errors import BoebotError
 from boebot.record.brain_record import BrainNames
 from boebot.record.run import FIGURES, SHARE
@@ -105,7 +105,8 @@ def killed(case: Case) -> dict[str, Any]:
 
 
 def run_case(folder: Folder, case: Case) -> dict[str, Any]:
-    """Runs a case. Only what the run raises becomes a row."""
+    """Runs a case. Only what the run raises becomes a row, also a KeyboardInterrupt: Ctrl-C reaches whoever waits for
+    the workers, and no run of theirs."""
     with _one_run:
         return _run(folder, case)
 
@@ -127,19 +128,18 @@ def _run(folder: Folder, case: Case) -> dict[str, Any]:
                 row |= dict(zip(_POSE, pose, strict=True))
             result = execute(request, in_time)
             error = result.error
-        except (BoebotError, _TimeIsUpError) as raised:
+        except (BoebotError, KeyboardInterrupt, _TimeIsUpError) as raised:
             error = raised
         finally:
             faulthandler.cancel_dump_traceback_later()
-    if isinstance(error, KeyboardInterrupt):
-        raise error
     wall_s = time.perf_counter() - since
     status = OK if error is None else TIMED_OUT if wall_s > limit_s else RAISED
     row |= {"status": status, "wall_time_s": round(wall_s, 3), "worker": f"{socket.gethostname()}:{os.getpid()}"}
     if status == TIMED_OUT:
         row["error"] = f"the run has lasted longer than {limit_s:g} s"
     elif error is not None:
-        row["error"] = str(error).replace(f"{folder.path}{os.sep}", "")
+        said = explain(error, None) if isinstance(error, KeyboardInterrupt) else str(error)
+        row["error"] = said.replace(f"{folder.path}{os.sep}", "")
     if result is not None and status in (OK, RAISED):
         row |= {name: value for name, value in result.robots[0].table().items() if name not in row}
     _freeze()

@@ -474,7 +474,7 @@ def _check_function(function: Callable[..., object], where: str, name: str) -> N
 def _construct(kind: type, path: Path | None) -> Any:
     try:
         return kind()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BrainError(explain(error, path)) from error
 
 

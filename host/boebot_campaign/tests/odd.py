@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from dataclasses import dataclass
 
@@ -22,6 +23,10 @@ class Odd(Wander):
         if robot.time > 0.5:
             if self.how == "raises":
                 raise ValueError("as it was asked to")
+            if self.how == "interrupts":
+                raise KeyboardInterrupt
+            if self.how == "exits":
+                sys.exit()
             if self.how == "sleeps":
                 time.sleep(3600)
             if self.how == "loops":

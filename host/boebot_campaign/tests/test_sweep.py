@@ -27,7 +27,7 @@ from boebot.errors import BoebotError
 from boebot_campaign import kept, local, plan, tasks
 from boebot_campaign.command import NEWEST_ROWS, newest_rows
 from boebot_campaign.report import report
-from boebot_campaign.rows import APART, columns, table_of
+from boebot_campaign.rows import APART, columns, run_case, table_of
 
 FORKED = multiprocessing.get_context("forkserver")
 FORKED.set_forkserver_preload(local.IMPORTED)
@@ -212,6 +212,15 @@ def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(each: int
     assert lost["run_time_s"] is None and lost["hash"] is None
 
 
+def test_a_brain_that_interrupts_or_exits_is_a_row(tmp_path: Path) -> None:
+    text = ODD.replace('"well", "raises", "loops", "kills"', '"interrupts", "exits"').replace("[1, 2]", "[1]")
+    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text))) as folder:
+        rows = [run_case(folder, folder.plan.case(row, folder.points)) for row in range(2)]
+    for row, error in zip(rows, ("KeyboardInterrupt", "SystemExit"), strict=True):
+        assert row["status"] == "raised" and 0.5 <= row["run_time_s"] < 0.7
+        assert re.fullmatch(rf"files/brain-0/odd\.py, line \d+: process 'odd': {error}", row["error"])
+
+
 def test_a_run_beyond_the_limit_is_a_row_without_figures(tmp_path: Path) -> None:
     text = ODD.replace('["well", "raises", "loops", "kills"]', '["loops"]').replace("1.5", "0.3")
     with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text))) as folder:
@@ -305,6 +314,11 @@ def test_a_dry_run_says_how_long_all_runs_take_and_keeps_nothing(
     found = json.loads(said)
     assert code == 0 and found["runs"] == 2_000_000 and 1e-3 < found["one_worker_s"] / 2_000_000 < took_s
     assert sorted(path.name for path in tmp_path.iterdir()) == ["odd.py", "sweep.toml"]
+
+
+def test_ctrl_c_ends_a_dry_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = saved(tmp_path, ODD.replace('"well", "raises", "loops", "kills"', '"interrupts"'))  # in this process
+    assert command.boebot(capsys, "sweep", str(file), "--dry-run")[0] == 130
 
 
 def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:

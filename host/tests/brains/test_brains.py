@@ -153,6 +153,7 @@ def test_brain_may_import_a_file_beside_it(tmp_path: Path) -> None:
         ("class Brain:\n    async def step(self, robot): ...\n", r"mine\.py: step is an async function"),
         ("raise ValueError('first\\nsecond')\n", r"mine\.py, line 1: ValueError: first$"),
         ("import sys\nsys.exit(3)\n", r"mine\.py, line 2: SystemExit"),
+        ("class Brain:\n    def __init__(self): raise SystemExit\n", r"mine\.py, line 2: SystemExit$"),
     ],
 )
 def test_brain_that_cannot_be_loaded_is_one_sentence_with_its_place(tmp_path: Path, text: str, sentence: str) -> None:
