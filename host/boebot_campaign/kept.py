@@ -46,7 +46,7 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         version: of the kit, with its protocol.
         names: for each brain, robot and arena that was given as a file: where its copy is, below the folder.
-        hashes: SHA-256 of each copy, by the same kind of path.
+        hashes: SHA-256 of each copy, and of the points, by the same kind of path.
     """
 
     version: str
@@ -63,19 +63,21 @@ class Folder:
         self.path = path.absolute()
         try:
             self.kept = msgspec.json.decode((path / NAME).read_bytes(), type=Kept)
-            self.points = np.load(path / POINTS)
         except FileNotFoundError:
             raise BoebotError(f"{path} holds no sweep; expected a folder with {NAME}") from None
         except (OSError, ValueError, msgspec.DecodeError) as error:
-            raise BoebotError(
-                f"the sweep in {path} cannot be read: {error}; expected one that boebot has kept"
-            ) from None
+            raise BoebotError(f"{path / NAME} cannot be read ({error}); expected it whole, or another --out") from None
         self.parts = self.path / PARTS
 
     @cached_property
     def plan(self) -> Plan:
         """What is run."""
         return self.kept.plan
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Of the design; read after `check`."""
+        return np.asarray(np.load(self.path / POINTS))
 
     @cached_property
     def stamp(self) -> str:
@@ -119,42 +121,38 @@ class Folder:
 
     def merge(self) -> Path:
         """Makes rows.parquet of the parts, some rows at a time; a row that two parts have is taken once."""
-        parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
         if not self.is_whole:
-            write_whole(self.path / ROWS, lambda path: self._merge(path, parquet))
+            write_whole(self.path / ROWS, self._merge)
         shutil.rmtree(self.parts, ignore_errors=True)
         return self.path / ROWS
 
-    def _merge(self, path: Path, parquet: Any) -> None:
-        arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+    def _merge(self, path: Path) -> None:
         writer: Any = None
         waiting, left = [], self.plan.count
-        for table in self._tables(parquet):
+        for table in self._tables():
             waiting.append(table)
             left -= len(table)
             if sum(map(len, waiting)) >= GROUP_ROWS or left == 0:
-                writer = writer or parquet.ParquetWriter(path, table.schema)
-                writer.write_table(arrow.concat_tables(waiting))
+                writer = writer or _arrow("pyarrow.parquet").ParquetWriter(path, table.schema, write_page_checksum=True)
+                writer.write_table(_arrow().concat_tables(waiting))
                 waiting = []
         writer.close()
 
-    def _tables(self, parquet: Any, columns: Sequence[str] | None = None) -> Iterator[Any]:
+    def _tables(self, columns: Sequence[str] | None = None) -> Iterator[Any]:
         """Of each part, in order, without the rows that one before it has."""
         at = 0
         for first, end in self.done():
             if end > at:
-                yield _read(parquet, self.part(first, end), columns).slice(max(at - first, 0))
+                yield _read(self.part(first, end), end - first, columns).slice(max(at - first, 0))
                 at = end
 
     def table(self, columns: Sequence[str] | None = None) -> Any:
-        """The rows so far, with some of the columns or all: a pyarrow.Table."""
-        parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
-        arrow = missing.imported("pyarrow", "a sweep", "pyarrow", "sweep")
+        """The rows so far, with some of the columns or all: a pyarrow.Table. Raises BoebotError: a file is damaged."""
         if self.is_whole:
-            return _read(parquet, self.path / ROWS, columns)
-        if not (tables := list(self._tables(parquet, columns))):
+            return _read(self.path / ROWS, self.plan.count, columns)
+        if not (tables := list(self._tables(columns))):
             raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
-        return arrow.concat_tables(tables)
+        return _arrow().concat_tables(tables)
 
 
 @lru_cache(maxsize=2)
@@ -204,7 +202,7 @@ def _make(path: Path, plan: Plan, points: np.ndarray | None) -> None:
     if points is None:
         points = designs.points(plan.design, plan.points, len(plan.axes), plan.first_seed % 2**32)
     write_whole(path / POINTS, lambda part: part.write_bytes(_npy(points)))
-    hashes = {name: _digest(data) for name, data in files.items()}
+    hashes = {name: _digest((path / name).read_bytes()) for name in (*files, POINTS)}
     kept = Kept(version=version(), plan=plan, names=names, hashes=hashes)
     write_whole(path / NAME, lambda part: part.write_bytes(msgspec.json.format(msgspec.json.encode(kept))))
 
@@ -218,12 +216,12 @@ def _take_up(path: Path, plan: Plan, points: np.ndarray | None) -> None:
     for key in plan.__struct_fields__:
         if _portable(getattr(plan, key)) != _portable(getattr(folder.plan, key)):
             raise BoebotError(f"the plan has changed since the sweep in {path} began, in {key}; {expected}")
+    folder.check()
     if points is not None and not np.array_equal(points, folder.points):
         raise BoebotError(f"the points of the sweep in {path} were others when it began; {expected}")
-    folder.check()
     _, files = _sources(plan)
     for name, digest in folder.kept.hashes.items():
-        if name not in files or _digest(files[name]) != digest:
+        if name != POINTS and (name not in files or _digest(files[name]) != digest):
             original = next((one for one, copy in folder.kept.names.items() if copy == name), Path(name).name)
             raise BoebotError(f"{original} has changed since the sweep in {path} began; {expected}")
     for left in (*folder.parts.glob(".*.tmp"), *folder.parts.glob("*.begun"), *path.glob(".*.tmp")):
@@ -262,16 +260,26 @@ def version() -> str:
     return f"{boebot.__version__} (schema {SCHEMA_HASH:08x})"
 
 
-def _read(parquet: Any, path: Path, columns: Sequence[str] | None = None) -> Any:
-    """A file's table. `parquet.read_table` would import pandas, where it is, which takes a second."""
-    with parquet.ParquetFile(path) as file:
-        return file.read(columns and list(columns))
+def _arrow(module: str = "pyarrow") -> Any:
+    return missing.imported(module, "a sweep", "pyarrow", "sweep")
+
+
+def _read(path: Path, count: int, columns: Sequence[str] | None) -> Any:
+    """The table of a file of that many rows. `parquet.read_table` would import pandas, where it is, which takes a
+    second. Raises BoebotError: it is damaged."""
+    parquet = _arrow("pyarrow.parquet")
+    try:
+        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            if file.metadata.num_rows != count:
+                raise ValueError(f"it has {file.metadata.num_rows} rows in place of {count}")
+            return file.read(columns and list(columns))
+    except Exception as error:  # whatever pyarrow makes of such bytes
+        raise BoebotError(f"{path} cannot be read ({error}); remove it, and the same sweep runs its rows") from None
 
 
 def write_part(path: Path, table: Any) -> None:
     """A part, whole or not at all. Raises BoebotError: the folder cannot be written to."""
-    parquet = missing.imported("pyarrow.parquet", "a sweep", "pyarrow", "sweep")
-    write_whole(path, lambda part: parquet.write_table(table, part))
+    write_whole(path, lambda part: _arrow("pyarrow.parquet").write_table(table, part, write_page_checksum=True))
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:

@@ -243,6 +243,51 @@ def test_after_a_change_it_is_refused_and_the_file_named(undisturbed: Path, tmp_
         boebot.sweep(undisturbed / "sweep.toml", out=out)
 
 
+@pytest.mark.parametrize("size", [0, 100])
+@pytest.mark.parametrize("name", ["rows.parquet", "sweep.json", "points.npy", "0000010-0000039.parquet"])
+def test_a_damaged_file_of_a_sweep_is_named(undisturbed: Path, name: str, size: int, tmp_path: Path) -> None:
+    file, out = saved(tmp_path, PLAN), shutil.copytree(undisturbed / "out", tmp_path / "out")
+    if name.startswith("0"):
+        in_parts(out, 10)
+    (damaged,) = out.rglob(name)
+    damaged.write_bytes(damaged.read_bytes()[:size])
+    with pytest.raises(BoebotError, match=rf"{name} (cannot be read|has changed).*; .*(another --out|remove it)"):
+        by_hand(out, file)
+
+
+def test_a_part_that_lacks_a_row_is_named(undisturbed: Path, tmp_path: Path) -> None:
+    file, out = saved(tmp_path, PLAN), shutil.copytree(undisturbed / "out", tmp_path / "out")
+    first = in_parts(out, 10)
+    first.rename(first.with_name("0000000-0000010.parquet"))
+    with pytest.raises(BoebotError, match=r"0010\.parquet cannot be read \(it has 10 rows in place of 11\); remove it"):
+        by_hand(out, file)
+
+
+def in_parts(out: Path, first: int) -> Path:
+    """Takes a whole sweep back to two parts, the first one, which is returned, of that many rows."""
+    folder = kept.Folder(out)
+    rows, parts = folder.table(), [folder.part(0, first), folder.part(first, folder.plan.count)]
+    folder.parts.mkdir()
+    kept.write_part(parts[0], rows.slice(0, first))
+    kept.write_part(parts[1], rows.slice(first))
+    (out / "rows.parquet").unlink()
+    return parts[0]
+
+
+def test_a_damaged_byte_of_the_rows_changes_none(undisturbed: Path, tmp_path: Path) -> None:
+    shutil.copytree(undisturbed / "out", tmp_path / "out")
+    rows, whole, refused = tmp_path / "out" / "rows.parquet", kept.Folder(undisturbed / "out").table(), 0
+    data = rows.read_bytes()
+    end = len(data) - 8 - int.from_bytes(data[-8:-4], "little")  # names of columns and the like follow
+    for at in range(4, end, end // 50):
+        rows.write_bytes(data[:at] + bytes([data[at] ^ 0x55]) + data[at + 1 :])
+        try:
+            assert kept.Folder(rows.parent).table().equals(whole)
+        except BoebotError:
+            refused += 1
+    assert refused > 20
+
+
 def test_a_kept_row_is_run_again(undisturbed: Path) -> None:
     row = rows_of(undisturbed / "out")[27]
     words = [sys.executable, "-m", "boebot", "run", "--sweep", str(undisturbed / "out"), "--row", "27", "--json"]
