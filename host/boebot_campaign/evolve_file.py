@@ -13,7 +13,6 @@ from boebot.brains import LoadedBrain, load_brain
 from boebot.description import toml_files
 from boebot.description.robots import Positive
 from boebot.errors import BoebotError, CallError, did_you_mean
-from boebot.record.run import FIGURES, SHARE
 from boebot.running import brain_parameters
 from boebot_campaign import plan, rows, toml_brain
 from boebot_campaign.plan import MOST_RUNS, SOME, Plan, Seeds, Starts, Whole
@@ -132,7 +131,7 @@ def _checked(given: Given, folder: Path, name: str) -> Evolve:
     if both := _seeds(given.seeds) & _seeds(given.test_seeds):
         raise CallError(f"{name}: test_seeds has {min(both)}, as seeds has; expected seeds that no candidate has met")
     for one in given.fitness:
-        if one not in (known := _weighable(asked)):
+        if one not in (known := [*rows.numbers(asked), *EVENTS]):
             raise CallError(
                 f"{name}: fitness has {one!r}; expected figures of a run: {', '.join(known)}{did_you_mean(one, known)}"
             )
@@ -162,13 +161,6 @@ def _box(loaded: LoadedBrain, one: str, box: Box, name: str) -> tuple[float, flo
 
 def _seeds(given: list[int] | Whole) -> set[int]:
     return set(given) if isinstance(given, list) else set(range(given.low, given.high + 1))
-
-
-def _weighable(asked: Plan) -> list[str]:
-    """What a fitness may be made of."""
-    numbers = [name for name, kind in rows.columns(asked, asked.brains).items() if kind in (int, float)]
-    ours = [one for one in numbers if one in FIGURES or one.endswith(SHARE)]
-    return [*(one for one in ours if one not in ("seed", "period_s")), *EVENTS]
 
 
 def _bundled(given: str | None, own: str | None) -> str | None:

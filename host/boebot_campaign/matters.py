@@ -24,17 +24,16 @@ from boebot import missing
 from boebot.cli import options
 from boebot.cli.ending import Detail
 from boebot.description.robots import RobotDescription, idle, magnitude
-from boebot.errors import BoebotError, CallError, did_you_mean
+from boebot.errors import BoebotError, CallError, expected_one
 from boebot.imperfections import imperfections
 from boebot.rates import Mean
-from boebot.record.run import FIGURES
 from boebot.record.run_folder import make_folder
 from boebot.running.tasks import prepare
 from boebot_campaign.command import Out, Scheduler, Workers, shown
 from boebot_campaign.kept import Folder
 from boebot_campaign.plan import AnyAxis, Axis, Plan, Range, length, listed, read_as
 from boebot_campaign.report import said, saved, tell, words
-from boebot_campaign.rows import OK
+from boebot_campaign.rows import OK, numbers
 from boebot_campaign.sweep import run_plan
 
 Axes = Sequence[tuple[str, AnyAxis]]
@@ -66,9 +65,8 @@ class Matters(Plan, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=
             raise CallError(f"{at}there is one seed; expected 2 or more, as one alone does not show what is chance")
         if self.samples < 1 or self.samples & (self.samples - 1):
             raise CallError(f"{at}samples is {self.samples}; expected a power of two, such as 128")
-        if FIGURES.get(self.figure) not in (int, float):
-            near = did_you_mean(self.figure, FIGURES)
-            raise CallError(f"{at}figure is {self.figure!r}; expected a number of those that each run has{near}")
+        if self.figure not in (known := numbers(self)):
+            raise CallError(f"{at}figure is {self.figure!r}; {expected_one(self.figure, known)}")
         robot = prepare(self.brains[0], self.all_robots[0], None)[1]
         found = {name: _ends(name, robot) for name in imperfections() if not idle(name, robot)}
         own = {name: axis for name, axis in found.items() if axis is not None}

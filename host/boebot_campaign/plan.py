@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import uuid
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -46,6 +47,10 @@ class Range(
     high: float
     steps: int = 0
 
+    def __post_init__(self) -> None:
+        if self.low == self.high:
+            raise ValueError(f"from and to are {self.low:g}; expected two numbers")
+
 
 Seed = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # of a column
 
@@ -57,6 +62,10 @@ class Whole(
 
     low: Seed
     high: Seed
+
+    def __post_init__(self) -> None:
+        if self.low > self.high:
+            raise ValueError(f"from is {self.low}, to is {self.high}; expected no less than from")
 
 
 SOME = msgspec.Meta(min_length=1)
@@ -283,19 +292,9 @@ def _at(axis: list[Any] | Whole, index: int) -> Any:
 
 def _checked(plan: _P, at: str) -> _P:
     """Raises CallError or another BoebotError, in one sentence, before anything is made."""
-    for name, values in (
-        ("arenas", [*plan.arenas, *plan.test_arenas]),
-        ("seeds", plan.seeds),
-        ("brains", plan.brains),
-        ("robots", plan.robots),
-    ):
-        short = [Path(one).name if isinstance(one, str) else one for one in values] if isinstance(values, list) else []
-        if len(set(short)) < len(short):
-            raise CallError(f"{at}{name} has one twice, by its name; expected each once")
+    _check_once(plan, at)
     if plan.test_arenas and not plan.arenas:
         raise CallError(f"{at}there are test_arenas and no arenas; expected arenas, too, to train in")
-    if isinstance(plan.seeds, Whole) and plan.seeds.low > plan.seeds.high:
-        raise CallError(f"{at}seeds are from {plan.seeds.low} to {plan.seeds.high}; expected no less than from")
     if plan.on is not None and is_live(plan.on):
         raise CallError(f"{at}on is {plan.on!r}, a port; expected an emulated board, native or avr, or direct")
     _check_design(plan, at)
@@ -303,6 +302,19 @@ def _checked(plan: _P, at: str) -> _P:
         raise CallError(f"{at}these are {plan.count:,} runs; expected at most {MOST_RUNS:,}")
     _check_runs(plan, at)
     return plan
+
+
+def _check_once(plan: Plan, at: str) -> None:
+    """Raises CallError where a list has one twice; of files the name counts."""
+    lists = {name: getattr(plan, name) for name in plan.__struct_fields__} | plan.parameters | plan.imperfections
+    files = {name: lists[name] for name in ("brains", "robots", "arenas")}
+    files["arenas and test_arenas"] = [*plan.arenas, *plan.test_arenas]
+    lists |= {name: [Path(one).name for one in given] for name, given in files.items()}
+    lists["faults"] = [str(sorted(one)) for one in plan.faults]
+    for name, values in lists.items():
+        if isinstance(values, list) and len(set(values)) < len(values):
+            one = Counter(values).most_common(1)[0][0]
+            raise CallError(f"{at}{one} is there twice, in {name}; expected each once")
 
 
 def _check_design(plan: Plan, at: str) -> None:

@@ -60,6 +60,13 @@ def columns(plan: Plan, brains: Sequence[str]) -> dict[str, type]:
     return {**_PLANNED, **axes, **figures, **dict.fromkeys(shares, float), **went}
 
 
+def numbers(plan: Plan) -> list[str]:
+    """Figures that a run has, and the plan does not say: those that something can be made of."""
+    kinds = columns(plan, plan.brains)
+    found = [name for name in kinds if kinds[name] in (int, float) and (name in FIGURES or name.endswith(SHARE))]
+    return [name for name in found if name not in ("seed", "period_s")]
+
+
 def _kind(axis: Any) -> type:
     """The type of an axis's values; of mixed ones text."""
     kinds = {type(value) for value in axis} if isinstance(axis, list) else {float}

@@ -90,6 +90,23 @@ BAD = {
     ),
     "second choice of faults is of no part": ({"faults": [[], ["sonar.missing@0s"]]}, "has no 'sonar.missing'"),
     "no time": ({"seconds": 0}, "a run cannot last 0 s"),
+    "start twice": ({"starts": [[0, 0, 0], [0.0, 0.0, 0.0]]}, "0.0, 0.0, 0.0. is there twice, in starts"),
+    "faults twice": (
+        {"faults": [["ping.missing@0s", "cable.out@0s"], ["cable.out@0s", "ping.missing@0s"]]},
+        "is there twice, in faults",
+    ),
+    "value twice": ({"parameters": {"avoid.utility.b": [0, 1, 0.0]}}, "0 is there twice, in avoid.utility.b"),
+    "magnitude twice": ({"imperfections": {"servo_lag_s": [0.1, 0.1]}}, "0.1 is there twice, in servo_lag_s"),
+    "seed twice": ({"seeds": [4, 5, 4]}, "4 is there twice, in seeds"),
+    "arena of both kinds": (
+        {"arenas": ["room", "station"], "test_arenas": ["room"]},
+        "room is there twice, in arenas and test_arenas",
+    ),
+    "range of one number": (
+        {"parameters": {"avoid.utility.b": {"from": 1.0, "to": 1.0, "steps": 3}}},
+        "parameters.avoid.utility.b: from and to are 1; expected two numbers",
+    ),
+    "seeds from above": ({"seeds": {"from": 3, "to": 1}}, "seeds: from is 3, to is 1; expected no less than from"),
     "limit beyond a clock": ({"limit_s": 1e12}, "limit_s: expected float <= "),
     "a port": ({"on": "/dev/ttyACM0"}, "a port"),
     "design without points": ({"design": "latin", "parameters": {"avoid.utility.b": {"from": 0, "to": 1}}}, "0 points"),
