@@ -38,7 +38,7 @@ def analog_infrared_parameters(sharp: SharpSensor, draw: Draw) -> Any:
     return ffi.new(
         "sharp_infrared_parameters *",
         {
-            "beam": beam_of(sharp.position_m, sharp.heading_rad, 0.0, draw["sharp_height_m"], 1),
+            "beam": beam_of(sharp, draw["sharp_height_m"], 1, opening=0.0),
             "reach": draw["sharp_reach_m"],
             "sigma": draw["sharp_spread"] if draw.noise else 0.0,
             "gain": 1.0 + draw["sharp_gain_spread"] * draw(66, 0),

@@ -91,12 +91,15 @@ class Model(Protocol):
         """Adds the notes' battery."""
 
 
-def beam_of(
-    position: tuple[float, float], heading: float, opening: float, height: float, rays: int
-) -> dict[str, float]:
-    """beam_parameters in C: m, rad, rad, m."""
-    x, y = position
-    return {"x": x, "y": y, "heading": heading, "opening": opening, "height": height, "rays": rays}
+def place_of(device: Any, height: float) -> dict[str, float]:
+    """Where a device sits, how high, and which way it looks: keys of its struct in C (m, rad)."""
+    x, y = device.position_m
+    return {"x": x, "y": y, "heading": device.heading_rad, "height": height}
+
+
+def beam_of(device: Any, height: float, rays: int, opening: float | None = None) -> dict[str, float]:
+    """beam_parameters in C; `opening`: in place of the device's own (rad)."""
+    return place_of(device, height) | {"opening": device.beam_rad if opening is None else opening, "rays": rays}
 
 
 def joined(*kinds: type) -> Callable[[Function], Function]:

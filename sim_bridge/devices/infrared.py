@@ -37,7 +37,7 @@ def proximity(device: InfraredProximity, name: str, model: Model) -> None:
         "infrared_proximity",
         name,
         period=device.period_s,
-        beam=beam_of(device.position_m, device.heading_rad, device.beam_rad, device.height_m, device.rays),
+        beam=beam_of(device, device.height_m, device.rays),
         range=device.range_m,
         c1=device.c1_m2,
         c2=device.c2,
@@ -55,11 +55,10 @@ def pair(device: InfraredPair, name: str, model: Model) -> None:
 
 def infrared_parameters(pair: InfraredPair, draw: Draw = AS_BUILT) -> Any:
     """The IR pair in C."""
-    height, rays = draw["infrared_height_m"], int(draw["infrared_rays"])
     return ffi.new(
         "infrared_pair_parameters *",
         {
-            "beam": beam_of(pair.position_m, pair.heading_rad, pair.beam_rad, height, rays),
+            "beam": beam_of(pair, draw["infrared_height_m"], int(draw["infrared_rays"])),
             "range": pair.range_m,
             "range_sigma": draw["infrared_spread"],
             "false_hit": draw["infrared_false_hit"],

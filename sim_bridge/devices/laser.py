@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from boebot.devices.laser import Laser
-from sim_bridge.devices.catalogue import Model, SensorKind, modelled
+from sim_bridge.devices.catalogue import Model, SensorKind, modelled, place_of
 from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE, TURN, Range
 
 
@@ -31,15 +31,11 @@ LASER = SensorKind(
 @modelled(Laser)
 def laser(device: Laser, name: str, model: Model) -> None:
     """A fan of rays."""
-    x, y = device.position_m
     model.sensor(
         "laser",
         name,
         period=device.period_s,
-        x=x,
-        y=y,
-        heading=device.heading_rad,
-        height=device.height_m,
+        **place_of(device, device.height_m),
         first=-device.step_rad * (device.rays - 1) / 2,
         step=device.step_rad,
         rays=device.rays,

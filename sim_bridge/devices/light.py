@@ -6,7 +6,7 @@ from typing import Any
 
 from boebot.devices.light import LightSensor, Phototransistor
 from sim_bridge.compiled import ffi
-from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled
+from sim_bridge.devices.catalogue import At, Model, Part, SensorKind, joined, modelled, place_of
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.vehicles.checked_structs import HEADING, NOT_NEGATIVE, POSITIVE
 
@@ -26,15 +26,11 @@ def part(device: LightSensor, at: At) -> Part:
 @modelled(Phototransistor)
 def phototransistor(device: Phototransistor, name: str, model: Model) -> None:
     """The irradiance."""
-    x, y = device.position_m
     model.sensor(
         "phototransistor",
         name,
         period=device.period_s,
-        x=x,
-        y=y,
-        heading=device.heading_rad,
-        height=device.height_m,
+        **place_of(device, device.height_m),
         near_distance=device.near_distance_m,
         ambient=device.ambient,
         sigma=device.sigma,
@@ -43,15 +39,11 @@ def phototransistor(device: Phototransistor, name: str, model: Model) -> None:
 
 def light_parameters(light: LightSensor, side: int, draw: Draw) -> Any:
     """The phototransistor of `side` (0 left, 1 right) in C."""
-    x, y = light.position_m
     return ffi.new(
         "light_sensor_parameters *",
         {
-            "light": {
-                "x": x,
-                "y": y,
-                "heading": light.heading_rad,
-                "height": draw["light_height_m"],
+            "light": place_of(light, draw["light_height_m"])
+            | {
                 "near_distance": draw["light_near_m"],
                 "ambient": draw["light_ambient"],
                 "sigma": draw["light_spread"] if draw.noise else 0.0,

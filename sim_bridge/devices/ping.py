@@ -46,7 +46,7 @@ def sonar(device: Sonar, name: str, model: Model) -> None:
         "sonar",
         name,
         period=device.period_s,
-        beam=beam_of(device.position_m, device.heading_rad, device.beam_rad, device.height_m, device.rays),
+        beam=beam_of(device, device.height_m, device.rays),
         range_minimum=device.range_min_m,
         range_maximum=device.range_max_m,
         sigma=device.sigma,
@@ -67,9 +67,8 @@ def ping_parameters(ping: PingSensor, draw: Draw = AS_BUILT) -> Any:
 
 def sonar_parameters(device: RangeFinder, draw: Draw, spread: float) -> dict[str, Any]:
     """sonar_parameters in C of a range finder at a board; `spread`: noise of the distance, as a share."""
-    height, rays = draw["ping_height_m"], int(draw["ping_rays"])
     return {
-        "beam": beam_of(device.position_m, device.heading_rad, device.beam_rad, height, rays),
+        "beam": beam_of(device, draw["ping_height_m"], int(draw["ping_rays"])),
         "range_minimum": device.range_min_m,
         "range_maximum": device.range_max_m,
         "sigma": spread,

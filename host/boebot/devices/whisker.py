@@ -63,6 +63,12 @@ class BentWire:
     GROUP: ClassVar[str] = "whiskers"
     SIGN: ClassVar[tuple[str, str] | None] = ("pressed", "touch")
 
+    def columns(self, place: Place, run: Run) -> list[Column]:
+        """Pressed or not: by telemetry, or, without the kit's firmware, by its contact."""
+        if "whiskers" not in (run.raw.dtype.names or ()):
+            return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
+        return [Column("pressed", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
+
     def drawing(self, name: str) -> list[Item]:
         """Thicker and in its colour while it is pressed."""
         free = Item([self.root_m, self.tip_m], ink="ink", width=1.1, layer=PARTS)
@@ -102,12 +108,6 @@ class WhiskerSwitch(BentWire, Device, tag="whisker", frozen=True, kw_only=True):
         bit = _bit(place)
         return lambda sample, _: _PRESSED if sample.whiskers & bit else _FREE
 
-    def columns(self, place: Place, run: Run) -> list[Column]:
-        """Pressed or not: by telemetry, or, where a program drives the robot, by its contact."""
-        if "whiskers" not in (run.raw.dtype.names or ()):
-            return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
-        return [Column("pressed", "", (run.raw["whiskers"] & _bit(place)) != 0, None)]
-
 
 def _bit(place: Place) -> int:
     return int(Whiskers[place.name.removeprefix("whisker_").upper()])
@@ -128,7 +128,3 @@ class TouchWhisker(BentWire, VehicleDevice, tag="touch_whisker", frozen=True, kw
     def reading(self, values: Sequence[float], age: float) -> Whisker:
         """See `VehicleDevice`."""
         return _PRESSED if values[0] else _FREE
-
-    def columns(self, place: Place, run: Run) -> list[Column]:
-        """Pressed or not."""
-        return [Column("pressed", "", run.values(place.name)[:, 0] > 0, None)]
