@@ -20,18 +20,6 @@ if TYPE_CHECKING:
     from boebot_course.running import Verdict
 
 FOLDER = Path("experiments")
-_HELP = """Run experiments of the notes: figures, measured against expected.
-
-  boebot list experiments         what there is
-
-  boebot experiment E29 E59       two of them
-
-  boebot experiment E22 --on avr  on another robot or board; --on "*" on all that it knows
-
-  boebot experiment --all         all of them on all robots, beside each other
-
-Each leaves NAME.png and NAME.svg, its figure; NAME.csv, the data; NAME.json, the verdict. Several leave index.md too,
-a page of all of them. The exit code is 1 when one is outside its criterion."""
 
 
 def listed() -> list[dict[str, Any]]:
@@ -77,7 +65,19 @@ def experiment(
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """See `_HELP`."""
+    """Run experiments of the notes: figures, measured against expected.
+
+      boebot list experiments         what there is
+
+      boebot experiment E29 E59       two of them
+
+      boebot experiment E22 --on avr  on another robot or board; --on "*" on all that it knows
+
+      boebot experiment --all         all of them on all robots, beside each other
+
+    Each leaves NAME.png and NAME.svg, its figure; NAME.csv, the data; NAME.json, the verdict. Several leave index.md
+    too, a page of all of them. The exit code is 1 when one is outside its criterion.
+    """
     # here, as it takes a while: no other sub-command should wait for it
     from boebot_course.experiments import all_experiments
 
@@ -85,9 +85,6 @@ def experiment(
         raise typer.BadParameter("give either NAME or --all")
     chosen = _chosen(names or ["*"], on or ("*" if every else None), all_experiments().values())
     _run(chosen, seed, out, jobs or os.cpu_count() or 1, json)
-
-
-experiment.__doc__ = _HELP
 
 
 def _chosen(wanted: Sequence[str], on: str | None, known: Collection[Experiment]) -> list[Experiment]:

@@ -23,25 +23,6 @@ if TYPE_CHECKING:
 
 EXIT_BROKEN, EXIT_INPUT = 1, 2
 _SHORTEST_S, _LONGEST_S = 0.1, 3600.0  # of a scenario
-_HELP = """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
-
-  boebot timing                         the bundled image, emulator too
-
-  boebot timing --elf F --no-measure    an image, by its machine code
-
-  boebot timing --port /dev/ttyACM0     with what a board measures itself
-
-  boebot timing --where NAME            the worst path of a task or interrupt
-
-  boebot timing --robot R --brain B     do sensors, brain and line fit?
-
-Times are cycles of 1/16 us. bound: the most that the machine code can take; emulator, board: the longest that was
-measured; slack: what the bound leaves of the budget; response: the latest end after a slot begins, interrupts included.
-
---out DIR writes the timing diagram, timing.png and timing.svg, and timing.json.
-
-Exit code: 0 all is well; 1 a budget or a limit is broken, or the robot is not realisable; 2 bad input, or an image
-whose timing is not known; 130 after Ctrl-C."""
 
 
 def timing(
@@ -78,7 +59,27 @@ def timing(
     ] = None,
     json: options.Json = False,
 ) -> None:
-    """See `_HELP`."""
+    """What the firmware may take, what it took, and whether that fits its budgets (notes, section 3.2, Fig. 3.2).
+
+      boebot timing                         the bundled image, emulator too
+
+      boebot timing --elf F --no-measure    an image, by its machine code
+
+      boebot timing --port /dev/ttyACM0     with what a board measures itself
+
+      boebot timing --where NAME            the worst path of a task or interrupt
+
+      boebot timing --robot R --brain B     do sensors, brain and line fit?
+
+    Times are cycles of 1/16 us. bound: the most that the machine code can take; emulator, board: the longest that was
+    measured; slack: what the bound leaves of the budget; response: the latest end after a slot begins, interrupts
+    included.
+
+    --out DIR writes the timing diagram, timing.png and timing.svg, and timing.json.
+
+    Exit code: 0 all is well; 1 a budget or a limit is broken, or the robot is not realisable; 2 bad input, or an image
+    whose timing is not known; 130 after Ctrl-C.
+    """
     from boebot.description.robots import load_robot
     from boebot.record.run_folder import make_folder
     from boebot.running.tasks import DEFAULT_PERIOD
@@ -120,9 +121,6 @@ def timing(
         answer.show()
     if answer.is_broken:
         raise typer.Exit(EXIT_BROKEN)
-
-
-timing.__doc__ = _HELP
 
 
 @dataclass

@@ -4,6 +4,7 @@ share one simulated world."""
 from __future__ import annotations
 
 import contextlib
+import inspect
 import math
 import os
 import tomllib
@@ -22,31 +23,6 @@ from boebot.running.tasks import Member, Request
 
 SECONDS = 60.0
 TURN = 2 * math.pi + 1e-9  # rad
-_HELP = f"""Let a brain drive a robot, and say what happened.
-
-Several robots in one simulated world:
-
-  boebot run wander --robots 3              three robots, the same brain
-
-  boebot run wander chase.py                two robots, a brain for each
-
-  boebot run wander --robots 2 --pose 0.5,0.5,90deg --pose 1.5,0.5,180deg
-
-A program for the Arduino Uno drives in place of a brain; what it prints is shown with its time:
-
-  boebot run blink.ino --expect-text ready --timeout 2000
-
-It is a sketch, which PlatformIO builds, the folder of one, a folder with a platformio.ini, or an ELF or HEX file.
-
-What is typed at the terminal goes to it; a script types by --type 'go\\n@0.5'. With --json its text is on standard
-error, with --quiet it is left out.
-
-An option that is given once goes for all of them; given several times, it goes to robot 1, 2 and so on.
-
-Times, lengths and angles are in s, m and rad, or have a unit: 50ms, 2min, 20cm, 90deg.
-
-Bundled brains: {", ".join(bundled())}. `boebot new NAME` writes a first one; with --main, one that runs
-from top to bottom; with --brain, one of several behaviors."""
 
 
 def run(
@@ -182,7 +158,29 @@ def run(
     verbose: options.Verbose = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """See `_HELP`."""
+    """Let a brain drive a robot, and say what happened.
+
+    Several robots in one simulated world:
+
+      boebot run wander --robots 3              three robots, the same brain
+
+      boebot run wander chase.py                two robots, a brain for each
+
+      boebot run wander --robots 2 --pose 0.5,0.5,90deg --pose 1.5,0.5,180deg
+
+    A program for the Arduino Uno drives in place of a brain; what it prints is shown with its time:
+
+      boebot run blink.ino --expect-text ready --timeout 2000
+
+    It is a sketch, which PlatformIO builds, the folder of one, a folder with a platformio.ini, or an ELF or HEX file.
+
+    What is typed at the terminal goes to it; a script types by --type 'go\\n@0.5'. With --json its text is on standard
+    error, with --quiet it is left out.
+
+    An option that is given once goes for all of them; given several times, it goes to robot 1, 2 and so on.
+
+    Times, lengths and angles are in s, m and rad, or have a unit: 50ms, 2min, 20cm, 90deg.
+    """
     wanted = detail(json=json, verbose=verbose, quiet=quiet)
     if sweep is not None or row is not None:
         request = _of_sweep(context, sweep, row)
@@ -284,7 +282,10 @@ def _of_sweep(context: typer.Context, folder: Path | None, row: int | None) -> R
     return request
 
 
-run.__doc__ = _HELP
+run.__doc__ = f"""{inspect.getdoc(run)}
+
+Bundled brains: {", ".join(bundled())}. `boebot new NAME` writes a first one; with --main, one that runs
+from top to bottom; with --brain, one of several behaviors."""
 
 
 def _built(name: str, quiet: bool) -> object:
