@@ -34,33 +34,21 @@ from typing import TYPE_CHECKING, Any
 from boebot import slips
 
 if TYPE_CHECKING:
-    from boebot import boards
-    from boebot.brain.main_brain import MainRobot
-    from boebot.description.robots import load_robot
-    from boebot.errors import BoebotError
-    from boebot.result import RunResult, TogetherResult
-    from boebot.robot import Command, Observation, Robot
-    from boebot.running.runner import run, run_together
-    from boebot.running.tasks import Member
-    from boebot.showing import Grid
+    from boebot import boards as boards
+    from boebot.brain.main_brain import MainRobot as MainRobot
+    from boebot.description.robots import load_robot as load_robot
+    from boebot.errors import BoebotError as BoebotError
+    from boebot.result import RunResult as RunResult
+    from boebot.result import TogetherResult as TogetherResult
+    from boebot.robot import Command as Command
+    from boebot.robot import Observation as Observation
+    from boebot.robot import Robot as Robot
+    from boebot.running.runner import run as run
+    from boebot.running.runner import run_together as run_together
+    from boebot.running.tasks import Member as Member
+    from boebot.showing import Grid as Grid
 
     __version__: str
-
-__all__ = [
-    "BoebotError",
-    "Command",
-    "Grid",
-    "MainRobot",
-    "Member",
-    "Observation",
-    "Robot",
-    "RunResult",
-    "TogetherResult",
-    "boards",
-    "load_robot",
-    "run",
-    "run_together",
-]
 
 # Loaded when first asked for: the command catches Ctrl-C before numpy and the rest take their time.
 _HOMES = {
@@ -77,6 +65,7 @@ _HOMES = {
     "run": "running.runner",
     "run_together": "running.runner",
 }
+__all__ = ["boards", *_HOMES]
 
 
 atexit.register(slips.say_unrun)
