@@ -14,6 +14,7 @@ docs/how-to/learn.md leads through it.
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -60,17 +61,19 @@ class BoardEnv(gymnasium.Env[Numbers, Numbers]):
         """Begins a run, to see what the robot's devices say, and ends it.
 
         Args:
-            robot, arena, on, seconds, period, pose, without, imperfections, faults: as of `boebot.run`.
+            robot, arena, on, seconds, period, pose, without, imperfections, faults: as of `boebot.run`; seconds are
+                finite.
             reward: of a step, by what the robot sees after it and what it was commanded.
             final: what is added at the end of an episode, by the run's figures as `info` has them.
 
         Raises:
             BoebotError: no such run can begin.
         """
+        number("seconds", seconds, CallError)
         self._asked = {name: value for name, value in locals().items() if name not in ("self", "reward", "final")}
         self._reward, self._final = reward, final
         self.result: RunResult | None = None
-        self._episode: _Episode | None = _Episode({**self._asked, "seed": 1})
+        self._episode: _Episode | None = _Episode(self, {**self._asked, "seed": 1})
         self._flat = FlatView(self._episode.robot.observation)
         self.close()
         self.names, self.observation_space = self._flat.names, self._flat.space
@@ -80,11 +83,12 @@ class BoardEnv(gymnasium.Env[Numbers, Numbers]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Numbers, dict[str, Any]]:
         """Begins an episode; one that goes on is cut. The run has the seed that is given, or else one drawn by the
-        environment's own stream, which is in `info`. Raises BoebotError if it cannot begin."""
+        environment's own stream, which is in `info`. Raises BoebotError if it cannot begin; Gymnasium's Error if the
+        seed is no whole number of 0 or more."""
         super().reset(seed=seed)
         self.close()
         seed = int(self.np_random.integers(2**31)) if seed is None else seed
-        self._episode = _Episode({**self._asked, "seed": seed})
+        self._episode = _Episode(self, {**self._asked, "seed": seed})
         return self._flat(self._episode.robot.observation), {"seed": seed}
 
     def step(self, action: Any) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
@@ -108,7 +112,7 @@ class BoardEnv(gymnasium.Env[Numbers, Numbers]):
             over = episode.go_on()
         finally:
             if episode.thread.is_done:
-                self._episode = None
+                self.close()
         reward = number("reward", self._reward(episode.robot.observation, command), CallError)
         if over:
             self.result = episode.result
@@ -119,7 +123,7 @@ class BoardEnv(gymnasium.Env[Numbers, Numbers]):
     def close(self) -> None:
         """Ends the run that goes on, if there is one."""
         if self._episode is not None:
-            self._episode.thread.end(_END_S)
+            self._episode.end()
             self._episode = None
 
 
@@ -129,9 +133,10 @@ class _Episode:
     robot: Robot
     result: RunResult
 
-    def __init__(self, asked: Mapping[str, Any]) -> None:
+    def __init__(self, env: BoardEnv, asked: Mapping[str, Any]) -> None:
         self._asked = asked
         self.thread = PausableThread(self._run, "episode")
+        self.end = weakref.finalize(env, self.thread.end, _END_S)  # also where that is dropped without close()
         if self.go_on():
             raise BoebotError("the run has ended before its first step; expected more seconds")
 

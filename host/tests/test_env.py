@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
@@ -21,6 +23,7 @@ from boebot.env import BoardEnv
 from boebot.errors import BoebotError, BrainError, CallError
 from boebot.learners import AGE_MAXIMUM
 from boebot.robot import Robot
+from boebot.running.board_driver import BoardDriver
 from boebot.running.stepping import AT_LEISURE
 
 pytestmark = pytest.mark.skipif("native" not in board_kinds(), reason="the simulator is not installed")
@@ -170,6 +173,21 @@ def test_rewards_are_of_what_is_seen_commanded_and_of_the_runs_figures() -> None
     assert episode(own, 1)[0] == pytest.approx(expected)
 
 
+def test_one_that_is_dropped_stops_its_board(monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[int] = []
+    end = BoardDriver.end
+    monkeypatch.setattr(BoardDriver, "end", lambda driver: (stopped.append(1), end(driver)))
+    env, threads = BoardEnv(), threading.active_count()
+    for _ in range(2):
+        env.reset(seed=1)
+    assert len(stopped) == 2 and threading.active_count() > threads
+    itself = [env]
+    itself.append(itself)  # type: ignore[arg-type]
+    del env, itself
+    gc.collect()
+    assert len(stopped) == 3 and threading.active_count() == threads
+
+
 def test_a_learner_may_think_for_longer_than_a_brain(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("boebot.running.board_driver.AT_LEISURE", AT_LEISURE._replace(seconds=0.1))
     env = BoardEnv(seconds=0.2)
@@ -195,6 +213,9 @@ def test_bad_input_is_a_sentence() -> None:
         BoardEnv(robot="nobot")
     with pytest.raises(BoebotError, match="a run cannot last 0 s"):
         BoardEnv(seconds=0)
+    for beyond in (float("inf"), float("nan")):
+        with pytest.raises(CallError, match=f"seconds is {beyond}; expected a finite number"):
+            BoardEnv(seconds=beyond)
     env = BoardEnv(seconds=0.5)
     with pytest.raises(CallError, match=r"there is no episode to step; expected reset\(\) first"):
         env.step((0.0, 0.0))
@@ -202,6 +223,10 @@ def test_bad_input_is_a_sentence() -> None:
     for action in ((0.5,), (0.1, 0.2, 0.3), 1.0, ("a", "b"), None):
         with pytest.raises(CallError, match="expected two motor signals"):
             env.step(action)
+    for seed in (-1, 1.5):
+        with pytest.raises(gymnasium.error.Error, match=r"^Seed must be"):
+            env.reset(seed=seed)  # type: ignore[arg-type]
+    env.reset(seed=1)
     for beyond in (1.5, float("nan")):
         with pytest.raises(BrainError, match="motor signals go from -1 to 1"):
             env.step((beyond, 0.0))
