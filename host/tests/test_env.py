@@ -176,7 +176,12 @@ def test_rewards_are_of_what_is_seen_commanded_and_of_the_runs_figures() -> None
 def test_one_that_is_dropped_stops_its_board(monkeypatch: pytest.MonkeyPatch) -> None:
     stopped: list[int] = []
     end = BoardDriver.end
-    monkeypatch.setattr(BoardDriver, "end", lambda driver: (stopped.append(1), end(driver)))
+
+    def ends(driver: BoardDriver) -> None:
+        end(driver)
+        stopped.append(1)
+
+    monkeypatch.setattr(BoardDriver, "end", ends)
     env, threads = BoardEnv(), threading.active_count()
     for _ in range(2):
         env.reset(seed=1)
