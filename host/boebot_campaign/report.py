@@ -76,11 +76,11 @@ def _values(folder: Folder, name: str) -> Iterator[tuple[str, float, np.ndarray]
     arrow = missing.imported("pyarrow", "a report", "pyarrow", "sweep")
     column = folder.table([name])[name]
     if arrow.types.is_string(column.type) or arrow.types.is_boolean(column.type):
-        encoded = column.combine_chunks().dictionary_encode(null_encoding="encode")
-        texts, places = encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
-        order = sorted(range(len(texts)), key=lambda one: (texts[one] is not None, str(texts[one])))
-        for at, index in enumerate(order if len(texts) > 1 else []):
-            yield "none" if texts[index] is None else str(texts[index]), float(at), places == index
+        texts, places = _encoded(column)
+        named = [(one, text) for one, text in enumerate(texts) if text is not None or name == "faults"]
+        named.sort(key=lambda pair: (pair[1] is not None, str(pair[1])))
+        for at, (one, text) in enumerate(named if len(named) > 1 else []):
+            yield "none" if text is None else str(text), float(at), places == one
         return
     numbers = np.asarray(column.to_numpy(), dtype=float)
     known = np.unique(numbers)
@@ -93,6 +93,12 @@ def _values(folder: Folder, name: str) -> Iterator[tuple[str, float, np.ndarray]
         return
     for value in known if len(known) > 1 else []:
         yield f"{value:.4g}", float(value), numbers == value
+
+
+def _encoded(column: Any) -> tuple[list[Any], np.ndarray]:
+    """The values that a column has, and where each row's is among them."""
+    encoded = column.combine_chunks().dictionary_encode(null_encoding="encode")
+    return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
 
 
 def _level(
@@ -115,17 +121,23 @@ def cliffs_delta(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def _compared(folder: Folder, name: str, values: np.ndarray) -> list[dict[str, Any]]:
-    """Each two brains by a figure, over the runs that both have ended as they should."""
-    plan = folder.plan
+    """Each two brains by a figure, over the runs that both have ended as they should, with one robot in one arena."""
+    plan, rows = folder.plan, folder.table(["row"])["row"].to_numpy()
+
+    def by_brain(of_rows: np.ndarray) -> np.ndarray:
+        whole = np.full(plan.count, np.nan)
+        whole[rows] = of_rows
+        return np.moveaxis(whole.reshape(plan.sizes), 1, 0).reshape(len(plan.brains), -1)
+
     found: list[dict[str, Any]] = []
-    whole = np.full(plan.count, np.nan)
-    whole[folder.table(["row"])["row"].to_numpy()] = values
-    each = np.moveaxis(whole.reshape(plan.sizes), 1, 0).reshape(len(plan.brains), -1)
-    by_brain = {Path(brain).name: each[index] for index, brain in enumerate(plan.brains)}
-    for one, other in combinations(sorted(by_brain), 2):
-        both = ~np.isnan(by_brain[one]) & ~np.isnan(by_brain[other])
-        first, second = by_brain[one][both], by_brain[other][both]
-        found.append({"brains": [one, other], "figure": name, "pairs": len(first)})
+    each, *places = by_brain(values), *(by_brain(_encoded(folder.table([one])[one])[1]) for one in ("arena", "robot"))
+    names = [Path(brain).name for brain in plan.brains]
+    for one, other in combinations(sorted(range(len(names)), key=names.__getitem__), 2):
+        both = ~np.isnan(each[one]) & ~np.isnan(each[other])
+        for place in places:
+            both &= place[one] == place[other]
+        first, second = each[one][both], each[other][both]
+        found.append({"brains": [names[one], names[other]], "figure": name, "pairs": len(first)})
         found[-1]["difference"] = mean_of(first - second) if len(first) else None
         if len(first) > 1:
             found[-1] |= {"cliffs_delta": cliffs_delta(first, second), "wilcoxon_p": _wilcoxon(first - second)}

@@ -148,7 +148,7 @@ def _run(folder: Folder, case: Case) -> dict[str, Any]:
         said = explain(error, None) if isinstance(error, KeyboardInterrupt) else str(error)
         row["error"] = said.replace(f"{folder.path}{os.sep}", "")
     if result is not None and status in (OK, RAISED):
-        row |= {name: value for name, value in result.robots[0].table().items() if name not in row}
+        row |= {name: value for name, value in result.robots[0].table().items() if row.get(name) is None}
     _freeze()
     return row
 

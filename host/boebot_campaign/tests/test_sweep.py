@@ -322,6 +322,23 @@ def test_a_report_of_one_pair_says_that_it_shows_nothing(tmp_path: Path, capsys:
     assert " over 1 pair: nothing is shown\n" in page and "Wilcoxon" not in page and "inf" not in page
 
 
+def test_brains_are_compared_where_robot_and_arena_are_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, text = tmp_path / "out", 'brains = ["clearway", "demo"]\nseconds = 0.2\nseeds = [1, 2, 3]\n'
+    rows = by_hand(out, saved(tmp_path, text))
+    places = {(row["brain"], row["robot"], row["arena"]) for row in rows}
+    assert places == {("clearway", "shieldbot", "room"), ("demo", "shieldbot-charging", "station")}
+    killed = {"row": 5, "brain": "demo", "seed": 3, "status": "killed"}
+    all_rows = [*kept.Folder(out).table().to_pylist()[:5], killed]
+    kept.write_part(out / kept.ROWS, table_of(all_rows, columns(kept.Folder(out).plan, ["clearway", "demo"])))
+    report(out, Detail.JSON)
+    said = json.loads(capsys.readouterr().out)
+    (pair,) = said["compared"]
+    assert pair["pairs"] == 0 and pair["difference"] is None
+    assert [one["value"] for one in said["levels"] if one["factor"] == "arena"] == ["room", "station"]
+
+
 def test_a_picture_of_what_cannot_be_negative_begins_at_0_or_above(
     undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
