@@ -11,6 +11,8 @@ from boebot.guests import Command, Folder
 COMMAND = Command(
     "Run brains in all the ways that a file says, and keep a row of each run.", "boebot_campaign.command:sweep"
 )
-MATTERS = Command("Find out which imperfections a brain's result hangs on.", "boebot_campaign.matters:matters")
+EVOLVE = Command(
+    "Find parameters with which a brain does better, as a file says.", "boebot_campaign.evolution:evolve_command"
+)
+MATTERS = Command("Find out which imperfections a brain's result hangs on.", "boebot_campaign.matters:matters_command")
 FOLDER = Folder("boebot_campaign.report:report", "boebot_campaign.sweep:kept_request")
-EVOLVE = Command("Find parameters with which a brain does better, as a file says.", "boebot_campaign.evolution:command")

@@ -11,53 +11,47 @@ beginning, and what its folders hold is not run twice.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+import dataclasses
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import msgspec
 import numpy as np
-import typer
+from msgspec.structs import replace
 
 from boebot import missing
-from boebot.cli import options, output
+from boebot.cli.ending import Detail
 from boebot.errors import BoebotError
 from boebot.rates import Mean, mean_of
 from boebot.record.figures import counted
 from boebot.record.run_folder import make_folder
 from boebot.running.brain_parameters import in_force
 from boebot.running.loop import execute
-from boebot_campaign import engine, evolve_file, kept, rows, toml_brain
-from boebot_campaign.command import Out, Scheduler, Workers, shown
+from boebot_campaign import kept, rows, toml_brain
+from boebot_campaign.command import command
+from boebot_campaign.engine import Told, Workers
 from boebot_campaign.evolve_file import Evolve
 from boebot_campaign.plan import Plan
-from boebot_campaign.report import saved
-from boebot_campaign.sweep import check_call
+from boebot_campaign.report import Page, saved, tell
+from boebot_campaign.sweep import function, run_plan
 
+TEST = "test"
 SIGMA = 0.3  # of the way between the bounds: how far the first candidates are from the brain by hand
 WORST = -np.inf  # fitness of a candidate of which a run has no figures
 
 
 @dataclass(frozen=True)
 class Generation:
-    """A point of the curve: fitness, the more the better. `mean`: of the candidates all of whose runs have figures.
-    `best_so_far`: the brain by hand is among them."""
+    """A point of the curve: fitness, the more the better. The brain by hand is among the candidates of the first one.
+    `mean`: of those all of whose runs have figures."""
 
     best: float
     mean: float | None
     best_so_far: float
 
 
-class Best(NamedTuple):
-    """A candidate."""
-
-    fitness: float
-    generation: int
-    candidate: int
-
-
-@dataclass(kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Evolution:
     """What came of it.
 
@@ -73,126 +67,107 @@ class Evolution:
     folder: Path
     brain: Path
     picture: Path
-    curve: list[Generation] = field(default_factory=list)
-    by_hand: float = WORST
-    pairs: int = 0
-    difference: Mean | None = None
+    curve: list[Generation]
+    by_hand: float
+    pairs: int
+    difference: Mean | None
 
 
-def evolve(
-    file: str | Path | None = None,
-    *,
-    out: str | Path | None = None,
-    scheduler: str | None = None,
-    workers: int | None = None,
-    progress: Callable[[int], object] | None = None,
-    **keys: Any,
-) -> Evolution:
-    """Finds parameters with which a brain does better, and says how much better where it has not been.
+def run_evolution(asked: Evolve, path: Path, workers: Workers, told: Told) -> Evolution:
+    """All of it."""
+    make_folder(path)
+    return _Work(asked, path, workers, told).all()
 
-    Args:
-        file: evolve.toml; or its keys by name, as of `boebot.sweep`.
-        out, scheduler, workers: as of `boebot.sweep`.
-        progress: is called with the number of runs that are done.
 
-    Raises:
-        BoebotError: in one sentence, before the first run where the file or the cluster is wrong. What is done stays.
-        KeyboardInterrupt: Ctrl-C; what is done stays, and the same call goes on.
-    """
-    check_call("an evolution", file, keys, out)
-    asked = evolve_file.made(keys) if file is None else evolve_file.read(Path(file))
-    folder = Path(out if out is not None else Path(str(file)).stem)
-    make_folder(folder)
-    with engine.Workers(scheduler, workers, folder / engine.LOG) as ours:
-        return _Work(asked, folder, ours, progress or (lambda _: None)).all()
+evolve = function("evolve", Evolve, run_evolution)
 
 
 class _Work:
     """An evolution on its way."""
 
-    def __init__(self, asked: Evolve, out: Path, workers: engine.Workers, told: Callable[[int], object]) -> None:
+    def __init__(self, asked: Evolve, out: Path, workers: Workers, told: Told) -> None:
         self._asked, self._out, self._workers, self._told = asked, out, workers, told
-        self._cma = missing.imported("cma", "an evolution", "cma", "learn")
         self._runs = 0
-        self._best = Best(WORST, 0, 0)
-        brain = out / f"{Path(asked.loaded.name).stem}-evolved.toml"
-        self._done = Evolution(folder=out, brain=brain, picture=out / "curve.png")
+        self._means: list[np.ndarray] = []  # of each generation: fitness by candidate, at the first's end by hand
 
     def all(self) -> Evolution:
-        for start in range(self._asked.given.restarts + 1):
-            self._from(start)
-        if self._best.fitness == WORST:
+        cma = missing.imported("cma", "an evolution", "cma", "learn")
+        for start in range(self._asked.restarts + 1):
+            self._from(cma, start)
+        best = [float(means.max()) for means in self._means]
+        if max(best) == WORST:
             raise BoebotError(f"no candidate has figures of all its runs; see the rows in {self._out}")
-        self._write_best()
-        self._test()
-        _draw(self._done)
-        return self._done
+        brain = self._best(best.index(max(best)))
+        pairs = self._test(brain)
+        done = Evolution(
+            folder=self._out,
+            brain=brain,
+            picture=self._out / "curve.png",
+            curve=[Generation(best[at], _mean(means), max(best[: at + 1])) for at, means in enumerate(self._means)],
+            by_hand=float(self._means[0][-1]),
+            pairs=len(pairs),
+            difference=mean_of(pairs) if len(pairs) else None,
+        )
+        _draw(done)
+        return done
 
-    def _from(self, start: int) -> None:
+    def _from(self, cma: Any, start: int) -> None:
         """CMA-ES from the brain by hand, or in a later start from anywhere with twice as many candidates."""
-        given, hand = self._asked.given, self._asked.by_hand
-        chance = np.random.default_rng((given.seed, start))
-        options = {"bounds": [0, 1], "popsize": given.population << start, "verbose": -9, "seed": np.nan}
+        asked = self._asked
+        chance = np.random.default_rng((asked.seed, start))
+        options = {"bounds": [0, 1], "popsize": asked.population << start, "verbose": -9, "seed": np.nan}
         options["randn"] = lambda *shape: chance.standard_normal(shape)
-        search = self._cma.CMAEvolutionStrategy(chance.random(len(hand)) if start else hand, SIGMA, options)
-        for _ in range(given.generations):
+        first = chance.random(len(asked.by_hand)) if start else asked.by_hand
+        search = cma.CMAEvolutionStrategy(first, SIGMA, options)
+        for _ in range(asked.generations):
             if search.stop():
                 break
             candidates = search.ask()
             search.tell(candidates, -self._generation(np.clip(candidates, 0, 1)))
 
     def _generation(self, points: np.ndarray) -> np.ndarray:
-        """The fitness of each candidate, after one more line of the curve."""
-        number, count = len(self._done.curve), len(points)
-        if number == 0:
+        """The fitness of each candidate: the mean of its runs."""
+        name, count = _folder(len(self._means)), len(points)
+        if not self._means:
             points = np.vstack([points, self._asked.by_hand])
-        plan = msgspec.structs.replace(self._asked.plan, points=len(points))
-        values = self._fitness(_folder(number), plan, points)
-        means: np.ndarray = values.reshape(plan.sizes[0], len(points), -1).mean(axis=(0, 2))
+        plan = replace(self._asked.training, points=len(points))
+        means = self._fitness(name, plan, points).reshape(plan.sizes[0], len(points), -1).mean(axis=(0, 2))
         means[np.isnan(means)] = WORST
-        if means.max() > self._best.fitness:
-            self._best = Best(float(means.max()), number, int(means.argmax()))
-        if number == 0:
-            self._done.by_hand = float(means[-1])
-        means = means[:count]
-        finite = means[means > WORST]
-        mean = float(finite.mean()) if len(finite) else None
-        self._done.curve.append(Generation(float(means.max()), mean, self._best.fitness))
-        return means
+        self._means.append(means)
+        return np.asarray(means[:count])
 
     def _fitness(self, name: str, plan: Plan, points: np.ndarray | None = None) -> np.ndarray:
         """Of each row of a sweep, in order, after it is run; nan: it has no figures."""
-        with kept.locked(self._out / name, plan, points) as folder:
-            self._workers.run(folder, lambda done: self._told(self._runs + done))
-            folder.merge()
-            self._runs += plan.count
-            self._told(self._runs)
-            return np.array([self._asked.fitness(row, folder.path) for row in folder.table().to_pylist()])
+        before = self._runs
+        folder = run_plan(plan, self._out / name, self._workers, lambda done: self._told(before + done), points)
+        self._runs += plan.count
+        return np.array([self._asked.fitness_of(row, folder.path) for row in folder.table().to_pylist()])
 
-    def _write_best(self) -> None:
-        """Writes its file, and runs it once, at the first arena, start and seed. Raises BoebotError: that run is
-        not the candidate's."""
-        folder = kept.Folder(self._out / _folder(self._best.generation))
-        row = self._best.candidate * (folder.plan.count // folder.plan.sizes[0] // folder.plan.points)
+    def _best(self, generation: int) -> Path:
+        """The file of the best candidate of a generation, which is run once, at the first arena, start and seed. Raises
+        BoebotError: that run is not the candidate's."""
+        asked, means, folder = self._asked, self._means[generation], kept.Folder(self._out / _folder(generation))
+        row = int(means.argmax()) * (folder.plan.count // folder.plan.sizes[0] // folder.plan.points)
         case = folder.plan.case(row, folder.points)
-        comment = f"{self._asked.loaded.name}, evolved: fitness {self._best.fitness:.4g} in training, by boebot evolve"
-        with in_force(self._asked.loaded, case.parameters):
-            text = toml_brain.text(self._asked.loaded, comment, self._asked.robot, self._asked.arena)
-        kept.write_whole(self._done.brain, lambda part: part.write_text(text, encoding="utf-8"))
+        comment = f"{asked.loaded.name}, evolved: fitness {means.max():.4g} in training, by boebot evolve"
+        with in_force(asked.loaded, case.parameters):
+            robot = _bundled(asked.all_robots[0], asked.loaded.robot)
+            text = toml_brain.text(asked.loaded, comment, robot, _bundled(asked.all_arenas[0], asked.loaded.arena))
+        brain = self._out / f"{Path(asked.loaded.name).stem}-evolved.toml"
+        kept.write_whole(brain, lambda part: part.write_text(text, encoding="utf-8"))
         request = rows.request_of(folder, case)
-        member = replace(request.members[0], brain=self._done.brain, parameters=None)
+        member = dataclasses.replace(request.members[0], brain=brain, parameters=None)
         expected = folder.table(["hash"])["hash"][row].as_py()
-        if execute(replace(request, members=[member])).robots[0].hash != expected:
-            raise BoebotError(f"{self._done.brain} does not run as row {row} of {folder.path}, of which it was made")
+        if execute(dataclasses.replace(request, members=[member])).robots[0].hash != expected:
+            raise BoebotError(f"{brain} does not run as row {row} of {folder.path}, of which it was made")
+        return brain
 
-    def _test(self) -> None:
-        plan = msgspec.structs.replace(
-            self._asked.test, brains=[*self._asked.test.brains, str(self._done.brain.absolute())]
-        )
-        values = self._fitness("test", plan).reshape(plan.sizes[0], 2, -1)
+    def _test(self, brain: Path) -> np.ndarray:
+        """How much fitter it is than the brain by hand, of each pair of runs that both have figures."""
+        plan = replace(self._asked.test, brains=[*self._asked.test.brains, str(brain.absolute())])
+        values = self._fitness(TEST, plan).reshape(plan.sizes[0], 2, -1)
         found = (values[:, 1] - values[:, 0]).ravel()
-        found = found[~np.isnan(found)]
-        self._done.pairs, self._done.difference = len(found), mean_of(found) if len(found) else None
+        return np.asarray(found[~np.isnan(found)])
 
 
 def in_words(done: Evolution) -> str:
@@ -204,6 +179,15 @@ def in_words(done: Evolution) -> str:
         return f"{mean:+.2f} beside by hand: nothing is shown by {pairs}"
     verdict = "nothing is shown: the interval includes 0" if least <= 0 <= most else "better" if mean > 0 else "worse"
     return f"{mean:+.2f} beside by hand ({least:+.2f} to {most:+.2f} at 95 %, {pairs}): {verdict}"
+
+
+def _bundled(given: str | None, own: str | None) -> str | None:
+    """The name that a brain's file may say: of the one that was given, or else of the brain's own."""
+    return own if given is None else given if Path(given).suffix != ".toml" else None
+
+
+def _mean(means: np.ndarray) -> float | None:
+    return float(np.mean(means[means > WORST])) if (means > WORST).any() else None
 
 
 def _folder(generation: int) -> str:
@@ -228,30 +212,16 @@ def _draw(done: Evolution) -> None:
     saved(figure, done.picture)
 
 
-def command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="How to evolve: docs/how-to/evolve.md has its keys.")],
-    out: Out = None,
-    scheduler: Scheduler = None,
-    workers: Workers = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check all, say how many runs it is, and run none.")
-    ] = False,
-    json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+@command(Evolve, run_evolution)
+def evolve_command(done: Evolution, wanted: Detail) -> None:
     """Find parameters with which a brain does better, as a file says.
 
-    Stopped anywhere, the same command goes on where it was. The best brain is a TOML file that runs on any board."""
-    asked, folder = evolve_file.read(file), out or Path(file.stem)
-    if dry_run:
-        output.print_json({"runs": asked.most_runs}) if json else output.line(f"at most {asked.most_runs:,} runs")
-        return
-    with shown("evolve", folder, asked.most_runs, quiet or json) as told:
-        done = evolve(file, out=folder, scheduler=scheduler, workers=workers, progress=told)
-    if json:
-        output.print_json(msgspec.to_builtins(done, enc_hook=str))
-    elif not quiet:
-        output.line(f"fitness in training {done.curve[-1].best_so_far:.2f}, by hand {done.by_hand:.2f}")
-        output.line(f"in the test {in_words(done)}")
-        output.line(f"best brain: {done.brain}")
-        output.line(f"picture: {done.picture}")
+    Stopped anywhere, the same command goes on where it was. The best brain is a TOML file that runs on any board. The
+    file is as docs/how-to/evolve.md says."""
+    lines = [
+        f"fitness in training {done.curve[-1].best_so_far:.2f}, by hand {done.by_hand:.2f}",
+        f"in the test {in_words(done)}",
+        f"best brain: {done.brain}",
+    ]
+    found = msgspec.to_builtins(done, enc_hook=str)
+    tell(Page(done.picture, f"Evolution {done.folder.name}", [], lines, found), wanted)

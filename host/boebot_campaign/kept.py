@@ -1,4 +1,4 @@
-"""The folder of a sweep: what was run, and the rows so far.
+"""The folder of a sweep: what was run, and the rows so far. Other campaigns keep their plan alike.
 
     sweep.json      the plan, the kit's version, and hashes of what follows
     points.npy      the design's points
@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import msgspec
 import numpy as np
@@ -35,13 +36,18 @@ from boebot.running.tasks import Request
 from boebot_campaign import designs
 from boebot_campaign.plan import Plan
 
+if TYPE_CHECKING:
+    import pandas
+
 NAME, POINTS, FILES, PARTS, ROWS = "sweep.json", "points.npy", "files", "parts", "rows.parquet"
 GROUP_ROWS = 65_536  # of rows.parquet, which is written group by group
 _WHAT = "the sweep's files"
+_SAME = "expected it as it was then, or another --out"
+_P = TypeVar("_P", bound=Plan)
 
 
-class Kept(msgspec.Struct, frozen=True, kw_only=True):
-    """What sweep.json says.
+class Kept(msgspec.Struct, Generic[_P], frozen=True, kw_only=True, omit_defaults=True):
+    """What sweep.json says, and its like.
 
     Attributes:
         version: of the kit, with its protocol.
@@ -50,24 +56,19 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     version: str
-    plan: Plan
-    names: dict[str, str]
-    hashes: dict[str, str]
+    plan: _P
+    names: dict[str, str] = {}
+    hashes: dict[str, str] = {}
 
 
 class Folder:
-    """A sweep's folder, of which sweep.json is there."""
+    """A sweep's folder, of which sweep.json is there, and what is in it so far."""
 
     def __init__(self, path: Path) -> None:
         """Raises BoebotError: there is no sweep."""
         self.path = path.absolute()
-        try:
-            self.kept = msgspec.json.decode((path / NAME).read_bytes(), type=Kept)
-        except FileNotFoundError:
-            raise BoebotError(f"{path} holds no sweep; expected a folder with {NAME}") from None
-        except (OSError, ValueError, msgspec.DecodeError) as error:
-            raise BoebotError(f"{path / NAME} cannot be read ({error}); expected it whole, or another --out") from None
-        self.parts = self.path / PARTS
+        self.kept = loaded(path / NAME, Plan)
+        self.parts, self.rows = self.path / PARTS, self.path / ROWS
 
     @cached_property
     def plan(self) -> Plan:
@@ -87,7 +88,7 @@ class Folder:
     @property
     def is_whole(self) -> bool:
         """All rows are there, in one file."""
-        return (self.path / ROWS).is_file()
+        return self.rows.is_file()
 
     def place(self, name: str | None) -> str | None:
         """Where the copy of a file is that the plan names; a bundled name is its own."""
@@ -117,14 +118,14 @@ class Folder:
         for name, digest in self.kept.hashes.items():
             copy = self.path / name
             if not copy.is_file() or _digest(copy.read_bytes()) != digest:
-                raise BoebotError(f"{copy} has changed since the sweep began; expected it as it was, or another --out")
+                raise BoebotError(f"{copy} has changed since the sweep began; {_SAME}")
 
     def merge(self) -> Path:
         """Makes rows.parquet of the parts, some rows at a time; a row that two parts have is taken once."""
         if not self.is_whole:
-            write_whole(self.path / ROWS, self._merge)
+            write_whole(self.rows, self._merge)
         shutil.rmtree(self.parts, ignore_errors=True)
-        return self.path / ROWS
+        return self.rows
 
     def _merge(self, path: Path) -> None:
         writer: Any = None
@@ -149,10 +150,29 @@ class Folder:
     def table(self, columns: Sequence[str] | None = None) -> Any:
         """The rows so far, with some of the columns or all: a pyarrow.Table. Raises BoebotError: a file is damaged."""
         if self.is_whole:
-            return _read(self.path / ROWS, self.plan.count, columns)
+            return _read(self.rows, self.plan.count, columns)
         if not (tables := list(self._tables(columns))):
             raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
         return _arrow().concat_tables(tables)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows so far, by their number."""
+        return self.table().to_pandas().set_index("row")
+
+    def statuses(self) -> dict[str, int]:
+        """How many rows there are of each status."""
+        counts = self.table(["status"])["status"].value_counts().to_pylist()
+        return {one["values"]: one["counts"] for one in counts}
+
+
+def loaded(file: Path, kind: type[_P]) -> Kept[_P]:
+    """What a campaign of that kind has begun with. Raises BoebotError: it has not, or the file is damaged."""
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=Kept[kind])  # type: ignore[valid-type]
+    except FileNotFoundError:
+        raise BoebotError(f"{file.parent} holds no {file.name}; expected a folder that boebot has made") from None
+    except (OSError, ValueError, msgspec.DecodeError) as error:
+        raise BoebotError(f"{file} cannot be read ({error}); expected it whole, or another --out") from None
 
 
 @lru_cache(maxsize=2)
@@ -163,6 +183,30 @@ def opened(path: Path, stamp: str) -> Folder:
 
 
 @contextlib.contextmanager
+def held(path: Path, name: str, before: Collection[str] = ()) -> Iterator[bool]:
+    """Makes a campaign's folder, and says whether the file `name` is in it, before which `before` are written; no other
+    campaign writes there in the block.
+
+    Raises:
+        BoebotError: another one does, or it holds other things.
+    """
+    make_folder(path)
+    try:
+        lock = system.lock_folder(path)
+    except BlockingIOError:
+        raise BoebotError(f"another process writes to {path} now; expected a folder for this one alone") from None
+    except OSError as error:
+        raise unwritable(path, error, _WHAT) from None
+    try:
+        there = {entry.name for entry in path.iterdir() if not entry.name.startswith(".")}
+        if name not in there and (others := there - set(before)):
+            raise BoebotError(f"{path} holds {min(others)!r} and no {name}; expected an empty folder or a new one")
+        yield name in there
+    finally:
+        os.close(lock)
+
+
+@contextlib.contextmanager
 def locked(path: Path, plan: Plan, points: np.ndarray | None = None) -> Iterator[Folder]:
     """The folder of that plan, made or taken up again; no other sweep writes there in the block. `points`: of the plan,
     in place of those of its design.
@@ -170,26 +214,12 @@ def locked(path: Path, plan: Plan, points: np.ndarray | None = None) -> Iterator
     Raises:
         BoebotError: another one does, or it holds other things, or a sweep of another plan, version or file.
     """
-    make_folder(path)
-    try:
-        lock = system.lock_folder(path)
-    except BlockingIOError:
-        raise BoebotError(f"another sweep writes to {path} now; expected a folder for this one alone") from None
-    except OSError as error:
-        raise unwritable(path, error, _WHAT) from None
-    try:
-        there = {entry.name for entry in path.iterdir() if not entry.name.startswith(".")}
-        if there and NAME not in there and there - {FILES, POINTS, PARTS}:
-            raise BoebotError(
-                f"{path} holds {sorted(there)[0]!r} and no sweep ({NAME}); expected an empty folder or a new one"
-            )
+    with held(path, NAME, (FILES, POINTS, PARTS)) as is_begun:
         try:
-            _make(path, plan, points) if NAME not in there else _take_up(path, plan, points)
+            _take_up(path, plan, points) if is_begun else _make(path, plan, points)
         except OSError as error:
             raise unwritable(path, error, _WHAT) from None
         yield Folder(path)
-    finally:
-        os.close(lock)
 
 
 def _make(path: Path, plan: Plan, points: np.ndarray | None) -> None:
@@ -203,27 +233,35 @@ def _make(path: Path, plan: Plan, points: np.ndarray | None) -> None:
         points = designs.points(plan.design, plan.points, len(plan.axes), plan.first_seed % 2**32)
     write_whole(path / POINTS, lambda part: part.write_bytes(_npy(points)))
     hashes = {name: _digest((path / name).read_bytes()) for name in (*files, POINTS)}
-    kept = Kept(version=version(), plan=plan, names=names, hashes=hashes)
-    write_whole(path / NAME, lambda part: part.write_bytes(msgspec.json.format(msgspec.json.encode(kept))))
+    keep(path / NAME, Kept(version=version(), plan=plan, names=names, hashes=hashes))
+
+
+def keep(file: Path, kept: Kept[Any]) -> None:
+    """Writes what a campaign begins with. Raises BoebotError: it cannot be written."""
+    write_whole(file, lambda part: part.write_bytes(msgspec.json.format(msgspec.json.encode(kept))))
+
+
+def compare(path: Path, kept: Kept[_P], plan: _P) -> None:
+    """Raises BoebotError where the folder was begun with another version or plan."""
+    if kept.version != version():
+        raise BoebotError(f"{path} is of boebot {kept.version}, this is {version()}; {_SAME}")
+    for key in reversed(plan.__struct_fields__):  # a kind's own first, of which those before may have been made
+        if _portable(getattr(plan, key)) != _portable(getattr(kept.plan, key)):
+            raise BoebotError(f"the plan has changed since {path} was begun, in {key}; {_SAME}")
 
 
 def _take_up(path: Path, plan: Plan, points: np.ndarray | None) -> None:
     """Checks that it is the same sweep; removes what writers have left that died."""
     folder = Folder(path)
-    expected = "expected it as it was when the sweep began, or another --out"
-    if folder.kept.version != version():
-        raise BoebotError(f"the sweep in {path} is of boebot {folder.kept.version}, this is {version()}; {expected}")
-    for key in plan.__struct_fields__:
-        if _portable(getattr(plan, key)) != _portable(getattr(folder.plan, key)):
-            raise BoebotError(f"the plan has changed since the sweep in {path} began, in {key}; {expected}")
+    compare(path, folder.kept, plan)
     folder.check()
     if points is not None and not np.array_equal(points, folder.points):
-        raise BoebotError(f"the points of the sweep in {path} were others when it began; {expected}")
+        raise BoebotError(f"the points have changed since {path} was begun; {_SAME}")
     _, files = _sources(plan)
     for name, digest in folder.kept.hashes.items():
         if name != POINTS and (name not in files or _digest(files[name]) != digest):
             original = next((one for one, copy in folder.kept.names.items() if copy == name), Path(name).name)
-            raise BoebotError(f"{original} has changed since the sweep in {path} began; {expected}")
+            raise BoebotError(f"{original} has changed since {path} was begun; {_SAME}")
     for left in (*folder.parts.glob(".*.tmp"), *folder.parts.glob("*.begun"), *path.glob(".*.tmp")):
         left.unlink(missing_ok=True)
     folder.parts.mkdir(exist_ok=True)
@@ -298,8 +336,6 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def _npy(points: np.ndarray) -> bytes:
-    import io
-
     file = io.BytesIO()
     np.save(file, points)
     return file.getvalue()

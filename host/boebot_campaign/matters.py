@@ -14,32 +14,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import msgspec
 import numpy as np
-import typer
 
 from boebot import missing
-from boebot.cli import options
 from boebot.cli.ending import Detail
 from boebot.description.robots import RobotDescription, idle, magnitude
 from boebot.errors import BoebotError, CallError, expected_one
 from boebot.imperfections import imperfections
 from boebot.rates import Mean
-from boebot.record.run_folder import make_folder
 from boebot.running.tasks import prepare
-from boebot_campaign.command import Out, Scheduler, Workers, shown
+from boebot_campaign.command import command
+from boebot_campaign.engine import Told, Workers
 from boebot_campaign.kept import Folder
-from boebot_campaign.plan import AnyAxis, Axis, Plan, Range, length, listed, read_as
-from boebot_campaign.report import said, saved, tell, words
+from boebot_campaign.plan import AnyAxis, Axis, Range, Single, length, listed
+from boebot_campaign.report import Page, said, saved, tell, words
 from boebot_campaign.rows import OK, numbers
-from boebot_campaign.sweep import run_plan
+from boebot_campaign.sweep import function, run_plan
 
 Axes = Sequence[tuple[str, AnyAxis]]
 MOST = 5  # imperfections that get Sobol indices
 ERROR = 0.05  # of all effects together
 PICTURE = "matters.png"
+EFFECTS = ["name", "from", "to", "effect on average", "at one seed"]
 SHARES = {"by_itself": "by itself", "with_others": "together with others"}
 LEGEND = (
     "Effect: the figure at the second value less that at the first. At one seed: its root mean square; three others "
@@ -48,7 +47,7 @@ LEGEND = (
 )
 
 
-class Matters(Plan, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
+class Matters(Single, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
     """The keys of matters.toml (docs/how-to/what-matters.md)."""
 
     figure: str
@@ -57,10 +56,6 @@ class Matters(Plan, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=
 
     def completed(self, at: str) -> Self:
         """With each imperfection that changes something of the robot. Raises CallError."""
-        if len(self.brains) != 1 or len(self.robots) > 1:
-            raise CallError(
-                f"{at}there are {len(self.brains)} brains and {len(self.robots)} robots; expected one of each"
-            )
         if length(self.seeds) < 2:
             raise CallError(f"{at}there is one seed; expected 2 or more, as one alone does not show what is chance")
         if self.samples < 1 or self.samples & (self.samples - 1):
@@ -72,9 +67,10 @@ class Matters(Plan, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=
         own = {name: axis for name, axis in found.items() if axis is not None}
         return msgspec.structs.replace(self, imperfections=own | self.imperfections)
 
-    def plan(self, **changes: Any) -> Plan:
-        """Of a sweep."""
-        return Plan(**{name: getattr(self, name) for name in Plan.__struct_fields__} | changes)
+    @property
+    def most_runs(self) -> int:
+        """Of the effects, and of the indices of as many axes as may get them, and of the seed."""
+        return self.count + self.count // (self.sizes[3] * self.sizes[6]) * self.samples * (MOST + 3)
 
 
 def _ends(name: str, robot: RobotDescription) -> Axis | None:
@@ -144,50 +140,36 @@ def _values(folder: Folder, figure: str) -> np.ndarray:
     return np.asarray(values.reshape(folder.plan.sizes).mean(axis=(0, 1, 2, 4, 5)))
 
 
-def matters(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="What to run: docs/how-to/what-matters.md has its keys.")
-    ],
-    out: Out = None,
-    scheduler: Scheduler = None,
-    workers: Workers = None,
-    json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
-    """Find out which imperfections a brain's result hangs on.
-
-    Stopped anywhere, the same command goes on where it was."""
-    asked, path = read_as(file, Matters), out or Path(file.stem)
+def run_matters(asked: Matters, path: Path, workers: Workers, told: Told) -> Page:
+    """The effects, and the indices of those that count."""
     missing.imported("SALib.analyze.sobol", "boebot matters", "SALib", "learn")
-    make_folder(path)
-
-    def ran(name: str, plan: Plan) -> Folder:
-        with shown(name, path / name, plan.count, quiet or json) as told:
-            return Folder(run_plan(plan, path / name, scheduler, workers, told).folder)
-
-    first = ran("effects", asked.plan())
+    first = run_plan(asked.as_sweep(), path / "effects", workers, told)
     found, indices = effects(first.plan.axes, first.points, _values(first, asked.figure)), []
-    if few := [one["name"] for one in found if one["counts"]][:MOST]:
+    counting = [one for one in found if one["counts"]]
+    if few := [one["name"] for one in counting][:MOST]:
         kinds = {"parameters": asked.parameters, "imperfections": asked.imperfections}
         axes = {kind: {name: own[name] for name in few if name in own} for kind, own in kinds.items()}
-        second = ran("indices", asked.plan(design="saltelli", points=asked.samples, **axes))
+        plan = asked.as_sweep(design="saltelli", points=asked.samples, **axes)
+        second = run_plan(plan, path / "indices", workers, lambda done: told(first.plan.count + done))
         indices = shares(second.plan.axes, _values(second, asked.figure)[:, 0])
     title = f"What the {words(asked.figure)} of {Path(asked.brains[0]).name} hangs on"
-    picture = _drawn(path / PICTURE, title, found, indices)
-    tables = [
-        (
-            ["name", "from", "to", "effect on average", "at one seed"],
-            [_in_words(one) for one in found if one["counts"]],
-        ),
-        (
-            ["share of the variance", *SHARES.values()],
-            [[one["name"], *(_said(one[key]) for key in SHARES)] for one in indices],
-        ),
-    ]
+    shared = [[one["name"], *(_said(one[key]) for key in SHARES)] for one in indices]
+    tables = [(EFFECTS, [_in_words(one) for one in counting]), (["share of the variance", *SHARES.values()], shared)]
     others = ", ".join(one["name"] for one in found if not one["counts"])
     lines = [*([f"No effect shows of {others}."] if others else []), LEGEND]
     both = {"figure": asked.figure, "effects": found, "indices": indices}
-    tell(picture, title, tables, lines, both, Detail.JSON if json else Detail.NOTHING if quiet else Detail.FEW)
+    return Page(_drawn(path / PICTURE, title, found, indices), title, tables, lines, both)
+
+
+matters = function("matters", Matters, run_matters)
+
+
+@command(Matters, run_matters)
+def matters_command(page: Page, wanted: Detail) -> None:
+    """Find out which imperfections a brain's result hangs on.
+
+    Stopped anywhere, the same command goes on where it was. The file is as docs/how-to/what-matters.md says."""
+    tell(page, wanted)
 
 
 def _in_words(one: dict[str, Any]) -> list[str]:

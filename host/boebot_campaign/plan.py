@@ -151,9 +151,19 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         return math.prod(self.sizes)
 
     @property
+    def most_runs(self) -> int:
+        """How many runs all of it is, at most."""
+        return self.count
+
+    @property
     def first_seed(self) -> int:
         """The design's, too."""
         return self.seeds.low if isinstance(self.seeds, Whole) else self.seeds[0]
+
+    def as_sweep(self, **changes: Any) -> Plan:
+        """The plan alone, without what a campaign of another kind has beside it, and with those keys."""
+        keys = {name: getattr(self, name) for name in Plan.__struct_fields__}
+        return msgspec.convert(msgspec.to_builtins(keys | changes), Plan)
 
     def completed(self, at: str) -> Self:
         """With what the file leaves to be found. Raises CallError, which begins with `at`."""
@@ -231,50 +241,46 @@ def heard(given: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in given.items() if given.get(table[name].needs, 1)}
 
 
+class Single(Plan, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
+    """Of one brain, on one robot or on its own."""
+
+    brains: Annotated[list[str], msgspec.Meta(min_length=1, max_length=1)]
+    robots: Annotated[list[str], msgspec.Meta(max_length=1)] = msgspec.field(default_factory=list)
+
+
 _P = TypeVar("_P", bound=Plan)
 
 
-def read(path: Path) -> Plan:
+def read(path: Path, kind: type[_P]) -> _P:
     """The plan in a file; what it names is found beside it. Raises CallError, with file, line and key."""
-    return read_as(path, Plan)
-
-
-def read_as(path: Path, kind: type[_P]) -> _P:
-    """The same of a file with more keys.
-
-    Raises:
-        CallError: with file, line and key.
-    """
     if not path.is_file():
         raise CallError(f"there is no file {path}; expected a TOML file")
-    table = toml_files.read(path, CallError)
-    plan, at = toml_files.convert(table, kind, path.name, CallError), f"{path.name}: "
-    return _checked(_found(plan, path.parent).completed(at), at)
+    return _made(toml_files.read(path, CallError), kind, path.name, path.parent)
 
 
-def made(keys: Mapping[str, Any], folder: Path = Path(), name: str = "sweep") -> Plan:
-    """The plan of these keys, as a file of that name in that folder could have them. Raises CallError."""
-    plain = as_in_a_file(keys, name)
-    return _checked(_found(toml_files.convert(plain, Plan, name, CallError), folder), f"{name}: ")
-
-
-def as_in_a_file(keys: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The keys as TOML has them. Raises CallError."""
+def made(keys: Mapping[str, Any], kind: type[_P], name: str) -> _P:
+    """The plan of these keys, as a file here could have them; `name`: of it, for errors. Raises CallError."""
     try:
-        return dict(msgspec.to_builtins(dict(keys)))
+        plain = msgspec.to_builtins(dict(keys))
     except TypeError as error:
         raise CallError(f"{name} is made of what TOML can have: {error}; brains are names or files") from None
+    return _made(plain, kind, name, Path())
+
+
+def _made(table: dict[str, Any], kind: type[_P], name: str, folder: Path) -> _P:
+    plan = toml_files.convert(table, kind, name, CallError)
+    return valid(_found(plan, folder).completed(f"{name}: "), f"{name}: ")
 
 
 def _found(plan: _P, folder: Path) -> _P:
     """With whole paths of files."""
     kinds = ("brains", "robots", "arenas", "test_arenas")
     return msgspec.structs.replace(
-        plan, **{kind: [whole(one, folder) for one in getattr(plan, kind)] for kind in kinds}
+        plan, **{kind: [_whole(one, folder) for one in getattr(plan, kind)] for kind in kinds}
     )
 
 
-def whole(name: str, folder: Path) -> str:
+def _whole(name: str, folder: Path) -> str:
     """The whole path of a file that is named in a folder; a bundled name as it is."""
     return str((folder / name).absolute()) if Path(name).suffix in (".py", ".toml") else name
 
@@ -290,7 +296,7 @@ def _at(axis: list[Any] | Whole, index: int) -> Any:
     return axis[index] if isinstance(axis, list) else axis.low + index
 
 
-def _checked(plan: _P, at: str) -> _P:
+def valid(plan: _P, at: str) -> _P:
     """Raises CallError or another BoebotError, in one sentence, before anything is made."""
     _check_once(plan, at)
     if plan.test_arenas and not plan.arenas:
@@ -298,8 +304,8 @@ def _checked(plan: _P, at: str) -> _P:
     if plan.on is not None and is_live(plan.on):
         raise CallError(f"{at}on is {plan.on!r}, a port; expected an emulated board, native or avr, or direct")
     _check_design(plan, at)
-    if plan.count > MOST_RUNS:
-        raise CallError(f"{at}these are {plan.count:,} runs; expected at most {MOST_RUNS:,}")
+    if plan.most_runs > MOST_RUNS:
+        raise CallError(f"{at}these are {plan.most_runs:,} runs; expected at most {MOST_RUNS:,}")
     _check_runs(plan, at)
     return plan
 

@@ -62,7 +62,7 @@ def report(path: Path, wanted: Detail) -> None:
     lines = [*_differences(compared), _INTERVALS]
     by_level = [{"factor": one.factor, "value": one.value, "runs": one.runs} | one.means for one in levels]
     found = {"levels": by_level, "compared": compared}
-    tell(picture, f"Sweep {path.name}", [(titles, rows)], lines, found, wanted)
+    tell(Page(picture, f"Sweep {path.name}", [(titles, rows)], lines, found), wanted)
 
 
 def _numbers(folder: Folder, name: str) -> np.ndarray:
@@ -208,15 +208,19 @@ def saved(figure: Any, path: Path) -> Path:
     return write_whole(path, lambda part: figure.savefig(part, dpi=120), path.name)
 
 
-def tell(
-    picture: Path,
-    title: str,
-    tables: Sequence[tuple[Sequence[str], Sequence[Sequence[str]]]],
-    lines: Sequence[str],
-    found: dict[str, Any],
-    wanted: Detail,
-) -> None:
-    """Tables and sentences beside a picture, as a page and as is wanted; `found`: for programs. Raises BoebotError."""
+class Page(NamedTuple):
+    """Tables, with their titles, and sentences beside a picture; `found`: for programs."""
+
+    picture: Path
+    title: str
+    tables: Sequence[tuple[Sequence[str], Sequence[Sequence[str]]]]
+    lines: Sequence[str]
+    found: dict[str, Any]
+
+
+def tell(told: Page, wanted: Detail) -> None:
+    """Writes the page beside its picture, and prints what is wanted of it. Raises BoebotError."""
+    picture, title, tables, lines, found = told
     parts = [f"# {title}", f"![{title}]({picture.name})"]
     for titles, rows in tables:
         cells = [titles, ["---"] * len(titles), *rows]

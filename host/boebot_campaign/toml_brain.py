@@ -12,24 +12,22 @@ from boebot.brains import LoadedBrain
 from boebot.errors import BrainError
 
 
-def check(loaded: LoadedBrain) -> None:
-    """Raises BrainError where a file cannot say what the brain is made of."""
+def text(loaded: LoadedBrain, comment: str, robot: str | None, arena: str | None) -> str:
+    """The file, with the parameters that are in force now, for that robot and arena.
+
+    Raises:
+        BrainError: a file cannot say what the brain is made of.
+    """
     if loaded.brain is None:
         raise BrainError(
             f"brain {loaded.name!r} has no processes; expected a Brain of processes, whose parameters evolve"
         )
-    if odd := described(loaded.brain)["undescribed"]:
+    table = described(loaded.brain)
+    if odd := table["undescribed"]:
         raise BrainError(
             f"brain {loaded.name!r} cannot be written as a TOML file: {odd[0]}; expected the kit's processes and "
             "state variables alone"
         )
-
-
-def text(loaded: LoadedBrain, comment: str, robot: str | None, arena: str | None) -> str:
-    """The file, with the parameters that are in force now, for that robot and arena. Raises as `check`."""
-    check(loaded)
-    assert loaded.brain is not None
-    table = described(loaded.brain)
     plain = {"period_s": table["period_s"], "margin": table["margin"], "robot": robot, "arena": arena}
     lines = [f"# {comment}", "", *_lines(plain)]
     for kind in ("variable", "process"):

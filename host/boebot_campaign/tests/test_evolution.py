@@ -6,6 +6,7 @@ import os
 import shutil
 import tomllib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +18,16 @@ from boebot.brains import load_brain
 from boebot.errors import BoebotError
 from boebot.rates import Mean, mean_of
 from boebot.running.brain_parameters import in_force
-from boebot_campaign import engine, evolution, evolve_file, kept, tasks, toml_brain
+from boebot_campaign import engine, evolution, kept, plan, tasks, toml_brain
+from boebot_campaign.evolve_file import Evolve
 
 KEYS: dict[str, Any] = {
-    "brain": "clearway",
+    "brains": ["clearway"],
     "arenas": ["room"],
     "seconds": 0.5,
     "seeds": [1, 2],
     "test_seeds": [11, 12],
-    "population": 3,
+    "population": 2,
     "generations": 2,
     "restarts": 1,
     "parameters": {"avoid.utility.b": {"from": -3, "to": 3}, "wander.forward": {}},
@@ -57,8 +59,8 @@ def whole(ran: list[tuple[str, int]], tmp_path_factory: pytest.TempPathFactory) 
     told: list[int] = []
     done: evolution.Evolution = boebot.evolve(out=tmp_path_factory.mktemp("whole"), progress=told.append, **KEYS)
     assert told == sorted(told)
-    assert told[-1] == sum(count for _, count in ran) == (3 + 1 + 3 + 6 + 6) * 2 + 2 * 2
-    assert told[-1] == evolve_file.made(KEYS).most_runs
+    assert told[-1] == sum(count for _, count in ran) == (2 + 1 + 2 + 4 + 4) * 2 + 2 * 2
+    assert told[-1] == plan.made(KEYS, Evolve, "evolve").most_runs
     return done
 
 
@@ -77,9 +79,9 @@ def test_stopped_evolution_goes_on_and_ends_as_one_that_was_not(
     assert stopped.curve == whole.curve and stopped.difference == whole.difference
     assert stopped.brain.read_text() == whole.brain.read_text()
 
-    with pytest.raises(BoebotError, match=r"points of the sweep in .*generation-000 were others"):
+    with pytest.raises(BoebotError, match=r"points have changed since .*generation-000 was begun"):
         boebot.evolve(out=tmp_path, **KEYS | {"seed": 2})
-    with pytest.raises(BoebotError, match=r"the plan has changed since .*generation-000 began, in seconds"):
+    with pytest.raises(BoebotError, match=r"the plan has changed since .*generation-000 was begun, in seconds"):
         boebot.evolve(out=tmp_path, **KEYS | {"seconds": 0.6})
 
 
@@ -90,7 +92,7 @@ def test_best_is_the_candidate_whose_rows_say_so(whole: evolution.Evolution) -> 
         for point, rows in frame.groupby(["parameter.avoid.utility.b", "parameter.wander.forward"]):
             means[point] = rows["fitness"].mean()
     best = max(means, key=lambda point: means[point])
-    assert len(means) == 3 + 1 + 3 + 6 + 6 and means[-1.0, 0.5] == pytest.approx(whole.by_hand)
+    assert len(means) == 2 + 1 + 2 + 4 + 4 and means[-1.0, 0.5] == pytest.approx(whole.by_hand)
     written = tomllib.loads(whole.brain.read_text())["process"]
     assert (written["avoid"]["utility"]["b"], written["wander"]["forward"]) == best
     assert whole.curve[-1].best_so_far == pytest.approx(means[best]) and whole.by_hand < means[best]
@@ -118,11 +120,12 @@ def _rows(folder: Path) -> Any:
     ],
 )
 def test_fitness_weighs_figures_and_what_happened(row: dict[str, Any], expected: float | None) -> None:
-    asked = evolve_file.made(KEYS | {"fitness": {"true_distance_m": 2.0, "empty_battery": -10.0, "raised": -100.0}})
-    found = asked.fitness({"row": 1, "true_distance_m": 3.0, **row}, Path("out"))
+    weights = {"true_distance_m": 2.0, "empty_battery": -10.0, "raised": -100.0}
+    asked = plan.made(KEYS | {"fitness": weights}, Evolve, "evolve")
+    found = asked.fitness_of({"row": 1, "true_distance_m": 3.0, **row}, Path("out"))
     assert np.isnan(found) if expected is None else found == expected
-    with pytest.raises(BoebotError, match="empty_battery is not known of row 1"):
-        asked.fitness({"row": 1, "true_distance_m": 3.0, "status": "ok", "battery_charge": None}, Path("out"))
+    with pytest.raises(BoebotError, match="row 1 in out has no empty_battery"):
+        asked.fitness_of({"row": 1, "true_distance_m": 3.0, "status": "ok", "battery_charge": None}, Path("out"))
 
 
 OWN = """\
@@ -146,12 +149,21 @@ brain = Brain([Mine()])
         ({"seeds": []}, "seeds: expected array of length >= 1"),
         ({"test_seeds": []}, "seeds: expected array of length >= 1"),
         ({"test_seeds": [2]}, "test_seeds has 2, as seeds has"),
+        ({"points": 3}, "an evolution has no points and imperfections; expected population and parameters"),
+        ({"imperfections": {"servo_lag_s": [0.1]}}, "has no points and imperfections"),
+        ({"design": "grid"}, "design is 'grid'; expected one of random"),
+        ({"parameters": {"avoid.utility.b": {"from": -3, "to": 3, "steps": 3}}}, "has steps, which only a grid takes"),
+        ({"parameters": {"avoid.utility.b": {"form": -3}}}, "unknown field form"),
+        ({"brains": ["clearway", "demo"]}, "brains: expected array of length <= 1"),
+        ({"brain": "clearway"}, "there is no key 'brain' here.*did you mean 'brains'"),
+        ({"test_seeds": {"from": 9, "to": 8}}, "test_seeds: from is 9, to is 8"),
+        ({"test_seeds": {"from": 2, "to": 10**12}}, "of the test, these are 999,999,999,999 runs"),
         ({"population": 1}, "population: expected int >= 2"),
         ({"restarts": 40}, "<= 20"),
         ({"restarts": 20}, "runs; expected at most"),
         ({"arenas": ["nowhere"]}, "nowhere"),
-        ({"brain": "wander"}, "has no processes"),
-        ({"brain": "own.py"}, "cannot be written as a TOML file: process 'mine'"),
+        ({"brains": ["wander"]}, "has no processes"),
+        ({"brains": ["own.py"]}, "cannot be written as a TOML file: process 'mine'"),
     ],
 )
 def test_bad_input_is_a_sentence_before_the_first_run(
@@ -177,10 +189,11 @@ def test_brain_written_as_toml_runs_as_it_did(name: str, tmp_path: Path) -> None
 
 
 def test_words_say_when_nothing_is_shown() -> None:
-    done = evolution.Evolution(folder=Path(), brain=Path(), picture=Path(), pairs=3)
+    none = Path()
+    done = evolution.Evolution(folder=none, brain=none, picture=none, curve=[], by_hand=0.0, pairs=3, difference=None)
     assert evolution.in_words(done) == "no run of both has figures"
     for bounds, verdict in (((-0.1, 0.5), "includes 0"), ((0.1, 0.5), "better"), ((-0.5, -0.1), "worse")):
-        done.difference = Mean(sum(bounds) / 2, *bounds)
-        assert evolution.in_words(done).endswith(verdict)
-    done.pairs, done.difference = 1, mean_of(np.array([0.5]))
-    assert evolution.in_words(done) == "+0.50 beside by hand: nothing is shown by 1 pair"
+        shown = replace(done, difference=Mean(sum(bounds) / 2, *bounds))
+        assert evolution.in_words(shown).endswith(verdict)
+    shown = replace(done, pairs=1, difference=mean_of(np.array([0.5])))
+    assert evolution.in_words(shown) == "+0.50 beside by hand: nothing is shown by 1 pair"

@@ -13,10 +13,9 @@ import pytest
 
 from boebot.description.robots import load_robot
 from boebot.errors import BoebotError
-from boebot_campaign import designs, kept, local, matters, tasks
+from boebot_campaign import designs, engine, kept, local, tasks
 from boebot_campaign.matters import Matters, effects, shares
-from boebot_campaign.plan import Plan, Range, heard, read_as
-from boebot_campaign.sweep import Sweep
+from boebot_campaign.plan import Plan, Range, heard, read
 from command import boebot
 from sim_bridge.robots.imperfections import applied
 
@@ -102,7 +101,7 @@ def saved(folder: Path, text: str) -> Path:
 
 def test_all_that_changes_something_of_the_robot_is_an_axis_and_each_row_can_be_run(tmp_path: Path) -> None:
     text = FILE.replace("arsim", "shieldbot") + "[imperfections]\nencoder_bounces = [0, 3]\n"
-    plan = read_as(saved(tmp_path, text), Matters).plan()
+    plan = read(saved(tmp_path, text), Matters).as_sweep()
     assert len(plan.axes) == 35 and plan.count == 128 * 2
     assert plan.imperfections["servo_lag_s"] == Range(low=0.0, high=0.055)
     assert plan.imperfections["ping_grazing_rad"] == Range(low=1.57, high=0.785)  # it is off at 1.57
@@ -115,13 +114,14 @@ def test_all_that_changes_something_of_the_robot_is_an_axis_and_each_row_can_be_
 def test_the_file_of_the_page_can_be_asked(tmp_path: Path) -> None:
     page = Path(__file__).resolve().parents[3] / "docs/how-to/what-matters.md"
     (block,) = re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL)
-    plan = read_as(saved(tmp_path, block), Matters).plan()
+    plan = read(saved(tmp_path, block), Matters).as_sweep()
     assert f"here {len(plan.axes)} of them in {plan.count // 12} settings, each at 12 seeds" in page.read_text()
 
 
 BAD = {
     "one seed": (("[1, 2]", "{ from = 3, to = 3 }"), "there is one seed; expected 2 or more"),
-    "two brains": (('["wander"]', '["wander", "clearway"]'), "2 brains and 1 robots"),
+    "two brains": (('["wander"]', '["wander", "clearway"]'), "brains: expected array of length <= 1"),
+    "two robots": (('["arsim"]', '["arsim", "shieldbot"]'), "robots: expected array of length <= 1"),
     "no such figure": (("true_distance_m", "true_distance"), "figure is 'true_distance'.*true_distance_m"),
     "a figure that is no number": (("true_distance_m", "hash"), "figure is 'hash'; expected one of [a-z_, ]*$"),
     "a figure that the plan says": (("true_distance_m", "seed"), "figure is 'seed'; expected one of "),
@@ -138,7 +138,7 @@ BAD = {
 def test_what_cannot_be_asked_is_one_sentence(change: tuple[str, str], sentence: str, tmp_path: Path) -> None:
     assert change[0] in FILE
     with pytest.raises(BoebotError, match=f"matters.toml.*{sentence}"):
-        read_as(saved(tmp_path, FILE.replace(*change)), Matters)
+        read(saved(tmp_path, FILE.replace(*change)), Matters)
 
 
 def test_the_command_writes_a_page_and_goes_on_where_it_was(
@@ -146,18 +146,16 @@ def test_the_command_writes_a_page_and_goes_on_where_it_was(
 ) -> None:
     ran = []
 
-    def without_cluster(plan: Plan, path: Path, *_: object) -> Sweep:
-        with kept.locked(path, plan) as folder:
-            if folder.undone():
-                ran.append((path.name, plan.count))
-                worker = FORKED.Process(target=tasks.do_part, args=(str(path), folder.stamp, 0, plan.count))
-                worker.start()
-                worker.join()
-                assert worker.exitcode == 0
-            folder.merge()
-        return Sweep(path)
+    def without_cluster(_: engine.Workers, folder: kept.Folder, told: engine.Told) -> None:
+        if folder.undone():
+            ran.append((folder.path.name, folder.plan.count))
+            worker = FORKED.Process(target=tasks.do_part, args=(str(folder.path), folder.stamp, 0, folder.plan.count))
+            worker.start()
+            worker.join()
+            assert worker.exitcode == 0
+        told(folder.plan.count)
 
-    monkeypatch.setattr(matters, "run_plan", without_cluster)
+    monkeypatch.setattr(engine.Workers, "run", without_cluster)
     out = tmp_path / "out"
     command = ["matters", str(saved(tmp_path, FILE)), "--out", str(out)]
     code, text, errors = boebot(capsys, *command, "--json")

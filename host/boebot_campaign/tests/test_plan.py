@@ -28,7 +28,9 @@ def test_rows_are_all_combinations_each_once_and_seeds_are_paired() -> None:
             "starts": [[0.0, 0.0, 0.0], [0.5, 0.5, 1.0]],
             "parameters": {"avoid.utility.b": [0.0, 1.0]},
             "imperfections": {"servo_lag_s": {"from": 0.02, "to": 0.08, "steps": 3}},
-        }
+        },
+        plan.Plan,
+        "sweep",
     )
     none = designs.points(made.design, made.points, 2, 1)
     cases = [made.case(row, none) for row in range(made.count)]
@@ -45,7 +47,8 @@ def test_rows_are_all_combinations_each_once_and_seeds_are_paired() -> None:
 
 
 def test_free_starts_are_of_the_arena_that_the_run_is_in() -> None:
-    made = plan.made({**ONE, "brains": ["wander"], "robots": ["arsim"], "seconds": 0.01, "starts": 50})
+    keys = {**ONE, "brains": ["wander"], "robots": ["arsim"], "seconds": 0.01, "starts": 50}
+    made = plan.made(keys, plan.Plan, "sweep")
     none = designs.points(made.design, made.points, 0, 1)
     requests = [made.request(made.case(row, none), "") for row in range(made.count)]
     assert len({request.members[0].pose for request in requests}) == 50

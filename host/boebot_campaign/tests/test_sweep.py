@@ -71,7 +71,7 @@ def at_a_worker(out: Path, first: int, end: int) -> int | None:
 
 def by_hand(out: Path, file: Path, *parts: tuple[int, int]) -> list[dict[str, Any]]:
     """The rows after those parts, or else all that are not there yet, were done in that order without a cluster."""
-    with kept.locked(out, plan.read(file)) as folder:
+    with kept.locked(out, plan.read(file, plan.Plan)) as folder:
         for part in parts or folder.undone():
             assert at_a_worker(out, *part) == 0
         folder.merge()
@@ -177,7 +177,7 @@ def test_a_full_disk_ends_the_sweep_in_a_sentence_and_loses_no_row(undisturbed: 
 
 def test_a_full_disk_leaves_no_half_part(undisturbed: Path, tmp_path: Path) -> None:
     file, out, said = saved(tmp_path, PLAN), tmp_path / "out", tmp_path / "said"
-    with kept.locked(out, plan.read(file)) as folder:
+    with kept.locked(out, plan.read(file, plan.Plan)) as folder:
         code = f"""
 import resource, sys
 from boebot_campaign import tasks
@@ -197,7 +197,7 @@ tasks.do_part({str(out)!r}, {folder.stamp!r}, 0, 40)
 def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(each: int, tmp_path: Path) -> None:
     text = ODD.replace('"raises", "loops", "kills"', '"kills", "raises"')
     file, out = saved(tmp_path, text if each == 2 else text.replace("[1, 2]", "[1]")), tmp_path / "out"
-    with kept.locked(out, plan.read(file)) as folder:
+    with kept.locked(out, plan.read(file, plan.Plan)) as folder:
         for _ in range(2 * each):
             assert at_a_worker(out, 0, 3 * each) == -signal.SIGKILL
         assert at_a_worker(out, 0, 3 * each) == 0
@@ -214,7 +214,7 @@ def test_the_row_that_kills_two_workers_says_so_and_the_others_are_run(each: int
 
 def test_a_brain_that_interrupts_or_exits_is_a_row(tmp_path: Path) -> None:
     text = ODD.replace('"well", "raises", "loops", "kills"', '"interrupts", "exits"').replace("[1, 2]", "[1]")
-    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text))) as folder:
+    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text), plan.Plan)) as folder:
         rows = [run_case(folder, folder.plan.case(row, folder.points)) for row in range(2)]
     for row, error in zip(rows, ("KeyboardInterrupt", "SystemExit"), strict=True):
         assert row["status"] == "raised" and 0.5 <= row["run_time_s"] < 0.7
@@ -223,7 +223,7 @@ def test_a_brain_that_interrupts_or_exits_is_a_row(tmp_path: Path) -> None:
 
 def test_a_run_beyond_the_limit_is_a_row_without_figures(tmp_path: Path) -> None:
     text = ODD.replace('["well", "raises", "loops", "kills"]', '["loops"]').replace("1.5", "0.3")
-    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text))) as folder:
+    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, text), plan.Plan)) as folder:
         assert at_a_worker(folder.path, 0, 1) == 0
         row = folder.table().to_pylist()[0]
     assert row["status"] == "timed out" and row["error"] == "the run has lasted longer than 0.3 s"
@@ -354,7 +354,7 @@ def test_a_picture_of_what_cannot_be_negative_begins_at_0_or_above(
 
 
 def test_the_newest_rows_are_shown_while_a_sweep_runs(tmp_path: Path) -> None:
-    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, PLAN))) as folder:
+    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, PLAN), plan.Plan)) as folder:
         assert newest_rows(folder.path, 1) == ""
         rows = [{"row": row, "brain": "odd.py", "seed": row + 500, "status": "ok"} for row in range(10)]
         kept.write_part(folder.part(0, 10), table_of(rows, columns(folder.plan, ["clearway"])))
@@ -385,7 +385,7 @@ def test_ctrl_c_ends_a_dry_run(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:
     file = saved(tmp_path, PLAN)
-    with kept.locked(tmp_path / "out", plan.read(file)) as folder:
+    with kept.locked(tmp_path / "out", plan.read(file, plan.Plan)) as folder:
         folder.part(0, 3).write_bytes(b"not looked at")
         assert tasks.do_part(str(folder.path), folder.stamp, 0, 3) < 1.0
         assert list(folder.parts.iterdir()) == [folder.part(0, 3)]

@@ -84,7 +84,7 @@ def overhead() -> float:
     from boebot_campaign import kept, plan, tasks
 
     with tempfile.TemporaryDirectory() as name:
-        asked = plan.made(PLAN | {"seeds": {"from": 1, "to": BEFORE + BLOCK * BLOCKS}})
+        asked = plan.made(PLAN | {"seeds": {"from": 1, "to": BEFORE + BLOCK * BLOCKS}}, plan.Plan, "sweep")
         with kept.locked(Path(name) / "out", asked) as folder:
 
             def part(first: int, end: int) -> None:
