@@ -1,6 +1,7 @@
 """`boebot.evolve(...)`: parameters of a brain by CMA-ES (Hansen, arXiv:1604.00772), as the package cma has it.
 
-    out/generation-000/     a sweep: its points are the candidates, each at all arenas, starts and seeds
+    out/evolve.json         what was asked
+        generation-000/     a sweep: its points are the candidates, each at all arenas, starts and seeds
         BRAIN-evolved.toml  the best candidate of all
         test/               a sweep: that file and the brain by hand, at arenas and seeds that no candidate has met
         curve.png
@@ -12,6 +13,7 @@ beginning, and what its folders hold is not run twice.
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,10 +24,9 @@ from msgspec.structs import replace
 
 from boebot import missing
 from boebot.cli.ending import Detail
-from boebot.errors import BoebotError
+from boebot.errors import BoebotError, CallError
 from boebot.rates import Mean, mean_of
 from boebot.record.figures import counted
-from boebot.record.run_folder import make_folder
 from boebot.running.brain_parameters import in_force
 from boebot.running.loop import execute
 from boebot_campaign import kept, rows, toml_brain
@@ -36,7 +37,7 @@ from boebot_campaign.plan import Plan
 from boebot_campaign.report import Page, saved, tell
 from boebot_campaign.sweep import function, run_plan
 
-TEST = "test"
+NAME, TEST = "evolve.json", "test"
 SIGMA = 0.3  # of the way between the bounds: how far the first candidates are from the brain by hand
 WORST = -np.inf  # fitness of a candidate of which a run has no figures
 
@@ -74,9 +75,15 @@ class Evolution:
 
 
 def run_evolution(asked: Evolve, path: Path, workers: Workers, told: Told) -> Evolution:
-    """All of it."""
-    make_folder(path)
-    return _Work(asked, path, workers, told).all()
+    """All of it, in a folder that keeps what it was begun with."""
+    with kept.held(path, NAME) as is_begun:
+        if is_begun:
+            before = kept.loaded(path / NAME, Evolve)
+            goes_on = asked.restarts == 0 and asked.generations > before.plan.generations
+            more = {"generations": asked.generations} if goes_on else {}
+            kept.compare(path, replace(before, plan=replace(before.plan, **more)), asked)
+        kept.keep(path / NAME, kept.Kept(version=kept.version(), plan=asked))
+        return _Work(asked, path, workers, told).all()
 
 
 evolve = function("evolve", Evolve, run_evolution)
@@ -154,7 +161,9 @@ class _Work:
             robot = _bundled(asked.all_robots[0], asked.loaded.robot)
             text = toml_brain.text(asked.loaded, comment, robot, _bundled(asked.all_arenas[0], asked.loaded.arena))
         brain = self._out / f"{Path(asked.loaded.name).stem}-evolved.toml"
-        kept.write_whole(brain, lambda part: part.write_text(text, encoding="utf-8"))
+        if not brain.is_file() or brain.read_text(encoding="utf-8") != text:
+            shutil.rmtree(self._out / TEST, ignore_errors=True)  # of the best before there were more generations
+            kept.write_whole(brain, lambda part: part.write_text(text, encoding="utf-8"))
         request = rows.request_of(folder, case)
         member = dataclasses.replace(request.members[0], brain=brain, parameters=None)
         expected = folder.table(["hash"])["hash"][row].as_py()
@@ -225,3 +234,10 @@ def evolve_command(done: Evolution, wanted: Detail) -> None:
     ]
     found = msgspec.to_builtins(done, enc_hook=str)
     tell(Page(done.picture, f"Evolution {done.folder.name}", [], lines, found), wanted)
+
+
+def no_rows(path: Path, *_: object) -> None:
+    """`boebot report` of an evolution's folder, and `boebot run --sweep`. Raises CallError."""
+    raise CallError(
+        f"{path} is the folder of an evolution; expected a sweep in it, as {path / TEST} or {path / _folder(0)}"
+    )

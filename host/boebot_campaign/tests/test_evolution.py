@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import boebot
+import command
 from boebot.brains import load_brain
 from boebot.errors import BoebotError
 from boebot.rates import Mean, mean_of
@@ -79,10 +80,77 @@ def test_stopped_evolution_goes_on_and_ends_as_one_that_was_not(
     assert stopped.curve == whole.curve and stopped.difference == whole.difference
     assert stopped.brain.read_text() == whole.brain.read_text()
 
-    with pytest.raises(BoebotError, match=r"points have changed since .*generation-000 was begun"):
-        boebot.evolve(out=tmp_path, **KEYS | {"seed": 2})
-    with pytest.raises(BoebotError, match=r"the plan has changed since .*generation-000 was begun, in seconds"):
-        boebot.evolve(out=tmp_path, **KEYS | {"seconds": 0.6})
+
+CHANGES: dict[str, Any] = {
+    "fitness": {"true_distance_m": 1.0, "true_contacts": -0.6},
+    "parameters": {"avoid.utility.b": {"from": -3, "to": 3.1}, "wander.forward": {}},
+    "seconds": 0.6,
+    "seeds": [1, 3],
+    "test_seeds": [11],
+    "population": 3,
+    "restarts": 0,
+    "seed": 2,
+    "generations": 3,  # after them the second start would begin elsewhere
+}
+
+
+@pytest.mark.parametrize("key", CHANGES)
+def test_after_a_change_it_is_refused_before_the_first_run_and_the_key_named(
+    key: str, whole: evolution.Evolution, ran: list[tuple[str, int]]
+) -> None:
+    ran.clear()
+    before = {path: path.stat().st_mtime_ns for path in whole.folder.iterdir()}
+    with pytest.raises(BoebotError, match=rf"the plan has changed since .* was begun, in {key}; expected it as it was"):
+        boebot.evolve(out=whole.folder, **KEYS | {key: CHANGES[key]})
+    assert not ran and before == {path: path.stat().st_mtime_ns for path in whole.folder.iterdir()}
+
+
+ONE = KEYS | {
+    "parameters": {"wander.forward": {}},
+    "seeds": [1],
+    "test_seeds": [2],
+    "generations": 1,
+    "population": 2,
+    "restarts": 0,
+}
+
+
+def test_more_generations_go_on_and_end_as_if_they_were_asked_at_first(
+    ran: list[tuple[str, int]], tmp_path: Path
+) -> None:
+    few = boebot.evolve(out=tmp_path / "grown", **ONE)
+    first = few.brain.read_text()
+    ran.clear()
+    grown = boebot.evolve(out=tmp_path / "grown", **ONE | {"generations": 2})
+    assert {name for name, _ in ran} == {"generation-001", "test"}
+    whole = boebot.evolve(out=tmp_path / "whole", **ONE | {"generations": 2})
+    assert grown.curve == whole.curve and grown.difference == whole.difference != few.difference
+    assert first != grown.brain.read_text() == whole.brain.read_text()
+    assert (tmp_path / "grown" / "evolve.json").read_text() == (tmp_path / "whole" / "evolve.json").read_text()
+    with pytest.raises(BoebotError, match="in generations;"):
+        boebot.evolve(out=tmp_path / "grown", **ONE)
+
+
+def test_what_was_asked_is_kept_before_the_first_run_and_others_keep_out(
+    ran: list[tuple[str, int]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = plan.made(ONE, Evolve, "evolve")
+
+    def run(_: engine.Workers, folder: kept.Folder, __: engine.Told) -> None:
+        assert kept.loaded(tmp_path / "out" / "evolve.json", Evolve).plan == asked
+        with pytest.raises(BoebotError, match=r"another process writes to .*out now"):
+            boebot.evolve(out=tmp_path / "out", **ONE)
+        raise BoebotError(f"in {folder.path.name}")
+
+    monkeypatch.setattr(engine.Workers, "run", run)
+    with pytest.raises(BoebotError, match=r"^in generation-000$"):
+        boebot.evolve(out=tmp_path / "out", **ONE)
+    for words in (["report", str(tmp_path / "out")], ["run", "--sweep", str(tmp_path / "out"), "--row", "1"]):
+        code, _, said = command.boebot(capsys, *words)
+        assert code != 0 and "is the folder of an evolution; expected a sweep in it" in said and "Traceback" not in said
+    (tmp_path / "out" / "evolve.json").unlink()
+    with pytest.raises(BoebotError, match=r"out holds 'generation-000' and no evolve\.json; expected an empty folder"):
+        boebot.evolve(out=tmp_path / "out", **ONE)
 
 
 def test_best_is_the_candidate_whose_rows_say_so(whole: evolution.Evolution) -> None:
