@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from boebot import resources
@@ -50,7 +49,6 @@ def pictures(experiment: Experiment, outcome: Outcome, forms: dict[str, float]) 
     found = []
     with mpl.rc_context({**PLOTS, "svg.hashsalt": experiment.name}):
         figure = Figure(figsize=(style.WIDTH_IN, HEIGHT_IN), layout="constrained")
-        FigureCanvasAgg(figure)
         outcome.draw(figure)
         for form, dpi in forms.items():
             metadata: dict[str, Any] = {"Title": f"{experiment.name}: {experiment.title}"}

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Patch, Polygon
 from matplotlib.transforms import Affine2D
 
@@ -37,7 +36,6 @@ class View:
         """`rays`: of its sensors that look. `ghost`: where its odometer, if it has one of that name, believes it is."""
         self.vehicle = vehicle
         self.figure = NotebookFigure(figsize=(5.0, 5.0), dpi=110, layout="constrained")
-        FigureCanvasAgg(self.figure)
         self._axes = self.figure.subplots()
         plan = floor_plan(vehicle.arena, 0.0, 0.0)
         draw_arena(self._axes, replace(plan, moving=()))

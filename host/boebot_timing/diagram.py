@@ -68,7 +68,6 @@ def _measured(report: Report) -> tuple[Moment, ...]:
 def figure(report: Report, verdict: Verdict | None = None) -> Figure:
     """The diagram; `verdict` adds the step of the brain, with the line and the sensors of a robot."""
     from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     spans = moments(report)
@@ -77,7 +76,6 @@ def figure(report: Report, verdict: Verdict | None = None) -> Figure:
     heights.append(_SLOT_IN * report.schedule.slots_per_tick + 0.8)
     with rc_context(PLOTS):
         drawn = Figure(figsize=(style.WIDTH_IN, sum(heights) + _FRAME_IN), dpi=style.DPI, layout="constrained")
-        FigureCanvasAgg(drawn)
         axes = drawn.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         if verdict is not None and events:
             step(axes[0], verdict)

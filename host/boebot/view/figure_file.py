@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from boebot.errors import BoebotError
 from boebot.record.run_folder import write_whole
@@ -36,7 +35,6 @@ def save(figure: Figure, path: Path, title: str) -> Path:
     Raises:
         BoebotError: the file cannot be written.
     """
-    FigureCanvasAgg(figure)
     kind = path.suffix.lower().removeprefix(".")
     metadata = {"Title": title, "Date": None} if kind == "svg" else {"Title": title}  # no date: the same bytes
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -318,7 +317,6 @@ class Sheet:
         below = 0.5 + panel_in + foot
         tall = height * scale + above + below
         self.figure = NotebookFigure(figsize=(style.WIDTH_IN, tall), dpi=style.DPI, facecolor=style.PAPER)
-        FigureCanvasAgg(self.figure)
         inset = (across - width * scale) / 2
         self.axes = self.figure.add_axes(
             (
