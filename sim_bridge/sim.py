@@ -24,7 +24,7 @@ from boebot.devices.display import letters_of
 from boebot.devices.faults import BODY_FAULTS
 from boebot.errors import ArenaError, BoardError, BrainError
 from boebot.record.blocks import Block, Group, group_of
-from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard, checked_pin
+from sim_bridge.boards.board import CLOCK_HZ, EmulatedBoard
 from sim_bridge.compiled import ffi, lib
 from sim_bridge.robots.imperfections import Draw, applied, body_parameters, collision_outline
 from sim_bridge.robots.wiring import done, join
@@ -104,10 +104,6 @@ def rows_of(buffer: Any, width: int) -> Floats:
     return np.frombuffer(data, dtype=np.float64).reshape(-1, width)
 
 
-def _columns(buffer: Any, names: tuple[str, ...]) -> dict[str, Floats]:
-    return dict(zip(names, rows_of(buffer, len(names)).T, strict=True))
-
-
 def _destroy(handle: Any) -> None:
     """Frees a simulation in C, and only then what it points to."""
     lib.sim_destroy(handle)
@@ -119,6 +115,9 @@ class Sim:
 
     A run is a function of arena, seed, robots by number, boards and what is sent to them: neither the order in which
     robots are added nor the way a run is cut into calls matters.
+
+    Attributes:
+        arena, seed, noise: as given. is_recorded: the truth is kept. members: the robots, by number.
     """
 
     def __init__(
@@ -149,8 +148,8 @@ class Sim:
             raise ArenaError(
                 f"arena {arena.name}: {moving} moving obstacles; a simulation takes {lib.SIM_OBSTACLES_MAXIMUM} at most"
             )
-        self.arena, self.seed, self.noise = arena, seed, noise
-        self._record, self._step_cycles = record, step_cycles
+        self.arena, self.seed, self.noise, self.is_recorded = arena, seed, noise, record
+        self._step_cycles = step_cycles
         handle = lib.sim_new(arena.handle, seed & (2**64 - 1), step_cycles, RECORD_CYCLES if record else 0, noise)
         if handle == ffi.NULL:
             raise MemoryError("simulation")
@@ -239,8 +238,7 @@ class Sim:
         self._outlines.append(outline)  # bodies in C point to them
         body = body_parameters(description.body, draw, outline)
         status = lib.sim_add_robot(self.handle, number, board.address, body, *pose)
-        self._check_place(status, pose)
-        done(status, f"the {board.description}")
+        self._check(status, pose, f"the {board.description}")
         self.members[number] = member = Member(board, description)
         me = weakref.ref(self)
         board.is_in_use = lambda: (sim := me()) is not None and sim._handle is not None
@@ -253,17 +251,17 @@ class Sim:
 
         model = vehicle_model(description, dt=self._step_cycles / CLOCK_HZ, noise=self.noise)
         status = lib.sim_add_vehicle(self.handle, number, model.handle, *pose)
-        self._check_place(status, pose)
-        done(status, f"robot {description.name!r}")
+        self._check(status, pose, f"robot {description.name!r}")
         model.in_use = True
         self.members[number] = Member(None, description, model, dict(model.names))
 
-    def _check_place(self, status: int, pose: Pose) -> None:
+    def _check(self, status: int, pose: Pose, what: str) -> None:
         if status == lib.SIM_NOT_FREE:
             x, y, _ = pose
             raise ArenaError(
                 f"arena {self.arena.name}: the robot cannot start at x = {x:g} m, y = {y:g} m: no free space"
             )
+        done(status, what)
 
     def robot(self, number: int) -> SimRobot:
         """The robot of that number.
@@ -349,11 +347,6 @@ class Sim:
         """How long it has stood still in debuggers, by the wall clock."""
         return sum(member.board.stood_still_s for member in self.members.values() if member.board is not None)
 
-    @property
-    def is_recorded(self) -> bool:
-        """The truth is kept."""
-        return self._record
-
     def place_shape(self, index: int, pose: Pose) -> None:
         """Puts a moving shape of the arena (0: the first one) at `pose` (m, m, rad), as it is now. It goes on along its
         way shifted by as much, and turned in itself; the direction of the way stays.
@@ -400,7 +393,7 @@ class Sim:
     def lateness(self) -> list[Lateness]:
         """Truth: how far the clock of each of the arena's moving shapes was behind, from the start to now, since it had
         waited for robots; empty without recording."""
-        if not self._record:
+        if not self.is_recorded:
             return []
         table, now, found = rows_of(self.handle.waits, 3), self.handle.world_at / CLOCK_HZ, []
         for shape, mover in enumerate(self.movers()):
@@ -674,12 +667,6 @@ class SimRobot:
         return int(self.handle.contacts)
 
     @property
-    def pack_voltage(self) -> float:
-        """Of the battery, V."""
-        battery = self.handle.battery
-        return float(battery.supply.pack_v) if battery else 0.0
-
-    @property
     def supply_voltage(self) -> float:
         """Of the rail that the board runs on, V."""
         return float(self.handle.chassis.supply * lib.SUPPLY_NOMINAL_V)
@@ -713,7 +700,7 @@ class SimRobot:
     def truth(self) -> dict[str, Floats]:
         """Columns `TRUTH`, one row every 10 ms, and two a cycle apart where it was put elsewhere; empty without
         recording."""
-        return _columns(self.handle.truth, TRUTH)
+        return dict(zip(TRUTH, rows_of(self.handle.truth, len(TRUTH)).T, strict=True))
 
     def truth_to_now(self) -> dict[str, Floats]:
         """The same with a row of now at its end, of a robot whose run ends with a world step."""
@@ -737,8 +724,3 @@ class SimRobot:
             return {}
         data = np.column_stack(columns)
         return {"truth": Block(time, data.tobytes(), np.array([8 * len(columns)], dtype=np.uint32))}
-
-    def turret_angle(self, pin: int) -> float:
-        """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
-        turret = lib.robot_turret(self.handle, checked_pin("turret_angle", pin))
-        return float(turret.motor.angle) if turret else 0.0

@@ -136,6 +136,17 @@ class Scripted:
         return [(int(cycles[i]), int(levels[i])) for i in range(count) if i == 0 or levels[i] != levels[i - 1]]
 
 
+def pack_voltage(robot: SimRobot) -> float:
+    """Of the battery, V."""
+    return float(robot.handle.battery.supply.pack_v)
+
+
+def turret_angle(robot: SimRobot, pin: int) -> float:
+    """Of the turret on that pin, rad, counter-clockwise from straight ahead."""
+    turret = lib.robot_turret(robot.handle, pin)
+    return float(turret.motor.angle) if turret else 0.0
+
+
 def script_board() -> tuple[Any, EmulatedBoard]:
     """A board that plays a script, and its place in a simulation."""
     script = scripts.script_board_new()

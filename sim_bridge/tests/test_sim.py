@@ -159,7 +159,6 @@ def test_what_is_no_number_name_or_byte() -> None:
         (lambda: pins.pin_log(-1), "pin_log: newest is -1; expected a whole number from 0"),
         (lambda: pins.output(300), "output: the pin is 300; expected a whole number from 0 to 19"),
         (lambda: pins.eeprom_damage(Damage.GARBAGE, 256), "garbage is 256; expected a whole number from 0 to 255"),
-        (lambda: robot.turret_angle(999), "turret_angle: the pin is 999; expected a whole number from 0 to 19"),
         (lambda: robot.wait(-1, 0), "wait: cycles is -1; expected a whole number from 0"),
         (lambda: robot.wait(anything, 0), "wait: cycles is 'x'"),
         (lambda: robot.wait(10, -1), "wait: quiet is -1; expected a whole number from 0"),

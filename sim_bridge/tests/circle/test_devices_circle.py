@@ -21,7 +21,7 @@ from boebot_hil.rig import CYCLES_PER_S, TICK_S
 from reading import read
 from sim_bridge.robots import imperfections
 from sim_bridge.tests.circle.circle import CircleRig, arena_of, block, circle, robot_of, wall_at
-from sim_bridge.tests.simulated import tones
+from sim_bridge.tests.simulated import tones, turret_angle
 
 pytestmark = pytest.mark.unsanitized
 
@@ -243,7 +243,7 @@ def test_turret_turns_and_the_ping_on_it_sees_what_is_there(board_url: str) -> N
         for asked in (0.0, 0.5 * math.pi, 0.3, -0.5 * math.pi, -0.3):
             rig.send(messages.Turret(round(asked * 1e4), 1))
             rig.listen(1.2)
-            angle = rig.robot.turret_angle(TURRET)
+            angle = turret_angle(rig.robot, TURRET)
             assert abs(angle - asked) <= 0.0075  # the dead band, 4 us of 573 a radian
             x, y = 0.045 + 0.015 * math.cos(angle), 0.015 * math.sin(angle)
             now = rig.latest()
@@ -251,7 +251,7 @@ def test_turret_turns_and_the_ping_on_it_sees_what_is_there(board_url: str) -> N
         rig.stop()
         rig.listen(0.1)
         assert rig.devices().turret_pulse == 0
-        assert abs(rig.robot.turret_angle(TURRET) - asked) <= 0.0075, "the gear holds"
+        assert abs(turret_angle(rig.robot, TURRET) - asked) <= 0.0075, "the gear holds"
 
 
 def test_the_turrets_axis_is_where_the_description_has_it(board_url: str) -> None:

@@ -19,6 +19,7 @@ from boebot_hil.rig import CYCLES_PER_S, TICK_S
 from reading import read
 from sim_bridge.robots.imperfections import AS_BUILT
 from sim_bridge.tests.circle.circle import CircleRig, arena_of, circle, robot_of
+from sim_bridge.tests.simulated import pack_voltage
 
 pytestmark = pytest.mark.unsanitized
 
@@ -66,7 +67,7 @@ def lowest_pack(rig: CircleRig, left: float, right: float, seconds: float) -> fl
     for _ in range(round(seconds / TICK_S)):
         rig.drive(left, right)
         rig.listen(TICK_S)
-        lowest = min(lowest, rig.robot.pack_voltage)
+        lowest = min(lowest, pack_voltage(rig.robot))
     return lowest
 
 
@@ -104,7 +105,7 @@ def test_the_shieldbots_regulator_holds_the_speed(board_url: str) -> None:
         rig.drive_for(1.0, 1.0, 1.5)
         speed = wheel_speed(robot, 1.0, drag_of(robot) * wheel_speed(robot, 1.0, 0.0) / 2)
         assert rig.robot.body().speed == pytest.approx(speed, rel=0.005)
-        sag = supply_of(robot).full_v - rig.robot.pack_voltage
+        sag = supply_of(robot).full_v - pack_voltage(rig.robot)
         assert sag > 0.2 and rig.robot.supply_voltage == 5.0
 
 

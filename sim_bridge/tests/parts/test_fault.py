@@ -19,7 +19,7 @@ from boebot.errors import BoardError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.sessions.world import AVR, open_on
 from sim_bridge.sim import NEVER
-from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, square
+from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, pack_voltage, scripted, square
 
 LEFT, RIGHT = 13, 12
 ENCODER, WHISKER, LED, RECEIVER, PING = 16, 5, 9, 10, 8
@@ -379,7 +379,7 @@ def test_a_sagging_battery_takes_the_rails_with_it() -> None:
     seen = []
     for _ in range(3):
         robot.run(0.1)
-        seen.append((robot.robot.pack_voltage, robot.robot.supply_voltage))
+        seen.append((pack_voltage(robot.robot), robot.robot.supply_voltage))
     assert seen[0] == pytest.approx(seen[2]) and seen[0][1] == 5.0
     assert seen[1] == pytest.approx((4.6, 4.1)) and fired() == 100
     strong = scripted()

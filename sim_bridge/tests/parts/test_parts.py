@@ -24,7 +24,7 @@ from sim_bridge.compiled import ffi, lib
 from sim_bridge.devices import battery as battery_model
 from sim_bridge.devices import servo as servo_model
 from sim_bridge.robots import imperfections
-from sim_bridge.tests.simulated import MS, SUPPLY, US, Scripted, arena_of, scripted, scripts, square
+from sim_bridge.tests.simulated import MS, SUPPLY, US, Scripted, arena_of, pack_voltage, scripted, scripts, square
 
 LEFT, RIGHT = 13, 12
 ENCODERS = 16, 17
@@ -495,17 +495,17 @@ def test_missed_echoes_and_spread() -> None:
 
 def test_pack_sags_under_load_and_the_regulator_holds() -> None:
     robot = scripted()
-    idle = robot.robot.pack_voltage
+    idle = pack_voltage(robot.robot)
     assert idle == pytest.approx(7.75 - 0.6 * 0.08, abs=1e-3)
     robot.pulses(1.0, {LEFT: 1700, RIGHT: 1300})
     robot.run(1.0)
-    steady = robot.robot.pack_voltage
+    steady = pack_voltage(robot.robot)
     assert steady == pytest.approx(7.75 - 0.6 * (0.08 + 2 * (0.015 + 0.13)), abs=0.03)
     robot.pulses(0.5, {LEFT: 1300, RIGHT: 1700}, start=1.0)
     lowest = idle
     for _ in range(50):
         robot.run(0.01)
-        lowest = min(lowest, robot.robot.pack_voltage)
+        lowest = min(lowest, pack_voltage(robot.robot))
         assert robot.robot.supply_voltage == 5.0
     assert lowest < steady - 0.1  # reversing costs most
 
@@ -525,7 +525,7 @@ def test_charge_runs_out() -> None:
     robot = scripted()
     assert lib.robot_add_battery(robot.robot.handle, 255, parameters) == 0
     robot.run(20.0)
-    assert robot.robot.pack_voltage == pytest.approx(5.0 - 0.6 * 0.08)
+    assert pack_voltage(robot.robot) == pytest.approx(5.0 - 0.6 * 0.08)
     assert robot.robot.supply_voltage == pytest.approx(4.5 - 0.6 * 0.08)
 
 

@@ -19,7 +19,7 @@ from sim_bridge.devices import light as light_model
 from sim_bridge.devices.catalogue import Part
 from sim_bridge.robots import imperfections
 from sim_bridge.robots.wiring import add_part
-from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, scripts, shortest_ray, square
+from sim_bridge.tests.simulated import MS, US, Scripted, arena_of, scripted, scripts, shortest_ray, square, turret_angle
 
 LIGHT, TURRET, PING = 6, 11, 8
 LIGHT_SENSOR = LightSensor(pin=LIGHT, position_m=(0.0, 0.0), heading_rad=0.0)
@@ -180,7 +180,7 @@ def pinged(robot: Scripted) -> float:
 def test_the_mounts_heading_follows_the_turret(degrees: float) -> None:
     """500 us for 45 degrees; the Ping sits 15 mm before the axis and goes round it."""
     robot = with_turret(arena_of(outline=square(0, 0, 4)), 1500 + 500 * degrees / 45)
-    angle = robot.robot.turret_angle(TURRET)
+    angle = turret_angle(robot.robot, TURRET)
     assert angle == pytest.approx(math.radians(degrees), abs=0.0064)  # its dead band, 4 us
     x, y = 0.045 + 0.015 * math.cos(angle), 0.015 * math.sin(angle)
     assert pinged(robot) == pytest.approx(shortest_ray(2.0, x, y, angle), rel=1e-9)
@@ -200,7 +200,7 @@ def test_turret_turns_at_its_speed() -> None:
     angles = []
     for _ in range(100):
         robot.run(0.01)
-        angles.append(robot.robot.turret_angle(TURRET))
+        angles.append(turret_angle(robot.robot, TURRET))
     speeds = np.diff(angles) / 0.01
     assert speeds.max() == pytest.approx(5.0, rel=1e-6)
     arrived = next(i for i, angle in enumerate(angles) if angle > math.pi / 2 - 0.02)
@@ -210,7 +210,7 @@ def test_turret_turns_at_its_speed() -> None:
 def test_only_what_is_there_can_be_mounted() -> None:
     robot = scripted()
     assert lib.robot_mount(robot.robot.handle, TURRET, PING) == lib.SIM_BAD_ARGUMENT
-    assert robot.robot.turret_angle(TURRET) == 0
+    assert turret_angle(robot.robot, TURRET) == 0
 
 
 # ---- encoders that err -----------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from sim_bridge.devices import battery as battery_model
 from sim_bridge.pins import BoardPins
 from sim_bridge.sim import Sim, SimRobot
 from sim_bridge.tests.boards.avr.avr_program import assemble
-from sim_bridge.tests.simulated import MS, SUPPLY, Scripted, arena_of, scripted
+from sim_bridge.tests.simulated import MS, SUPPLY, Scripted, arena_of, pack_voltage, scripted
 
 TOGGLE = """
 main:
@@ -147,14 +147,14 @@ def test_a_robot_at_the_charger_takes_charge() -> None:
     for robot in (away, at):
         robot.robot.place(0.0, 0.0, 0.0)
         robot.run(20.0)
-    assert away.robot.pack_voltage == pytest.approx(at.robot.pack_voltage)
+    assert pack_voltage(away.robot) == pytest.approx(pack_voltage(at.robot))
     at.robot.place(1.1, 0.0, 0.0)
     away.robot.place(0.7, 0.0, 0.0)
     for robot in (away, at):
         robot.run(2.0)
-    assert at.robot.pack_voltage > away.robot.pack_voltage + 0.1
+    assert pack_voltage(at.robot) > pack_voltage(away.robot) + 0.1
     open_circuit = 7.75 - (7.75 - 5.0) * (22 * 0.08) / 10.0
-    assert away.robot.pack_voltage == pytest.approx(open_circuit - 0.6 * 0.08, abs=0.01)
+    assert pack_voltage(away.robot) == pytest.approx(open_circuit - 0.6 * 0.08, abs=0.01)
 
 
 def described(text: str, folder: Path, x: float) -> SimRobot:
@@ -176,13 +176,13 @@ def test_a_robots_file_says_how_full_it_begins_and_what_its_charger_gives(tmp_pa
         robot = described(text, tmp_path, x)
         robot.sim.run(CLOCK_HZ)
         open_circuit = 5.0 + 2.75 * (0.5 + change)
-        assert robot.pack_voltage == pytest.approx(open_circuit - 0.6 * current, abs=0.01)
+        assert pack_voltage(robot) == pytest.approx(open_circuit - 0.6 * current, abs=0.01)
 
 
 def test_without_contacts_nothing_is_charged(tmp_path: Path) -> None:
     robot = described("capacity_as = 20.0\ncharger_a = 0", tmp_path, 1.0)
     robot.sim.run(CLOCK_HZ)
-    assert robot.pack_voltage == pytest.approx(5.0 + 2.75 * (1 - 0.004) - 0.6 * 0.08, abs=0.01)
+    assert pack_voltage(robot) == pytest.approx(5.0 + 2.75 * (1 - 0.004) - 0.6 * 0.08, abs=0.01)
 
 
 @pytest.mark.parametrize("charge", [-0.1, 1.1])

@@ -44,7 +44,7 @@ from sim_bridge.devices import turret as turret_model
 from sim_bridge.robots import imperfections as parts
 from sim_bridge.robots.imperfections import Draw
 from sim_bridge.sim import Sim
-from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, square
+from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, pack_voltage, scripted, square
 from sim_bridge.vehicle import Vehicle
 from sim_bridge.vehicles.model_file import vehicle_model
 
@@ -300,7 +300,7 @@ def volts(*without: str) -> tuple[float, float]:
     robot = scripted(robot=weak(), without=without, step_cycles=10 * MS)
     robot.pulses(2.0, {LEFT: 1700, RIGHT: 1300})
     robot.run(2.0)
-    return robot.robot.pack_voltage, robot.robot.supply_voltage
+    return pack_voltage(robot.robot), robot.robot.supply_voltage
 
 
 def test_supply_is_ideal() -> None:

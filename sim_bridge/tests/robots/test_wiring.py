@@ -24,7 +24,18 @@ from boebot.errors import ArenaError, BoardError, RobotError
 from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.boards.emulated import native_board, native_library
 from sim_bridge.sim import Sim
-from sim_bridge.tests.simulated import MS, US, add_scripted, arena_of, scripted, scripts, shortest_ray, square
+from sim_bridge.tests.simulated import (
+    MS,
+    US,
+    add_scripted,
+    arena_of,
+    pack_voltage,
+    scripted,
+    scripts,
+    shortest_ray,
+    square,
+    turret_angle,
+)
 
 DEVICES: dict[str, robots.AnyDevice] = {
     "turret": PositionServo(pin=11, position_m=(0.045, 0.0)),
@@ -51,7 +62,7 @@ def test_each_device_sits_at_its_pins() -> None:
     robot.edge(800 * MS, 8, 1)
     robot.edge(800 * MS + 5 * US, 8, 2)
     robot.run(1.0)
-    angle = robot.robot.turret_angle(11)
+    angle = turret_angle(robot.robot, 11)
     assert angle == pytest.approx(500 / 573.0, abs=0.008)
     x, y = 0.045 + 0.015 * math.cos(angle), 0.015 * math.sin(angle)  # the Ping is on it
     distance = robot.robot.readings()[robot.robot.layout["ping"]][0]
@@ -61,7 +72,7 @@ def test_each_device_sits_at_its_pins() -> None:
     assert "buzzer" in robot.robot.parts
     ahead = 100 * (1.0 - 0.02) / math.cos(0.3)  # as it is mounted here
     assert scripts.script_board_volts(robot.script, 2) == pytest.approx(33.9 / (ahead + 4.74))
-    assert scripts.script_board_volts(robot.script, 0) == pytest.approx(robot.robot.pack_voltage / 2)
+    assert scripts.script_board_volts(robot.script, 0) == pytest.approx(pack_voltage(robot.robot) / 2)
     assert {robot.inputs(pin)[0][1] for pin in (18, 19)} == {1}  # the compass board's pull-ups
 
 
