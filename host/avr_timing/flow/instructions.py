@@ -7,7 +7,7 @@ ATmega328P has the AVRe+ set without what needs more than 64 KB of flash: no `ei
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from avr_timing.program import Instruction
@@ -76,22 +76,6 @@ asr     1001010ddddd0101                  d                       1
 lsr     1001010ddddd0110                  d                       1
 ror     1001010ddddd0111                  d                       1
 dec     1001010ddddd1010                  d                       1
-sec     1001010000001000                                          1
-sez     1001010000011000                                          1
-sen     1001010000101000                                          1
-sev     1001010000111000                                          1
-ses     1001010001001000                                          1
-seh     1001010001011000                                          1
-set     1001010001101000                                          1
-sei     1001010001111000                                          1
-clc     1001010010001000                                          1
-clz     1001010010011000                                          1
-cln     1001010010101000                                          1
-clv     1001010010111000                                          1
-cls     1001010011001000                                          1
-clh     1001010011011000                                          1
-clt     1001010011101000                                          1
-cli     1001010011111000                                          1
 ijmp    1001010000001001                                          2
 ret     1001010100001000                                          4
 icall   1001010100001001                                          3
@@ -115,32 +99,19 @@ out     10111AArrrrrAAAA                  A r                     1
 rjmp    1100kkkkkkkkkkkk                  k:near                  2
 rcall   1101kkkkkkkkkkkk                  k:near                  3
 ldi     1110KKKKddddKKKK                  d:high K                1
-brcs    111100kkkkkkk000                  k:near                  1
-breq    111100kkkkkkk001                  k:near                  1
-brmi    111100kkkkkkk010                  k:near                  1
-brvs    111100kkkkkkk011                  k:near                  1
-brlt    111100kkkkkkk100                  k:near                  1
-brhs    111100kkkkkkk101                  k:near                  1
-brts    111100kkkkkkk110                  k:near                  1
-brie    111100kkkkkkk111                  k:near                  1
-brcc    111101kkkkkkk000                  k:near                  1
-brne    111101kkkkkkk001                  k:near                  1
-brpl    111101kkkkkkk010                  k:near                  1
-brvc    111101kkkkkkk011                  k:near                  1
-brge    111101kkkkkkk100                  k:near                  1
-brhc    111101kkkkkkk101                  k:near                  1
-brtc    111101kkkkkkk110                  k:near                  1
-brid    111101kkkkkkk111                  k:near                  1
 bld     1111100ddddd0bbb                  d b                     1
 bst     1111101ddddd0bbb                  d b                     1
 sbrc    1111110rrrrr0bbb                  r b                     1
 sbrs    1111111rrrrr0bbb                  r b                     1
 """
 
+# BSET, BCLR, BRBS and BRBC are in none of these rows: the manual names them by the flag in SREG, from bit 0 on.
+FLAGS = "cznvshti"
+IF_SET = ("brcs", "breq", "brmi", "brvs", "brlt", "brhs", "brts", "brie")
+IF_CLEAR = ("brcc", "brne", "brpl", "brvc", "brge", "brhc", "brtc", "brid")
+
 # Branches take 1 cycle, and 1 more when taken; skips 1 cycle, and 1 more for each word that is skipped.
-BRANCHES = frozenset(("brcs", "breq", "brmi", "brvs", "brlt", "brhs", "brts", "brie")) | frozenset(
-    ("brcc", "brne", "brpl", "brvc", "brge", "brhc", "brtc", "brid")
-)
+BRANCHES = frozenset(IF_SET + IF_CLEAR)
 SKIPS = frozenset(("cpse", "sbrc", "sbrs", "sbic", "sbis"))
 JUMPS = frozenset(("jmp", "rjmp"))
 CALLS = frozenset(("call", "rcall"))
@@ -228,9 +199,19 @@ def _row(line: str) -> _Row:
     return _Row(mnemonic, mask, bits, len(pattern) // 8, parsed, int(cycles))
 
 
+def _of_flags() -> Iterator[str]:
+    """The rows of BSET, BCLR, BRBS and BRBC."""
+    for bit, (flag, if_set, if_clear) in enumerate(zip(FLAGS, IF_SET, IF_CLEAR, strict=True)):
+        yield f"se{flag} 100101000{bit:03b}1000 1"
+        yield f"cl{flag} 100101001{bit:03b}1000 1"
+        yield f"{if_set} 111100kkkkkkk{bit:03b} k:near 1"
+        yield f"{if_clear} 111101kkkkkkk{bit:03b} k:near 1"
+
+
 def _by_high_byte() -> tuple[tuple[_Row, ...], ...]:
     """The rows that an opcode with this high byte may be, those with most fixed bits first: `ld` before `ldd`."""
-    rows = sorted((_row(line) for line in TABLE.splitlines() if line), key=lambda row: -row.mask.bit_count())
+    lines = [*TABLE.strip().splitlines(), *_of_flags()]
+    rows = sorted(map(_row, lines), key=lambda row: -row.mask.bit_count())
     return tuple(tuple(row for row in rows if (high << 8 ^ row.bits) & row.mask & 0xFF00 == 0) for high in range(256))
 
 
