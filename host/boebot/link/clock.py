@@ -131,34 +131,27 @@ class BoardClock:
             board_s = self._note(raw_us, received_s)
             self._bound_by(board_s, received_s - _TELEMETRY_BYTES * self._byte_s, 1.0)
             self._refresh(board_s)
-        expected = self._us + int((received_s - self._received_s) * 1e6)
-        us = self._us = raw_us + ((expected - raw_us + 2147483648) // _WRAP_US) * _WRAP_US
-        self._received_s = received_s
-        board_s = us * 1e-6
+        self._us, self._received_s = self.unwrap(raw_us, received_s), received_s
+        board_s = self._us * 1e-6
         since_s = board_s - self._at_s
         latest_s = received_s - _TELEMETRY_BYTES * self._byte_s
         if latest_s - board_s < self._useful_below + since_s * self._useful_fastest:
             self._bound_by(board_s, latest_s, 1.0)
             self._refresh(board_s)
-            return board_s, self._middle, self._bound
-        return (
-            board_s,
-            self._middle + since_s * (1.0 + self._slope),
-            self._bound + abs(since_s) * self._slope_bound,
-        )
+        return self._stamp(board_s)
 
     def stamp_earlier(self, raw_us: int) -> Stamp:
         """The stamp of a tick before the one that was observed last. It bounds nothing: its message was received
         together with the later one, so when it came is not known."""
-        board_s = (self._us - (self._us - raw_us) % _WRAP_US) * 1e-6
-        since_s = board_s - self._at_s
-        return (
-            board_s,
-            self._middle + since_s * (1.0 + self._slope),
-            self._bound + abs(since_s) * self._slope_bound,
-        )
+        return self._stamp((self._us - (self._us - raw_us) % _WRAP_US) * 1e-6)
 
     # ---- inside --------------------------------------------------------------------------------------------
+
+    def _stamp(self, board_s: float) -> Stamp:
+        """Of a board time, by what is known of the clock."""
+        since_s = board_s - self._at_s
+        middle_s, bound_s = since_s * (1.0 + self._slope), abs(since_s) * self._slope_bound
+        return board_s, self._middle + middle_s, self._bound + bound_s
 
     def _note(self, raw_us: int, received_s: float) -> float:
         """Notes a board time; returns it unwrapped (s)."""

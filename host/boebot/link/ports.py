@@ -66,11 +66,10 @@ class _Port:
     """
 
     realtime = True
-    resets_board = False
 
-    def __init__(self, name: str, device: Any, gone: str) -> None:
+    def __init__(self, name: str, device: Any, gone: str, *, resets_board: bool) -> None:
         """Takes over what is open, to be closed at the latest when Python ends. `gone`: why it might be no more."""
-        self.name = name
+        self.name, self.resets_board = name, resets_board
         self._device = device
         self._why_gone = gone
         self._close_once = weakref.finalize(self, _close, device)
@@ -123,8 +122,8 @@ class SerialPort(_Port):
         baud_given: the URL named the bit rate.
     """
 
-    def __init__(self, name: str, device: Any, gone: str, *, baud_given: bool) -> None:
-        super().__init__(name, device, gone)
+    def __init__(self, name: str, device: Any, gone: str, *, baud_given: bool, resets_board: bool) -> None:
+        super().__init__(name, device, gone, resets_board=resets_board)
         self.baud_given = baud_given
         self._overruns_before = _overruns(device)
 
@@ -167,8 +166,6 @@ class SerialPort(_Port):
 class SocketPort(_Port):
     """A TCP connection that carries a board's bytes: `socket://HOST:PORT`. Who serves a board there resets it."""
 
-    resets_board = True
-
     def __init__(self, host: str, port: int) -> None:
         """Connects.
 
@@ -182,7 +179,7 @@ class SocketPort(_Port):
             raise BoardError(f"{name} cannot be opened: {why_not_connected(error, host)}") from None
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.settimeout(_WRITE_S)
-        super().__init__(name, connection, "closed by the other side")
+        super().__init__(name, connection, "closed by the other side", resets_board=True)
 
     def _receive(self, wait_s: float) -> bytes:
         if not select.select([self._device], [], [], max(wait_s, 0.0))[0]:
@@ -225,9 +222,8 @@ def open_serial(port: str, baud: int, *, baud_given: bool = False, reset: bool =
         if isinstance(error, _FAILURES):
             raise BoardError(_why_not_opened(port, baud, error)) from None
         raise
-    opened = SerialPort(port, device, "unplugged, or closed by the other side", baud_given=baud_given)
-    opened.resets_board = resets_board
-    return opened
+    gone = "unplugged, or closed by the other side"
+    return SerialPort(port, device, gone, baud_given=baud_given, resets_board=resets_board)
 
 
 def open_rfc2217(host: str, port: int, baud: int, *, baud_given: bool = False, reset: bool = True) -> SerialPort:
@@ -255,9 +251,7 @@ def open_rfc2217(host: str, port: int, baud: int, *, baud_given: bool = False, r
         if isinstance(error, _FAILURES):
             raise BoardError(_why_not_shared(name, host, baud, error)) from None
         raise
-    opened = SerialPort(name, device, "closed by the other side", baud_given=baud_given)
-    opened.resets_board = resets_board
-    return opened
+    return SerialPort(name, device, "closed by the other side", baud_given=baud_given, resets_board=resets_board)
 
 
 def check_baud(port: str, baud: int) -> None:
