@@ -231,7 +231,8 @@ def _make(path: Path, plan: Plan, points: np.ndarray | None) -> None:
     (path / PARTS).mkdir(exist_ok=True)
     if points is None:
         points = designs.points(plan.design, plan.points, len(plan.axes), plan.first_seed % 2**32)
-    write_whole(path / POINTS, lambda part: part.write_bytes(_npy(points)))
+    np.save(raw := io.BytesIO(), points)
+    write_whole(path / POINTS, lambda part: part.write_bytes(raw.getvalue()))
     hashes = {name: _digest((path / name).read_bytes()) for name in (*files, POINTS)}
     keep(path / NAME, Kept(version=version(), plan=plan, names=names, hashes=hashes))
 
@@ -333,12 +334,6 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
-
-
-def _npy(points: np.ndarray) -> bytes:
-    file = io.BytesIO()
-    np.save(file, points)
-    return file.getvalue()
 
 
 def _digest(data: bytes) -> str:

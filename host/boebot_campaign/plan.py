@@ -268,8 +268,9 @@ def made(keys: Mapping[str, Any], kind: type[_P], name: str) -> _P:
 
 
 def _made(table: dict[str, Any], kind: type[_P], name: str, folder: Path) -> _P:
-    plan = toml_files.convert(table, kind, name, CallError)
-    return valid(_found(plan, folder).completed(f"{name}: "), f"{name}: ")
+    plan, at = _found(toml_files.convert(table, kind, name, CallError), folder), f"{name}: "
+    _check_once(plan, at)
+    return valid(plan.completed(at), at)
 
 
 def _found(plan: _P, folder: Path) -> _P:
@@ -298,7 +299,6 @@ def _at(axis: list[Any] | Whole, index: int) -> Any:
 
 def valid(plan: _P, at: str) -> _P:
     """Raises CallError or another BoebotError, in one sentence, before anything is made."""
-    _check_once(plan, at)
     if plan.test_arenas and not plan.arenas:
         raise CallError(f"{at}there are test_arenas and no arenas; expected arenas, too, to train in")
     if plan.on is not None and is_live(plan.on):

@@ -115,8 +115,9 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    except FileExistsError:
-        raise BoebotError(f"{folder} is a file; expected a folder, by another --out") from None
+    except (FileExistsError, NotADirectoryError):
+        file = next(one for one in (folder, *folder.parents) if one.exists())
+        raise BoebotError(f"{file} is a file; expected a folder, by another --out") from None
     except OSError as error:
         raise unwritable(folder, error) from None
 

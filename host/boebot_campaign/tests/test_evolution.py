@@ -217,6 +217,7 @@ brain = Brain([Mine()])
         ({"seeds": []}, "seeds: expected array of length >= 1"),
         ({"test_seeds": []}, "seeds: expected array of length >= 1"),
         ({"test_seeds": [2]}, "test_seeds has 2, as seeds has"),
+        ({"test_seeds": [11, 12, 11]}, "11 is there twice, in test_seeds"),
         ({"points": 3}, "an evolution has no points and imperfections; expected population and parameters"),
         ({"imperfections": {"servo_lag_s": [0.1]}}, "has no points and imperfections"),
         ({"design": "grid"}, "design is 'grid'; expected one of random"),

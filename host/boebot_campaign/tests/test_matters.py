@@ -127,6 +127,10 @@ BAD = {
     "a figure that the plan says": (("true_distance_m", "seed"), "figure is 'seed'; expected one of "),
     "seeds from above": (("[1, 2]", "{ from = 3, to = 1 }"), "seeds: from is 3, to is 1; expected no less"),
     "samples": (("samples = 4", "samples = 5"), "samples is 5; expected a power of two"),
+    "too many samples": (
+        ("samples = 4", "samples = 1073741824"),
+        "these are [0-9,]* runs; expected at most 10,000,000",
+    ),
     "a design": (("samples = 4", 'design = "grid"'), "design"),
     "idle": (("samples = 4", "[imperfections]\nservo_lag_s = [0, 0.1]"), "servo_lag_s changes nothing"),
     "three values": (("samples = 4", "[imperfections]\ntyre_grip = [0.1, 0.5, 1]"), "lists 3; expected two"),

@@ -226,7 +226,8 @@ def test_run_that_never_heard_of_its_board_still_leaves_files(tmp_path: Path, mo
     assert json.loads((tmp_path / "summary.json").read_text())["ended"] == "interrupted"
 
 
-def test_folder_that_cannot_be_written_is_one_sentence(result: RunResult, tmp_path: Path) -> None:
+@pytest.mark.parametrize("folder", ["file", "file/below/it"])
+def test_folder_that_cannot_be_written_is_one_sentence(folder: str, result: RunResult, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BoebotError, match="file is a file; expected a folder, by another --out"):
-        result.save(tmp_path / "file")
+        result.save(tmp_path / folder)
