@@ -19,7 +19,7 @@ from boebot import missing
 from boebot.cli import options, output
 from boebot.cli.ending import Detail
 from boebot.errors import InterruptedRunError
-from boebot.record import figures
+from boebot.record.figures import counted, text
 from boebot.running.loop import execute
 from boebot_campaign import kept, plan
 from boebot_campaign.kept import PARTS, Folder
@@ -91,7 +91,7 @@ def sweep(done: Folder, wanted: Detail) -> None:
     if wanted is Detail.JSON:
         output.print_json({"runs": count, "statuses": statuses, "folder": str(done.path), "rows": str(done.rows)})
     elif wanted is not Detail.NOTHING:
-        output.line(f"{count:,} runs: {', '.join(f'{count:,} {status}' for status, count in statuses.items())}")
+        output.line(f"{counted(count, 'run', 'runs')}: {', '.join(f'{one:,} {how}' for how, one in statuses.items())}")
         output.line(f"rows in {done.rows}")
         _say_errors(done)
 
@@ -110,7 +110,7 @@ def _say_size(asked: Plan, json: bool) -> None:
         output.print_json({"runs": runs, "one_worker_s": round(took_s, 3)})
     else:
         most, took = "" if runs == one.count else "at most ", timedelta(seconds=math.ceil(took_s))
-        output.line(f"{most}{runs:,} runs: about {took} (hours:minutes:seconds) of one processor")
+        output.line(f"{most}{counted(runs, 'run', 'runs')}: about {took} (hours:minutes:seconds) of one processor")
 
 
 def _say_errors(done: Folder) -> None:
@@ -118,7 +118,7 @@ def _say_errors(done: Folder) -> None:
     table = done.table(["row", "error"])
     errors = table.filter(table["error"].is_valid()).group_by("error").aggregate([("row", "count"), ("row", "min")])
     for one in errors.sort_by([("row_count", "descending")]).slice(0, 3).to_pylist():
-        output.line(f"{one['row_count']:,} times, first in row {one['row_min']}: {one['error']}")
+        output.line(f"{counted(one['row_count'], 'time', 'times')}, first in row {one['row_min']}: {one['error']}")
 
 
 @lru_cache(maxsize=1)
@@ -133,6 +133,6 @@ def newest_rows(folder: Path, _second: int = 0) -> RenderableType:
         for name in NEWEST:
             table.add_column(words(name))
         for row in rows:
-            table.add_row(*("" if value is None else figures.text(value) for value in row.values()))
+            table.add_row(*("" if value is None else text(value) for value in row.values()))
         return table
     return ""
