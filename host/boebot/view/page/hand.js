@@ -101,16 +101,9 @@ function tellDrive() {
 // ---- keys: true, if it was one of these ----
 function driveKey(e) {
   if (e.key === " ") {
-    if (e.repeat) return can.has("hand") || can.has("pause"); // said once, however long it is held
-    if (can.has("hand")) {
-      stopRobot();
-      return true;
-    }
-    if (can.has("pause")) {
-      $("pause").click();
-      return true;
-    }
-    return false;
+    const does = can.has("hand") ? stopRobot : can.has("pause") ? () => $("pause").click() : null;
+    if (does && !e.repeat) does(); // once, however long it is held
+    return does !== null;
   }
   const way = KEYS[e.key.toLowerCase()],
     scrubs = e.target === $("cursor") || e.target === $("slider");

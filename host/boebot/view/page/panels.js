@@ -173,13 +173,8 @@ function tellMind() {
     value.textContent = Number.isNaN(utility) ? "–" : signed(utility);
   });
   if (!mind.switches.length) return;
-  const [since, , reason] =
-    mind.switches[
-      indexIn(
-        mind.switches.map(one => one[0]),
-        mind.time.values[step] + 1e-3,
-      )
-    ];
+  const switched = mind.switches.map(([time]) => time),
+    [since, , reason] = mind.switches[indexIn(switched, mind.time.values[step] + 1e-3)];
   say("since", "since " + since.toFixed(2) + " s");
   say("reason", reason);
 }
