@@ -6,7 +6,7 @@ The JSON schema for editors and the tables in docs/reference/arenas.md are made 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
 import msgspec
@@ -199,16 +199,18 @@ def _check_row(points: list[Point], place: str, closed: bool) -> None:
     same = lib.arena_repeated(xy, len(points), closed)
     if same >= 0:
         raise DescriptionError(f"{place}[{same}]", " and the point after it are the same; expected an edge")
-    if not closed:
-        return
+    if closed and (fault := crossing(points)):
+        raise DescriptionError(place, fault)
+
+
+def crossing(corners: Sequence[Point]) -> str:
+    """Which edges of a closed polygon cross or touch, as the words behind its key; "": none."""
+    xy = ffi.from_buffer("double[]", np.array(corners, dtype=np.float64))
     one, other = ffi.new("uint32_t *"), ffi.new("uint32_t *")
-    crossing = lib.arena_crossing(xy, len(points), one, other)
-    if crossing < 0:
-        raise MemoryError("arena")
-    if crossing > 0:
-        raise DescriptionError(
-            place, f": edges {one[0]} and {other[0]} cross or touch; expected a polygon whose edges do not"
-        )
+    found = lib.arena_crossing(xy, len(corners), one, other)
+    if found < 0:
+        raise MemoryError("polygon")
+    return f": edges {one[0]} and {other[0]} cross or touch; expected a polygon whose edges do not" if found else ""
 
 
 def _check_moving(moving: Moving, place: str) -> None:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 import msgspec
 
 from boebot import resources
+from boebot.arenas.description import Point
 from boebot.description import toml_files
-from boebot.description.outlines import Point, polygon_fault, way_out
+from boebot.description.outlines import polygon_fault, way_out
 from boebot.devices.battery import Energy
 from boebot.devices.device import Device, VehicleDevice, kinds, pin_name, pin_number
 from boebot.devices.encoder import WheelEncoder
