@@ -4,43 +4,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/arena.h"
+
 #define ROUNDING 1e-3
 #define ROUNDING_NARROW 1e-4 /* m: a narrow place needs no less */
 #define CORNER_LOSS 1e-4     /* m: a corner's tip is at most so far outside of what is rounded */
 
 static double cross(const double *o, const double *a, const double *b) {
   return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
-}
-
-static int between(const double *a, const double *b, const double *p) { /* p on the line through a and b */
-  return p[0] >= fmin(a[0], b[0]) && p[0] <= fmax(a[0], b[0]) && p[1] >= fmin(a[1], b[1]) && p[1] <= fmax(a[1], b[1]);
-}
-
-static int meet(const double *a, const double *b, const double *c, const double *d) {
-  const double c1 = cross(a, b, c);
-  const double c2 = cross(a, b, d);
-  const double c3 = cross(c, d, a);
-  const double c4 = cross(c, d, b);
-  if (((c1 > 0.0 && c2 < 0.0) || (c1 < 0.0 && c2 > 0.0)) && ((c3 > 0.0 && c4 < 0.0) || (c3 < 0.0 && c4 > 0.0)))
-    return 1;
-  return (c1 == 0.0 && between(a, b, c)) || (c2 == 0.0 && between(a, b, d)) || (c3 == 0.0 && between(c, d, a)) ||
-         (c4 == 0.0 && between(c, d, b));
-}
-
-/* 1 if no two edges have a point in common but neighbours their corner, and no neighbours fold back on each other. */
-static int is_simple(const double *xy, size_t n) {
-  for (size_t i = 0; i < n; i++) {
-    const double *a = xy + 2 * i;
-    const double *b = xy + 2 * ((i + 1) % n);
-    const double *next = xy + 2 * ((i + 2) % n);
-    const double back = (b[0] - a[0]) * (next[0] - b[0]) + (b[1] - a[1]) * (next[1] - b[1]);
-    if (cross(a, b, next) == 0.0 && back < 0.0) return 0;
-    for (size_t k = i + 2; k < n; k++) {
-      if (i == 0 && k == n - 1) continue;
-      if (meet(a, b, xy + 2 * k, xy + 2 * ((k + 1) % n))) return 0;
-    }
-  }
-  return 1;
 }
 
 static double area_of(const double *xy, size_t n) {
@@ -77,7 +48,8 @@ static int shrink(const double *xy, size_t n, double by, double *core) {
                          (core[2 * k + 1] - core[2 * i + 1]) * (xy[2 * k + 1] - xy[2 * i + 1]);
     if (!(along > 0.0)) return 0;
   }
-  return is_simple(core, n);
+  uint32_t one, other;
+  return arena_crossing(core, n, &one, &other) == 0;
 }
 
 /* The rounding r with which no outward corner of angle a loses more than CORNER_LOSS: r (1 / sin(a/2) - 1), the distance
