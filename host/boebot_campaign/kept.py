@@ -155,6 +155,10 @@ class Folder:
             raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
         return _arrow().concat_tables(tables)
 
+    def steady(self, columns: Sequence[str]) -> Callable[[list[str]], Any]:
+        """Gives a table of some of these columns, of the same rows each time, also while the sweep goes on."""
+        return self.table if self.is_whole else self.table(columns).select
+
     def to_pandas(self) -> pandas.DataFrame:
         """The rows so far, by their number."""
         return self.table().to_pandas().set_index("row")

@@ -7,7 +7,7 @@ Intervals are those of boebot.rates. Two brains differ by the mean of the paired
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,6 +21,7 @@ from boebot.rates import Mean, mean_of
 from boebot.record import figures as figures_in_words
 from boebot.record.run_folder import write_whole
 from boebot_campaign.kept import Folder
+from boebot_campaign.plan import Plan
 from boebot_campaign.rows import OK
 
 PICTURE, PAGE = "report.png", "index.md"
@@ -28,6 +29,7 @@ MEANS = ("true_distance_m", "true_contacts", "behavior_switches")
 FACTORS = ("set", "arena", "brain", "robot", "faults")
 BINS = 6  # of a factor that has more values than MOST_VALUES
 MOST_VALUES = 8
+Read = Callable[[list[str]], Any]  # a table of those columns
 
 
 class Level(NamedTuple):
@@ -47,34 +49,32 @@ class Level(NamedTuple):
 def report(path: Path, wanted: Detail) -> None:
     """`boebot report` of a sweep's folder. Raises BoebotError: there is no row yet, or it cannot be written to."""
     folder = Folder(path)
+    axes = {"parameter": folder.plan.parameters, "imperfection": folder.plan.imperfections}
+    factors = [*FACTORS, *(f"{kind}.{one}" for kind, own in axes.items() for one in own)]
+    read = folder.steady(["row", "status", *MEANS, *factors])
     compute = missing.imported("pyarrow.compute", "a report", "pyarrow", "sweep")
-    is_ok = compute.equal(folder.table(["status"])["status"], OK).to_numpy()
-    numbers = {name: np.where(is_ok, _numbers(folder, name), np.nan) for name in MEANS}
+    is_ok = compute.equal(read(["status"])["status"], OK).to_numpy()
+    numbers = {name: np.where(is_ok, read([name])[name].to_numpy(), np.nan) for name in MEANS}
     figures = {name: values for name, values in numbers.items() if not np.isnan(values).all()}
     levels = [_level("all", "", 0.0, np.ones(len(is_ok), dtype=bool), is_ok, figures)]
-    axes = {"parameter": folder.plan.parameters, "imperfection": folder.plan.imperfections}
-    for name in [*FACTORS, *(f"{kind}.{one}" for kind, own in axes.items() for one in own)]:
-        levels += [_level(name, *level, is_ok, figures) for level in _values(folder, name)]
-    compared = [] if not figures else _compared(folder, *next(iter(figures.items())))
+    for name in factors:
+        levels += [_level(name, *level, is_ok, figures) for level in _values(read, name)]
+    compared = [] if not figures else _compared(folder.plan, read, *next(iter(figures.items())))
     picture = _drawn(path / PICTURE, levels, figures)
     titles = ["factor", "value", "ok", *map(words, figures)]
     rows = [[one.factor, one.value, one.ok, *(said(one.means[name]) for name in figures)] for one in levels]
     lines = [*_differences(compared), _INTERVALS]
     by_level = [{"factor": one.factor, "value": one.value, "runs": one.runs} | one.means for one in levels]
-    found = {"levels": by_level, "compared": compared}
-    tell(Page(picture, f"Sweep {path.name}", [(titles, rows)], lines, found), wanted)
+    tell(
+        Page(picture, f"Sweep {path.name}", [(titles, rows)], lines, {"levels": by_level, "compared": compared}), wanted
+    )
 
 
-def _numbers(folder: Folder, name: str) -> np.ndarray:
-    """A column; NaN: null."""
-    return np.asarray(folder.table([name])[name].to_numpy(), dtype=float)
-
-
-def _values(folder: Folder, name: str) -> Iterator[tuple[str, float, np.ndarray]]:
+def _values(read: Read, name: str) -> Iterator[tuple[str, float, np.ndarray]]:
     """Of a factor that has several: the value, where it is drawn, and which rows have it. Many numbers are put together
     in bins of as many runs."""
     arrow = missing.imported("pyarrow", "a report", "pyarrow", "sweep")
-    column = folder.table([name])[name]
+    column = read([name])[name]
     if arrow.types.is_string(column.type) or arrow.types.is_boolean(column.type):
         texts, places = _encoded(column)
         named = [(one, text) for one, text in enumerate(texts) if text is not None or name == "faults"]
@@ -120,9 +120,9 @@ def cliffs_delta(one: np.ndarray, other: np.ndarray) -> float:
     return float((below.sum() - (len(other) - upto).sum()) / (len(one) * len(other)))
 
 
-def _compared(folder: Folder, name: str, values: np.ndarray) -> list[dict[str, Any]]:
+def _compared(plan: Plan, read: Read, name: str, values: np.ndarray) -> list[dict[str, Any]]:
     """Each two brains by a figure, over the runs that both have ended as they should, with one robot in one arena."""
-    plan, rows = folder.plan, folder.table(["row"])["row"].to_numpy()
+    rows = read(["row"])["row"].to_numpy()
 
     def by_brain(of_rows: np.ndarray) -> np.ndarray:
         whole = np.full(plan.count, np.nan)
@@ -130,7 +130,7 @@ def _compared(folder: Folder, name: str, values: np.ndarray) -> list[dict[str, A
         return np.moveaxis(whole.reshape(plan.sizes), 1, 0).reshape(len(plan.brains), -1)
 
     found: list[dict[str, Any]] = []
-    each, *places = by_brain(values), *(by_brain(_encoded(folder.table([one])[one])[1]) for one in ("arena", "robot"))
+    each, *places = by_brain(values), *(by_brain(_encoded(read([one])[one])[1]) for one in ("arena", "robot"))
     names = [Path(brain).name for brain in plan.brains]
     for one, other in combinations(sorted(range(len(names)), key=names.__getitem__), 2):
         both = ~np.isnan(each[one]) & ~np.isnan(each[other])

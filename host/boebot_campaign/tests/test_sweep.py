@@ -322,6 +322,25 @@ def test_a_report_of_one_pair_says_that_it_shows_nothing(tmp_path: Path, capsys:
     assert " over 1 pair: nothing is shown\n" in page and "Wilcoxon" not in page and "inf" not in page
 
 
+def test_a_report_is_of_the_same_rows_throughout_while_a_sweep_goes_on(
+    undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    looks: list[int] = []
+
+    def done(_: kept.Folder) -> list[tuple[int, int]]:
+        looks.append(1)
+        return [(20 * at, 20 * at + len(looks)) for at in range(2)]
+
+    with kept.locked(tmp_path / "out", plan.read(undisturbed / "sweep.toml", plan.Plan)) as folder:
+        rows = kept.Folder(undisturbed / "out").table()
+        for first, count in ((0, 1), (20, 1), (0, 2), (20, 2)):
+            kept.write_part(folder.part(first, first + count), rows.slice(first, count))
+    monkeypatch.setattr(kept.Folder, "done", done)
+    report(tmp_path / "out", Detail.JSON)
+    said = json.loads(capsys.readouterr().out)
+    assert len(looks) == 1 and said["levels"][0]["runs"] == 2 and said["compared"][0]["pairs"] == 1
+
+
 def test_brains_are_compared_where_robot_and_arena_are_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
