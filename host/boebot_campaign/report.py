@@ -65,9 +65,8 @@ def report(path: Path, wanted: Detail) -> None:
     rows = [[one.factor, one.value, one.ok, *(said(one.means[name]) for name in figures)] for one in levels]
     lines = [*_differences(compared), _INTERVALS]
     by_level = [{"factor": one.factor, "value": one.value, "runs": one.runs} | one.means for one in levels]
-    tell(
-        Page(picture, f"Sweep {path.name}", [(titles, rows)], lines, {"levels": by_level, "compared": compared}), wanted
-    )
+    found = {"levels": by_level, "compared": compared}
+    tell(Page(picture, f"Sweep {path.name}", [(titles, rows)], lines, found), wanted)
 
 
 def _values(read: Read, name: str) -> Iterator[tuple[str, float, np.ndarray]]:
