@@ -24,6 +24,7 @@ KEEP_ALIVE = 30  # steps of 10 ms after which the host says something
 # A probe is answered by 14 bytes, and telemetry takes a tenth of the line: probes must not come faster than answers go.
 BYTE_CYCLES = 320
 ROUND_BYTES = 70  # time of a round at least
+FREE = 8  # bytes, after which the line is free for one: a tick with bursts reads more slowly than a full line fills
 STEP = 50  # rounds between two looks at what the board sends
 
 
@@ -142,7 +143,7 @@ class Image:
             lib.channel_send(line, fault, spoilt)
             data = ffi().buffer(spoilt.wire, spoilt.size)[:]
             self._give(data, at)
-            at += max(spoilt.size, ROUND_BYTES) * BYTE_CYCLES
+            at += max(spoilt.size + spoilt.size // FREE, ROUND_BYTES) * BYTE_CYCLES
             if number % STEP == STEP - 1:
                 self._advance(at)
         self._advance(at)
