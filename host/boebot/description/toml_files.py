@@ -258,7 +258,7 @@ def _all_finite(rows: list[Any]) -> bool:
 
 def _fault(value: Any, kind: Any, key: str) -> Fault | None:
     """The first thing in `value` that does not fit `kind`."""
-    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    origin, inner = typing.get_origin(_plain(kind)), typing.get_args(_plain(kind))
     if origin in (types.UnionType, typing.Union) and all(_is_struct(choice) for choice in inner):
         return _union_fault(value, inner, key)
     if _is_struct(kind) and isinstance(value, dict):
@@ -268,8 +268,7 @@ def _fault(value: Any, kind: Any, key: str) -> Fault | None:
         places = ((_below(key, str(place)) if origin is dict else f"{key}[{place}]", item) for place, item in items)
         if fault := next((fault for place, item in places if (fault := _fault(item, inner[-1], place))), None):
             return fault
-    choices = _choices(kind)
-    if choices and value not in choices:
+    if (choices := _choices(kind)) and value not in choices:
         known = [str(choice) for choice in choices]
         return Fault(key, f"{key} is {reprlib.repr(value)}; {expected_one(str(value), known)}")
     try:
@@ -316,8 +315,12 @@ def _struct_fault(value: dict[str, Any], kind: Any, key: str) -> Fault | None:
 
 def _choices(kind: Any) -> tuple[Any, ...]:
     """The values that a Literal allows, () for any other type."""
-    plain = typing.get_args(kind)[0] if typing.get_origin(kind) is typing.Annotated else kind
-    return typing.get_args(plain) if typing.get_origin(plain) is typing.Literal else ()
+    return typing.get_args(_plain(kind)) if typing.get_origin(_plain(kind)) is typing.Literal else ()
+
+
+def _plain(kind: Any) -> Any:
+    """A type without its bounds."""
+    return typing.get_args(kind)[0] if typing.get_origin(kind) is typing.Annotated else kind
 
 
 def _below(key: str, name: str) -> str:

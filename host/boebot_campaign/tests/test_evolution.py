@@ -222,7 +222,11 @@ brain = Brain([Mine()])
         ({"imperfections": {"servo_lag_s": [0.1]}}, "has no points and imperfections"),
         ({"design": "grid"}, "design is 'grid'; expected one of random"),
         ({"parameters": {"avoid.utility.b": {"from": -3, "to": 3, "steps": 3}}}, "has steps, which only a grid takes"),
-        ({"parameters": {"avoid.utility.b": {"form": -3}}}, "unknown field form"),
+        (
+            {"parameters": {"avoid.utility.b": {"form": -3}}},
+            "parameters.avoid.utility.b: there is no key 'form' here; expected from, to, steps; did you mean 'from'",
+        ),
+        ({"fitness": {"true_distance_m": "much"}}, "fitness.true_distance_m: expected float, got str"),
         ({"brains": ["clearway", "demo"]}, "brains: expected array of length <= 1"),
         ({"brain": "clearway"}, "there is no key 'brain' here.*did you mean 'brains'"),
         ({"test_seeds": {"from": 9, "to": 8}}, "test_seeds: from is 9, to is 8"),
