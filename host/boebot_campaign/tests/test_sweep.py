@@ -6,7 +6,6 @@ import contextlib
 import json
 import multiprocessing
 import re
-import resource
 import shutil
 import signal
 import socket
@@ -159,15 +158,24 @@ def test_a_sleep_that_no_signal_ends_takes_its_worker_with_it(tmp_path: Path) ->
     ] * 2
 
 
+FULL = """\
+import resource
+from boebot import cli
+from boebot_campaign import engine
+run = engine.Workers.run
+def full(*given):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
+    run(*given)
+engine.Workers.run = full
+cli.main()
+"""
+
+
 @pytest.mark.soak
 def test_a_full_disk_ends_the_sweep_in_a_sentence_and_loses_no_row(undisturbed: Path, tmp_path: Path) -> None:
     file, out = saved(tmp_path, PLAN), tmp_path / "out"
-
-    def small() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (6000, resource.RLIM_INFINITY))
-
-    words = [*COMMAND, str(file), "--out", str(out), "--workers", "1"]
-    done = subprocess.run(words, preexec_fn=small, capture_output=True, text=True)
+    words = [sys.executable, "-c", FULL, "sweep", str(file), "--out", str(out), "--workers", "1"]
+    done = subprocess.run(words, capture_output=True, text=True)
     assert (
         done.returncode == 1 and "the sweep's files cannot be written" in done.stderr and "Traceback" not in done.stderr
     )
@@ -331,7 +339,7 @@ def test_a_report_is_of_the_same_rows_throughout_while_a_sweep_goes_on(
         looks.append(1)
         return [(20 * at, 20 * at + len(looks)) for at in range(2)]
 
-    with kept.locked(tmp_path / "out", plan.read(undisturbed / "sweep.toml", plan.Plan)) as folder:
+    with kept.locked(tmp_path / "out", plan.read(saved(tmp_path, PLAN), plan.Plan)) as folder:
         rows = kept.Folder(undisturbed / "out").table()
         for first, count in ((0, 1), (20, 1), (0, 2), (20, 2)):
             kept.write_part(folder.part(first, first + count), rows.slice(first, count))

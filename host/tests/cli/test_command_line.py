@@ -88,7 +88,7 @@ def test_folder_that_cannot_be_written_is_said_before_the_run(
     monkeypatch.setattr(loop, "open_world", lambda url, requests: pytest.fail("the run began"))
     (tmp_path / "file").touch()
     code, _, err = boebot(capsys, "run", "wander", "--out", str(tmp_path / "file"))
-    assert code == 1 and "cannot be written to" in err
+    assert code == 1 and "file is a file; expected a folder" in err
 
 
 @pytest.mark.parametrize("period", ["0.02", "20ms", "20 ms", "2e-2s"])
