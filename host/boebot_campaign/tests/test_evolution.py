@@ -116,8 +116,9 @@ ONE = KEYS | {
 
 
 def test_more_generations_go_on_and_end_as_if_they_were_asked_at_first(
-    ran: list[tuple[str, int]], tmp_path: Path
+    ran: list[tuple[str, int]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(evolution, "_draw", lambda _: None)
     few = boebot.evolve(out=tmp_path / "grown", **ONE)
     first = few.brain.read_text()
     ran.clear()
