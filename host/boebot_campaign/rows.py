@@ -112,8 +112,8 @@ def killed(case: Case) -> dict[str, Any]:
 
 
 def run_case(folder: Folder, case: Case) -> dict[str, Any]:
-    """Runs a case. Only what the run raises becomes a row, also a KeyboardInterrupt: Ctrl-C reaches whoever waits for
-    the workers, and no run of theirs."""
+    """Runs a case. Only what the run raises becomes a row, also a KeyboardInterrupt: Ctrl-C reaches the process
+    that waits for the workers, and no run of theirs."""
     with _one_run:
         return _run(folder, case)
 

@@ -389,6 +389,7 @@ def test_the_newest_rows_are_shown_while_a_sweep_runs(tmp_path: Path) -> None:
         printed = output.console()
         with printed.capture() as caught:
             printed.print(newest_rows(folder.path, 2))
+        assert newest_rows(tmp_path, 3) != ""  # an evolution's sweeps are in folders of its folder
     lines = [line for line in caught.get().splitlines() if "odd.py" in line]
     assert len(lines) == NEWEST_ROWS and "509" in lines[-1] and "row" in caught.get()
 

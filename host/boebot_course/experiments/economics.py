@@ -35,7 +35,7 @@ CHARGING = {"never": NEVER, "always": Utility(b=9.0), "by utility": None}
 
 
 def sweeper(charge: Utility | None = None) -> Brain:
-    """The demonstration brain; with that utility of charging in place of its own."""
+    """The demonstration brain; with that utility of charging, if one is given."""
     brain = load_brain("demo").brain
     assert brain is not None
     if charge is not None:
