@@ -177,7 +177,7 @@ def test_folder_that_cannot_be_written_is_said_before_the_run(
 ) -> None:
     (tmp_path / "file").touch()
     code, out, err = boebot(capsys, "experiment", "Y", "--out", str(tmp_path / "file"))
-    assert (code, out) == (1, "") and "cannot be written to" in err
+    assert (code, out) == (1, "") and "file is a file; expected a folder" in err
 
 
 def test_experiments_that_miss_or_fail_are_named_and_the_others_go_on(
