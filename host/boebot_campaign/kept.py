@@ -68,12 +68,8 @@ class Folder:
         """Raises BoebotError: there is no sweep."""
         self.path = path.absolute()
         self.kept = loaded(path / NAME, Plan)
+        self.plan = self.kept.plan
         self.parts, self.rows = self.path / PARTS, self.path / ROWS
-
-    @cached_property
-    def plan(self) -> Plan:
-        """What is run."""
-        return self.kept.plan
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -120,12 +116,11 @@ class Folder:
             if not copy.is_file() or _digest(copy.read_bytes()) != digest:
                 raise BoebotError(f"{copy} has changed since the sweep began; {_SAME}")
 
-    def merge(self) -> Path:
+    def merge(self) -> None:
         """Makes rows.parquet of the parts, some rows at a time; a row that two parts have is taken once."""
         if not self.is_whole:
             write_whole(self.rows, self._merge)
         shutil.rmtree(self.parts, ignore_errors=True)
-        return self.rows
 
     def _merge(self, path: Path) -> None:
         writer: Any = None
@@ -151,9 +146,15 @@ class Folder:
         """The rows so far, with some of the columns or all: a pyarrow.Table. Raises BoebotError: a file is damaged."""
         if self.is_whole:
             return _read(self.rows, self.plan.count, columns)
-        if not (tables := list(self._tables(columns))):
-            raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
-        return _arrow().concat_tables(tables)
+        try:
+            if tables := list(self._tables(columns)):
+                return _arrow().concat_tables(tables)
+        except BoebotError:
+            if not self.is_whole:
+                raise
+        if self.is_whole:  # the parts have just been merged
+            return self.table(columns)
+        raise BoebotError(f"the sweep in {self.path} has no row yet; expected one that has begun")
 
     def steady(self, columns: Sequence[str]) -> Callable[[list[str]], Any]:
         """Gives a table of some of these columns, of the same rows each time, also while the sweep goes on."""

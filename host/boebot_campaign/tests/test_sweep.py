@@ -349,6 +349,22 @@ def test_a_report_is_of_the_same_rows_throughout_while_a_sweep_goes_on(
     assert len(looks) == 1 and said["levels"][0]["runs"] == 2 and said["compared"][0]["pairs"] == 1
 
 
+@pytest.mark.parametrize("listed", [[(0, 40)], []])
+def test_rows_are_read_while_the_parts_are_being_merged(
+    listed: list[tuple[int, int]], undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between a look at which parts there are and the reading of them they go."""
+    out = shutil.copytree(undisturbed / "out", tmp_path / "out")
+    (out / kept.ROWS).rename(out / "later")
+
+    def done(_: kept.Folder) -> list[tuple[int, int]]:
+        (out / "later").rename(out / kept.ROWS)
+        return listed
+
+    monkeypatch.setattr(kept.Folder, "done", done)
+    assert rows_of(out) == rows_of(undisturbed / "out")
+
+
 def test_brains_are_compared_where_robot_and_arena_are_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
