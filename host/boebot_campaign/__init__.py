@@ -16,4 +16,4 @@ EVOLVE = Command(
 )
 MATTERS = Command("Find out which imperfections a brain's result hangs on.", "boebot_campaign.matters:matters_command")
 FOLDER = Folder("boebot_campaign.report:report", "boebot_campaign.sweep:kept_request")
-EVOLVED = Folder("boebot_campaign.evolution:no_rows", "boebot_campaign.evolution:no_rows")
+SEVERAL = Folder("boebot_campaign.sweep:no_rows", "boebot_campaign.sweep:no_rows")

@@ -24,7 +24,7 @@ from msgspec.structs import replace
 
 from boebot import missing
 from boebot.cli.ending import Detail
-from boebot.errors import BoebotError, CallError
+from boebot.errors import BoebotError
 from boebot.rates import Mean, mean_of
 from boebot.record.figures import counted
 from boebot.running.brain_parameters import in_force
@@ -234,10 +234,3 @@ def evolve_command(done: Evolution, wanted: Detail) -> None:
     ]
     found = msgspec.to_builtins(done, enc_hook=str)
     tell(Page(done.picture, f"Evolution {done.folder.name}", [], lines, found), wanted)
-
-
-def no_rows(path: Path, *_: object) -> None:
-    """`boebot report` of an evolution's folder, and `boebot run --sweep`. Raises CallError."""
-    raise CallError(
-        f"{path} is the folder of an evolution; expected a sweep in it, as {path / TEST} or {path / _folder(0)}"
-    )

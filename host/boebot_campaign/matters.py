@@ -26,6 +26,7 @@ from boebot.errors import BoebotError, CallError, expected_one
 from boebot.imperfections import imperfections
 from boebot.rates import Mean
 from boebot.running.tasks import prepare
+from boebot_campaign import kept
 from boebot_campaign.command import command
 from boebot_campaign.engine import Told, Workers
 from boebot_campaign.kept import Folder
@@ -37,7 +38,7 @@ from boebot_campaign.sweep import function, run_plan
 Axes = Sequence[tuple[str, AnyAxis]]
 MOST = 5  # imperfections that get Sobol indices
 ERROR = 0.05  # of all effects together
-PICTURE = "matters.png"
+NAME, PICTURE = "matters.json", "matters.png"
 EFFECTS = ["name", "from", "to", "effect on average", "at one seed"]
 SHARES = {"by_itself": "by itself", "with_others": "together with others"}
 LEGEND = (
@@ -143,6 +144,12 @@ def _values(folder: Folder, figure: str) -> np.ndarray:
 def run_matters(asked: Matters, path: Path, workers: Workers, told: Told) -> Page:
     """The effects, and the indices of those that count."""
     missing.imported("SALib.analyze.sobol", "boebot matters", "SALib", "learn")
+    with kept.held(path, NAME):
+        kept.keep(path / NAME, kept.Kept(version=kept.version(), plan=asked))
+        return _page(asked, path, workers, told)
+
+
+def _page(asked: Matters, path: Path, workers: Workers, told: Told) -> Page:
     first = run_plan(asked.as_sweep(), path / "effects", workers, told)
     found, indices = effects(first.plan.axes, first.points, _values(first, asked.figure)), []
     counting = [one for one in found if one["counts"]]

@@ -87,3 +87,11 @@ def kept_request(path: Path, row: int) -> Request:
     if not 0 <= row < folder.plan.count:
         raise CallError(f"the sweep has no row {row}; expected 0 to {folder.plan.count - 1}")
     return request_of(folder, folder.plan.case(row, folder.points))
+
+
+def no_rows(path: Path, *_: object) -> None:
+    """`boebot report` and `boebot run --sweep` of a folder of several sweeps. Raises CallError."""
+    sweeps = sorted(str(one.parent) for one in path.glob(f"*/{kept.NAME}"))
+    raise CallError(
+        f"{path} holds sweeps, and no rows itself; expected one of them: {', '.join(sweeps[-2:]) or 'none'}"
+    )

@@ -148,7 +148,9 @@ def test_what_was_asked_is_kept_before_the_first_run_and_others_keep_out(
         boebot.evolve(out=tmp_path / "out", **ONE)
     for words in (["report", str(tmp_path / "out")], ["run", "--sweep", str(tmp_path / "out"), "--row", "1"]):
         code, _, said = command.boebot(capsys, *words)
-        assert code != 0 and "is the folder of an evolution; expected a sweep in it" in said and "Traceback" not in said
+        assert (
+            code != 0 and "holds sweeps, and no rows itself; expected one of them: " in said and "Traceback" not in said
+        )
     (tmp_path / "out" / "evolve.json").unlink()
     with pytest.raises(BoebotError, match=r"out holds 'generation-000' and no evolve\.json; expected an empty folder"):
         boebot.evolve(out=tmp_path / "out", **ONE)

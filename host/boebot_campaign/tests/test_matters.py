@@ -174,3 +174,5 @@ def test_the_command_writes_a_page_and_goes_on_where_it_was(
     assert all(f"| {name} |" in page for name in counting) and (out / "matters.png").stat().st_size > 10_000
     code, text, errors = boebot(capsys, *command)
     assert (code, errors, len(ran)) == (0, "", 2) and "by itself" in text and str(out / "index.md") in text
+    code, _, errors = boebot(capsys, "report", str(out))
+    assert code != 0 and errors.endswith(f"expected one of them: {out / 'effects'}, {out / 'indices'}\n")
