@@ -28,9 +28,9 @@ from boebot.errors import BoebotError, BrainError, CallError, RobotError
 from boebot.robot import Robot
 from sim_bridge.batch import Batch
 from sim_bridge.compiled import ffi, lib
+from sim_bridge.tests.boards.native.native_program import FIRMWARE
 from sim_bridge.vehicle import ARSIM_BODY, Vehicle, VehicleModel, arsim, vehicle_model
 
-ROOT = Path(__file__).resolve().parents[3]
 RUNS = 100
 SECONDS = 1.5  # thirty time constants of a servo
 PULSE_US = 1 / 16
@@ -89,12 +89,12 @@ def rims(batch: Batch) -> NDArray[np.float64]:
 def firmware(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """firmware/src/motion.c as it is, in a library."""
     library = tmp_path_factory.mktemp("motion") / "motion.so"
-    source, stubs = ROOT / "firmware/src/motion.c", library.with_name("stubs.c")
+    source, stubs = FIRMWARE / "motion.c", library.with_name("stubs.c")
     stubs.write_text(
         "#include <stdint.h>\nvoid servo_set(uint16_t a, uint16_t b) { (void)a, (void)b; }\n"
         "uint16_t parameters_u16(int a) { return (uint16_t)a; }\nint16_t parameters_i16(int a) { return (int16_t)a; }\n"
     )
-    folders = [f"-I{ROOT / 'firmware/src'}", f"-I{ROOT / 'firmware/src/hal/native'}"]
+    folders = [f"-I{FIRMWARE}", f"-I{FIRMWARE / 'hal/native'}"]
     command = ["cc", "-std=gnu11", "-shared", "-fPIC", "-DPIN_MAP_SHIELDBOT", *folders, "-o", str(library)]
     subprocess.run([*command, str(source), str(stubs)], check=True)
     own = FFI()
