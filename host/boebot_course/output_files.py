@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from boebot import resources
 from boebot.record.run_folder import write_whole
-from boebot.view import style
+from boebot.view import figure_file, style
 from boebot_course.experiment import Experiment, Measured, Outcome
 from boebot_timing.plots import PLOTS
 
@@ -47,15 +47,11 @@ def files(experiment: Experiment, outcome: Outcome, seed: int) -> dict[str, byte
 def pictures(experiment: Experiment, outcome: Outcome, forms: dict[str, float]) -> list[bytes]:
     """The figure in those forms, "png" or "svg", with that many dots per inch."""
     found = []
-    with mpl.rc_context({**PLOTS, "svg.hashsalt": experiment.name}):
+    with mpl.rc_context(PLOTS):
         figure = Figure(figsize=(style.WIDTH_IN, HEIGHT_IN), layout="constrained")
         outcome.draw(figure)
         for form, dpi in forms.items():
-            metadata: dict[str, Any] = {"Title": f"{experiment.name}: {experiment.title}"}
-            metadata |= {"Software": None} if form == "png" else {"Date": None, "Creator": None}
-            target = io.BytesIO()
-            figure.savefig(target, format=form, dpi=dpi, metadata=metadata)
-            found.append(target.getvalue())
+            found.append(figure_file.as_bytes(figure, form, f"{experiment.name}: {experiment.title}", dpi))
             figure.set_layout_engine("none")  # it is laid out
     return found
 

@@ -7,7 +7,6 @@ come from the fullest tick that was measured; where none was, tasks are drawn as
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from boebot.arguments import duration
 from boebot.running.driver import TICK_S
-from boebot.view import style
+from boebot.view import figure_file, style
 from boebot_timing.budget import Report
 from boebot_timing.costs import SLOT_BEGINS
 from boebot_timing.measured import Moment
@@ -95,16 +94,8 @@ def _how(report: Report) -> str:
 
 def files(report: Report, verdict: Verdict | None = None) -> dict[str, bytes]:
     """The diagram as timing.png and timing.svg."""
-    from matplotlib import rc_context
-
     drawn = figure(report, verdict)
-    found = {}
-    for kind in ("png", "svg"):
-        target = io.BytesIO()
-        with rc_context({"svg.hashsalt": "boebot", "svg.fonttype": "none"}):
-            drawn.savefig(target, format=kind, metadata={"Date": None} if kind == "svg" else None)
-        found[f"{NAME}.{kind}"] = target.getvalue()
-    return found
+    return {f"{NAME}.{kind}": figure_file.as_bytes(drawn, kind, "Timing of the firmware") for kind in ("png", "svg")}
 
 
 def _legend(drawn: Figure, kinds: set[str]) -> None:

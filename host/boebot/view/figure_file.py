@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 import zlib
 from pathlib import Path
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = (".png", ".svg")
+_UNSAID: dict[str, dict[str, None]] = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}
 
 
 def check(path: Path) -> None:
@@ -30,20 +32,22 @@ def check(path: Path) -> None:
 
 
 def save(figure: Figure, path: Path, title: str) -> Path:
-    """Writes the figure with its title to a path that was checked; in an SVG, texts stay texts.
+    """Writes the figure with its title to a path that was checked.
 
     Raises:
         BoebotError: the file cannot be written.
     """
-    kind = path.suffix.lower().removeprefix(".")
-    metadata = {"Title": title, "Date": None} if kind == "svg" else {"Title": title}  # no date: the same bytes
+    drawn = as_bytes(figure, path.suffix.lower().removeprefix("."), title)
+    return write_whole(path, lambda part: part.write_bytes(drawn), "the picture")
 
-    def write(part: Path) -> None:
-        figure.savefig(part, format=kind, facecolor=style.PAPER, metadata=metadata)
 
+def as_bytes(figure: Figure, kind: str, title: str, dpi: float | str = "figure") -> bytes:
+    """The figure with its title as "png" or "svg"; in an SVG, texts stay texts."""
     with (
+        io.BytesIO() as file,
         warnings.catch_warnings(),
         mpl.rc_context({"svg.hashsalt": f"{zlib.crc32(title.encode()):08x}", "svg.fonttype": "none"}),
     ):
         warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box
-        return write_whole(path, write, "the picture")
+        figure.savefig(file, format=kind, dpi=dpi, facecolor=style.PAPER, metadata={"Title": title, **_UNSAID[kind]})
+        return file.getvalue()
