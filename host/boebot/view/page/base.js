@@ -14,6 +14,22 @@ function element(tag, properties = {}, ...children) {
   made.append(...children);
   return made;
 }
+// Calls `press` with true when the button is pressed, by a pointer or one of the keys, and with false when it is let go.
+function onHold(button, keys, press) {
+  button.onpointerdown = e => {
+    button.setPointerCapture(e.pointerId);
+    press(true);
+  };
+  button.onpointerup = button.onpointercancel = button.onblur = () => press(false);
+  button.onkeydown = e => {
+    if (!keys.includes(e.key)) return;
+    e.preventDefault();
+    e.stopPropagation(); // it is not the key that pauses
+    press(true);
+  };
+  button.onkeyup = e => keys.includes(e.key) && press(false);
+  button.oncontextmenu = e => e.preventDefault(); // of a long press
+}
 // Of a panel; returns the row and its right cell.
 function row(name, value = "") {
   const cell = element("span", { textContent: value });

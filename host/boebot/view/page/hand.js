@@ -54,24 +54,7 @@ addEventListener("blur", letGo);
 
 // ---- the panel ----
 function listenToHand() {
-  for (const it of document.querySelectorAll("[data-way]")) {
-    const name = it.dataset.way;
-    it.onpointerdown = event => {
-      it.setPointerCapture(event.pointerId);
-      hold(name, true);
-    };
-    it.onpointerup = it.onpointercancel = it.onblur = () => hold(name, false);
-    it.onkeydown = event => {
-      if (event.key === "Enter") {
-        event.preventDefault();
-        hold(name, true);
-      }
-    };
-    it.onkeyup = event => {
-      if (event.key === "Enter") hold(name, false);
-    };
-    it.oncontextmenu = event => event.preventDefault(); // of a long press
-  }
+  for (const it of document.querySelectorAll("[data-way]")) onHold(it, ["Enter"], on => hold(it.dataset.way, on));
   $("release").onclick = () => {
     letGo();
     act({ kind: "release" });

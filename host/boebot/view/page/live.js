@@ -394,20 +394,9 @@ function makeInput({ name, kind }) {
   if (kind === "button") {
     const whole = element("button", { textContent: title, disabled: ended !== null, title: "Pressed while it is held" });
     let held = false;
-    const press = on => {
+    onHold(whole, [" ", "Enter"], on => {
       if (on !== held) set((held = on) ? 1 : 0);
-    };
-    whole.onpointerdown = e => {
-      whole.setPointerCapture(e.pointerId);
-      press(true);
-    };
-    whole.onpointerup = whole.onpointercancel = whole.onblur = () => press(false);
-    whole.onkeydown = e => {
-      if (e.key !== " " && e.key !== "Enter") return;
-      e.stopPropagation(); // it is not the key that pauses
-      press(true);
-    };
-    whole.onkeyup = () => press(false);
+    });
     return { whole, tell: i => (whole.ariaPressed = String(run.isOn(name, i))) };
   }
   if (kind === "slider") {
