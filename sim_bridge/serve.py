@@ -23,7 +23,7 @@ from sim_bridge.boards.board import CLOCK_HZ
 from sim_bridge.pins import RXEN0
 from sim_bridge.served_ports import Port, PtyPort, TcpPort
 from sim_bridge.sessions.session import SimSession
-from sim_bridge.sessions.world import AVR, NATIVE, Pace, open_on
+from sim_bridge.sessions.world import KINDS, Pace, open_on
 
 IDLE_S = 0.002  # how long the loop sleeps when no byte comes
 BRISK_S = 0.0002  # and for a while after one came, so that its answer is not late
@@ -218,11 +218,10 @@ def serve(
     Raises:
         BoebotError: no such board or port.
     """
-    kinds = {board.name: board for board in (NATIVE, AVR)}
-    if kind not in kinds:
-        raise BoardError(f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(kinds)}")
+    if kind not in KINDS:
+        raise BoardError(f"there is no emulated board {kind!r} to serve; expected one of: {', '.join(KINDS)}")
     with contextlib.ExitStack() as stack:
-        session = open_on(kinds[kind], request)
+        session = open_on(KINDS[kind], request)
         stack.callback(session.close)
         port: Port = PtyPort(session.transport.baud) if tcp is None else TcpPort(tcp)
         stack.callback(port.close)

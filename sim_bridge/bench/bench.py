@@ -24,7 +24,7 @@ from boebot.record.blocks import Group, merged
 from boebot.record.record import Record
 from sim_bridge.boards.board import EDGE, FRAME, LEVELS, Edge, EmulatedBoard, Reaction
 from sim_bridge.pins import EDGES_KEPT, streams_of
-from sim_bridge.sessions.world import AVR, NATIVE, open_on
+from sim_bridge.sessions.world import KINDS, open_on
 
 SLICE_CYCLES = 8_000  # 0.5 ms, between two chances for sources
 BARE = "bare"
@@ -113,13 +113,12 @@ class Bench:
             CallError: there is no such board.
             BoardError, RobotError, ArenaError: as of a run.
         """
-        kinds = {kind.name: kind for kind in (AVR, NATIVE)}
-        if on not in kinds:
-            raise CallError(f"there is no board {on!r} for a bench; expected {' or '.join(kinds)}")
+        if on not in KINDS:
+            raise CallError(f"there is no board {on!r} for a bench; expected {' or '.join(KINDS)}")
         described = load_robot(robot) if isinstance(robot, str) else robot or bare("shieldbot")
         program = None if image is None else str(image)
         asked = BoardRequest(robot=described, image=program, arena=arena, noise=noise, **request)
-        self.session = open_on(kinds[on], asked)
+        self.session = open_on(KINDS[on], asked)
         self.session.transport.stamp()
         self.session.transport.wait = lambda robot, cycles, quiet: self.run_until(self.now + cycles)
         self.pins, self.robot, self.mark = self.session.board, self.session.robot, 0

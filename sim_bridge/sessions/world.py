@@ -157,6 +157,7 @@ class BoardKind(NamedTuple):
 
 NATIVE = BoardKind("native", native_library, native_board)
 AVR = BoardKind("avr", avr_image, avr.create)
+KINDS = {kind.name: kind for kind in (AVR, NATIVE)}
 
 
 def native_world(requests: Sequence[BoardRequest]) -> SimWorld:
