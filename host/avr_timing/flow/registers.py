@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from functools import cache
 
+from avr_timing.flow.instructions import BRANCHES, JUMPS, SKIPS
 from avr_timing.program import Instruction
 
 
@@ -18,11 +19,7 @@ REGISTERS = 32  # at data addresses 0 to 31
 SREG = 0x3F  # I/O address
 ZERO = 1  # holds zero wherever compiled code does not multiply
 CALL_CLOBBERED = frozenset((0, 1, *range(18, 28), 30, 31))
-NO_RESULT = _words(
-    "cpse cpc cp cpi tst out sts st std push nop sleep wdr break spm sei cli sec clc sez clz sen cln sev clv ses cls "
-    "seh clh set clt bst sbi cbi sbic sbis sbrc sbrs jmp rjmp ijmp ret reti brcs breq brmi brvs brlt brhs brts brie "
-    "brcc brne brpl brvc brge brhc brtc brid"
-)
+NO_RESULT = BRANCHES | SKIPS | JUMPS | _words("cp cpc cpi tst out sts st std push spm bst sbi cbi")  # with operands
 PRODUCTS = _words("mul muls mulsu fmul fmuls fmulsu")
 PAIRS = _words("movw adiw sbiw")
 
