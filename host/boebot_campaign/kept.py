@@ -198,8 +198,6 @@ def held(path: Path, name: str, before: Collection[str] = ()) -> Iterator[bool]:
     make_folder(path)
     try:
         lock = system.lock_folder(path)
-    except BlockingIOError:
-        raise BoebotError(f"another process writes to {path} now; expected a folder for this one alone") from None
     except OSError as error:
         raise unwritable(path, error, _WHAT) from None
     try:

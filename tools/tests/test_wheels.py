@@ -288,7 +288,7 @@ def test_a_folder_is_of_one_run(system: System, tmp_path: Path) -> None:
         while not _has_begun(tmp_path / "out" / "record.mcap") and time.perf_counter() < until:
             time.sleep(0.2)
         for _ in range(2):
-            assert "another run writes to out now" in system.boebot(tmp_path, *words, "1", code=1)
+            assert "another process writes to out now" in system.boebot(tmp_path, *words, "1", code=1)
         os.killpg(process.pid, signal.SIGKILL)
     system.boebot(tmp_path, "run", "wander", "--out", "out", "--seconds", "1", "--quiet")
     assert not (tmp_path / "out" / ".running").exists()

@@ -54,9 +54,6 @@ class RunFolder:
             self._lock = system.lock_folder(path)
             there = {entry.name for entry in path.iterdir()} - {system.LOCK}
             links = sorted(name for name in there if _ROBOT.match(name) and (path / name).is_symlink())
-        except BlockingIOError:
-            self.close()
-            raise BoebotError(f"another run writes to {path} now; expected a folder for this one alone") from None
         except OSError as error:
             self.close()
             raise unwritable(path, error) from None
@@ -153,7 +150,9 @@ def write_whole(path: Path, write: Callable[[Path], object], what: str = "the ru
 
 
 def unwritable(folder: Path, error: OSError, what: str = "the run's files") -> BoebotError:
-    """Why a run's files, or others, cannot be written."""
+    """Why a run's files, or others, cannot be written; BlockingIOError: another process has locked their folder."""
+    if isinstance(error, BlockingIOError):
+        return BoebotError(f"another process writes to {folder} now; expected a folder for this one alone")
     return BoebotError(f"{what} cannot be written to {folder}: {error.strerror or error}")
 
 

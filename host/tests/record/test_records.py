@@ -41,7 +41,7 @@ def test_killed_run_leaves_all_but_its_last_second(tmp_path: Path) -> None:
     process.kill()
     process.wait()
     assert (other.returncode, other.stdout) == (1, "")
-    assert other.stderr == f"boebot: another run writes to {run} now; expected a folder for this one alone\n"
+    assert other.stderr == f"boebot: another process writes to {run} now; expected a folder for this one alone\n"
     cut = read(run)
     assert isinstance(cut.error, CutError) and "the record is cut: it ends at" in str(cut.error)
     assert cut.run_time == cut.record.times_of(cut.record.tick_stream)[-1] > 1 and cut.steps > 20
