@@ -61,13 +61,6 @@ class Wire(NamedTuple):
     """What is in it, such as "220 Ω"; empty: nothing."""
 
 
-SERVO_CABLE: Final = (
-    Wire("pin", "signal", "white"),
-    Wire(SERVO_POWER, "power", "red"),
-    Wire(GROUND, "ground", "black"),
-)
-
-
 Reader = Callable[[Any, Any], Any]
 """Makes a reading of an observation's `sample` and `slow`."""
 
@@ -246,10 +239,7 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     @property
     def connector(self) -> str:
         """Where its wires are plugged in on the board."""
-        if self.WIRES is not SERVO_CABLE:
-            return self.CONNECTOR
-        (pin,) = self.pins().values()
-        return f"servo port {pin}" if pin in SERVO_PORTS else "three-pin header"
+        return self.CONNECTOR
 
     def reader(self, place: Place) -> Reader:
         """What makes its reading; for kinds that have one."""
@@ -297,6 +287,36 @@ class Device(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     def sweeps(self, place: Place, run: Run) -> Sweeps | None:
         """The area that it measured, at each tick; None: it measures none."""
         return None
+
+
+class AnyServo(Device, frozen=True, kw_only=True):
+    """What servos of both kinds share: the cable, and the timer that makes their pulses."""
+
+    pin: int | str
+
+    PINS: ClassVar[dict[str, str]] = {"pin": ""}
+    HEARS: ClassVar[frozenset[str]] = frozenset({"pin"})
+    WIRES: ClassVar[tuple[Wire, ...]] = (
+        Wire("pin", "signal", "white"),
+        Wire(SERVO_POWER, "power", "red"),
+        Wire(GROUND, "ground", "black"),
+    )
+    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
+    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+    DOES: ClassVar[str]  # what it does by pulses, for people
+
+    @property
+    def connector(self) -> str:
+        """See `Device`."""
+        (pin,) = self.pins().values()
+        return f"servo port {pin}" if pin in SERVO_PORTS else "three-pin header"
+
+    def checkup(self, readings: Sequence[Any]) -> Checkup:
+        """See `Device`."""
+        expected = f"no pulses, as nothing {self.DOES}"
+        if readings[-1].pulse_us is None:
+            return Checkup("no pulses", expected)
+        return Checkup(f"{readings[-1].pulse_us:.0f} µs", expected, f"something {self.DOES}: the board's own brain?")
 
 
 class SlowDevice(Device, frozen=True, kw_only=True):

@@ -15,12 +15,11 @@ What a brain reads is the pulse that the firmware sends now. Pins 8 to 13 can do
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import SERVO_CABLE, Checkup, Column, Device, FaultKind, Place, Reader, Run, Wire
+from boebot.devices.device import AnyServo, Column, FaultKind, Place, Reader, Run
 from boebot.devices.faults import MOTOR_FAULTS
 from boebot.link.messages import Telemetry
 
@@ -40,10 +39,9 @@ class Servo(NamedTuple):
     """Whether the value may be trusted."""
 
 
-class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True):
+class ContinuousServo(AnyServo, tag="continuous_servo", frozen=True, kw_only=True):
     """A servo modified for continuous rotation: the pulse sets the wheel's speed."""
 
-    pin: int | str
     centre_us: Annotated[float, msgspec.Meta(ge=1400, le=1600)]
     gain_us: Annotated[float, msgspec.Meta(ge=-200, le=200)]  # pulse offset at full forward signal
 
@@ -51,22 +49,11 @@ class ContinuousServo(Device, tag="continuous_servo", frozen=True, kw_only=True)
     GROUP: ClassVar[str] = "servos"
     NAMES: ClassVar[tuple[str, ...]] = ("servo_left", "servo_right")
     SHOWN: ClassVar = ("pulse", "µs", 1.0, 0)
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    HEARS: ClassVar[frozenset[str]] = frozenset({"pin"})
-    WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
-    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+    DOES: ClassVar[str] = "drives"
     FAULTS: ClassVar = {
         **MOTOR_FAULTS,
         "offset": FaultKind("pulses count as longer by this", "us", 30.0, least=-500.0, most=500.0, harmless=0.0),
     }
-
-    def checkup(self, readings: Sequence[Servo]) -> Checkup:
-        """See `Device`."""
-        expected = "no pulses, as nothing drives"
-        if readings[-1].pulse_us is None:
-            return Checkup("no pulses", expected)
-        return Checkup(f"{readings[-1].pulse_us:.0f} µs", expected, "something drives: the board's own brain?")
 
     def reader(self, place: Place) -> Reader:
         """See `Device`."""

@@ -18,12 +18,12 @@ programs of one's own, pages show the angle that the turret has.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from boebot.devices.device import SERVO_CABLE, Checkup, Device, Point, SlowDevice, Wire
+from boebot.devices.device import AnyServo, Device, Point, SlowDevice
 from boebot.devices.ping import PingSensor
 from boebot.devices.servo import PULSE_SCALE_US
 from boebot.link.messages import Turret as TurretMessage
@@ -59,10 +59,9 @@ class Turret(NamedTuple):
     """Whether the value may be trusted."""
 
 
-class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True):
+class PositionServo(AnyServo, SlowDevice, tag="position_servo", frozen=True, kw_only=True):
     """A servo that turns to an angle."""
 
-    pin: int | str
     position_m: Point  # of its axis
     centre_us: Annotated[float, msgspec.Meta(ge=1000, le=2000)] = 1500.0
     gain_us_per_rad: Annotated[float, msgspec.Meta(ge=-1000, le=1000)] = 573.0  # 10 us a degree
@@ -70,11 +69,7 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
 
     READING: ClassVar = Turret
     NAMES: ClassVar[tuple[str, ...]] = ("turret",)
-    PINS: ClassVar[dict[str, str]] = {"pin": ""}
-    HEARS: ClassVar[frozenset[str]] = frozenset({"pin"})
-    WIRES: ClassVar[tuple[Wire, ...]] = SERVO_CABLE
-    NEEDS: ClassVar[dict[str, str]] = {"Timer1 compare A": "servo edges"}
-    ONLY_PINS: ClassVar[dict[str, tuple[int, ...]]] = {"pin": (8, 9, 10, 11, 12, 13)}
+    DOES: ClassVar[str] = "turns it"
     COLUMNS: ClassVar = (("angle", "rad", 4),)
     SHOWN: ClassVar = ("angle", "°", 180 / math.pi, 1)
 
@@ -84,13 +79,6 @@ class PositionServo(SlowDevice, tag="position_servo", frozen=True, kw_only=True)
             return 0
         pulse_us = self.centre_us + self.gain_us_per_rad * message.angle * ANGLE_SCALE
         return round(max(PULSE_MIN_US, min(PULSE_MAX_US, pulse_us)) / PULSE_SCALE_US)
-
-    def checkup(self, readings: Sequence[Turret]) -> Checkup:
-        """See `Device`."""
-        expected = "no pulses, as nothing turns it"
-        if readings[-1].pulse_us is None:
-            return Checkup("no pulses", expected)
-        return Checkup(f"{readings[-1].pulse_us:.0f} µs", expected, "something turns it: the board's own brain?")
 
     def reading(self, message: Any, name: str, age: float, fresh: bool) -> Turret:
         """See `SlowDevice`."""
