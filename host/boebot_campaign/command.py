@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from boebot import missing
-from boebot.cli import options, output
+from boebot.cli import options, output, streams
 from boebot.cli.ending import Detail
 from boebot.errors import InterruptedRunError
 from boebot.record.figures import counted, text
@@ -62,14 +62,16 @@ def command(kind: type[_P], work: Work[_P, _T]) -> Callable[[Callable[[_T, Detai
             json: options.Json = False,
             quiet: options.Quiet = False,
         ) -> None:
-            asked, path = plan.read(file, kind), out or Path(file.stem)
+            with streams.kept(for_the_answer=json):  # here brains are loaded, too
+                asked, path = plan.read(file, kind), out or Path(file.stem)
+                took_s = _one_worker_s(asked) if dry_run else 0.0
             if dry_run:
-                _say_size(asked, json)
+                _say_size(asked, took_s, json)
                 return
             below = lambda: newest_rows(path, int(time.perf_counter()))  # noqa: E731
             bar = output.progress_bar(path.name, asked.most_runs, quiet or json, " runs", left=True, below=below)
             try:
-                with bar as told:
+                with bar as told, streams.kept(for_the_answer=json):
                     done = carried_out(work, asked, path, scheduler, workers, told)
             except KeyboardInterrupt:
                 said = f"interrupted; what is done is in {path}, and the same command goes on"
@@ -97,20 +99,25 @@ def sweep(done: Folder, wanted: Detail) -> None:
         _say_errors(done)
 
 
-def _say_size(asked: Plan, json: bool) -> None:
-    """How many runs it is and, by the second of two, how long they take."""
-    runs, one = asked.most_runs, asked.as_sweep()
-    with tempfile.TemporaryDirectory() as name, kept.locked(Path(name) / "sweep", one) as folder:
-        for row in (0, one.count - 1):  # the first one imports, too
+def _one_worker_s(asked: Plan) -> float:
+    """How long all runs take, by the second of two."""
+    with tempfile.TemporaryDirectory() as name, kept.locked(Path(name) / "sweep", asked.as_sweep()) as folder:
+        for row in (0, folder.plan.count - 1):  # the first one imports, too
             begun_s = time.perf_counter()
-            error = execute(request_of(folder, one.case(row, folder.points))).error
+            error = execute(request_of(folder, folder.plan.case(row, folder.points))).error
             if isinstance(error, KeyboardInterrupt):
                 raise error
-            took_s = runs * (time.perf_counter() - begun_s)
+            took_s = time.perf_counter() - begun_s
+    return asked.most_runs * took_s
+
+
+def _say_size(asked: Plan, took_s: float, json: bool) -> None:
+    """How many runs it is, and how long they take."""
+    runs = asked.most_runs
     if json:
         output.print_json({"runs": runs, "one_worker_s": round(took_s, 3)})
     else:
-        most, took = "" if runs == one.count else "at most ", timedelta(seconds=math.ceil(took_s))
+        most, took = "" if runs == asked.count else "at most ", timedelta(seconds=math.ceil(took_s))
         output.line(f"{most}{counted(runs, 'run', 'runs')}: about {took} (hours:minutes:seconds) of one processor")
 
 

@@ -13,6 +13,7 @@ import msgspec
 from boebot.brains import LoadedBrain, load_brain
 from boebot.errors import BoebotError, CallError, did_you_mean
 from boebot.running import brain_parameters
+from boebot.system import folder_kept
 from boebot_campaign import rows, toml_brain
 from boebot_campaign.plan import SOME, Plan, Range, Seeds, Single, Whole, valid
 
@@ -59,7 +60,8 @@ class Evolve(Single, frozen=True, kw_only=True, forbid_unknown_fields=True, dict
     @cached_property
     def loaded(self) -> LoadedBrain:
         """The brain by hand."""
-        return load_brain(self.brains[0])
+        with folder_kept():
+            return load_brain(self.brains[0])
 
     @cached_property
     def by_hand(self) -> list[float]:

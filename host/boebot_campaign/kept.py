@@ -286,7 +286,8 @@ def _sources(plan: Plan) -> tuple[dict[str, str], dict[str, bytes]]:
             if not Path(name).is_absolute():
                 continue
             request = Request.single(**{"brain": plan.brains[0], "robot": plan.all_robots[0], kind: name})
-            found = sources(request, request.tasks())
+            with system.folder_kept():  # a brain may change it as it is loaded
+                found = sources(request, request.tasks())
             below = f"{FILES}/{kind}-{number}"
             names[name] = f"{below}/{Path(name).name}"
             files |= {

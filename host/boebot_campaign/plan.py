@@ -30,6 +30,7 @@ from boebot.running.brain_parameters import in_force
 from boebot.running.hands import Onlooker
 from boebot.running.loop import execute
 from boebot.running.tasks import Request, prepare
+from boebot.system import folder_kept
 from boebot_campaign import designs
 from boebot_campaign.designs import Design
 
@@ -270,7 +271,8 @@ def made(keys: Mapping[str, Any], kind: type[_P], name: str) -> _P:
 def _made(table: dict[str, Any], kind: type[_P], name: str, folder: Path) -> _P:
     plan, at = _found(toml_files.convert(table, kind, name, CallError), folder), f"{name}: "
     _check_once(plan, at)
-    return valid(plan.completed(at), at)
+    with folder_kept():
+        return valid(plan.completed(at), at)
 
 
 def _found(plan: _P, folder: Path) -> _P:

@@ -50,6 +50,8 @@ PYTHON, TOML = ".py", ".toml"  # what brains are written in
 PROGRAMS = (".elf", ".hex")  # for the board: they drive a robot in place of a brain
 SKETCHES = (".ino", ".pde", ".ini")  # of which one is built
 _loading = threading.RLock()  # a process has one table of modules, whatever its threads load
+if hasattr(os, "register_at_fork"):  # of another thread's lock a copy of the process would wait forever
+    os.register_at_fork(after_in_child=_loading._at_fork_reinit)  # type: ignore[attr-defined]
 _executing: set[tuple[Path, int]] = set()  # files that are being loaded, each with its thread
 _beside: dict[Path, dict[str, ModuleType]] = {}  # what each brain's file has imported, as it was last loaded
 
@@ -339,7 +341,7 @@ def _neighbours(path: Path) -> Iterator[None]:
         for name, module in [*sys.modules.items()]
         if id(module) in of or name.partition(".")[0] in scripts
     }
-    before = set(sys.modules)
+    before = {id(module): module for module in [*sys.modules.values()]}  # some have two names, as __mp_main__
     sys.path.insert(0, entry)
     importlib.invalidate_caches()
     try:
@@ -347,7 +349,7 @@ def _neighbours(path: Path) -> Iterator[None]:
     finally:
         with contextlib.suppress(ValueError):
             sys.path.remove(entry)
-        new = [item for item in [*sys.modules.items()] if item[0] not in before and _file(item[1])]
+        new = [item for item in [*sys.modules.items()] if id(item[1]) not in before and _file(item[1])]
         _beside[path] = {name: module for name, module in new if not name.startswith("boebot_brain_")}
         for name, module in _beside[path].items():
             _forget(module)

@@ -422,6 +422,21 @@ def test_a_dry_run_says_how_long_all_runs_take_and_keeps_nothing(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["odd.py", "sweep.toml"]
 
 
+def test_what_a_brain_prints_and_where_it_goes_as_it_is_loaded_changes_nothing(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "away.py").write_text(
+        "import os\nprint('hello')\nos.chdir(os.sep)\n\ndef step(robot):\n    print('on')\n"
+    )
+    Path("sweep.toml").write_text('brains = ["away.py"]\nseconds = 0.2\nseeds = [1]\n')
+    code, said, _ = command.boebot(capfd, "sweep", "sweep.toml", "--dry-run", "--json")
+    assert code == 0 and json.loads(said)["runs"] == 1
+    with kept.locked(Path("out"), plan.read(Path("sweep.toml"), plan.Plan)):
+        assert (tmp_path / "out" / "files" / "brain-0" / "away.py").is_file()
+    assert Path.cwd() == tmp_path
+
+
 def test_ctrl_c_ends_a_dry_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = saved(tmp_path, ODD.replace('"well", "raises", "loops", "kills"', '"interrupts"'))  # in this process
     assert command.boebot(capsys, "sweep", str(file), "--dry-run")[0] == 130

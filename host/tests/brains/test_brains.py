@@ -6,6 +6,7 @@ import importlib
 import math
 import os
 import re
+import signal
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -243,6 +244,37 @@ def test_brains_that_threads_load_have_their_own_modules(tmp_path: Path) -> None
     brains = [brain_beside(tmp_path / str(number), "helper.py", number) for number in range(1, 5)]
     with ThreadPoolExecutor(4) as pool:
         assert [loaded.period for loaded in pool.map(load_brain, brains * 5)] == [1, 2, 3, 4] * 5
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks")
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+def test_a_copy_of_the_process_loads_brains_while_a_thread_of_the_first_one_does(tmp_path: Path) -> None:
+    begun, end = tmp_path / "begun", tmp_path / "end"
+    wait = f"while not Path({str(end)!r}).exists():\n    time.sleep(0.01)\n"
+    begin = f"import time\nfrom pathlib import Path\nPath({str(begun)!r}).touch()\n"
+    slow, fast = write(tmp_path, begin + wait + STEP, "slow.py"), write(tmp_path, STEP, "fast.py")
+    with ThreadPoolExecutor(1) as pool:
+        loaded = pool.submit(load_brain, slow)
+        try:
+            while not begun.exists():
+                time.sleep(0.01)
+            if (copy := os.fork()) == 0:
+                signal.alarm(5)
+                os._exit(7 if load_brain(fast).name == "fast" else 1)
+            assert os.waitstatus_to_exitcode(os.waitpid(copy, 0)[1]) == 7
+        finally:
+            end.touch()
+        assert loaded.result().name == "slow"
+
+
+def test_a_module_that_gets_a_second_name_stays(tmp_path: Path) -> None:
+    brain = write(tmp_path, f"import sys\nsys.modules['second_name'] = sys.modules[{__name__!r}]\n{STEP}")
+    try:
+        for _ in range(2):
+            load_brain(brain)
+            assert sys.modules[__name__].load_brain is load_brain
+    finally:
+        del sys.modules["second_name"]
 
 
 def test_an_edit_within_a_second_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
