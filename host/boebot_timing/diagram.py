@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from boebot.arguments import duration
 from boebot.running.driver import TICK_S
-from boebot.view import figure_file, style
+from boebot.view import style
 from boebot_timing.budget import Report
 from boebot_timing.costs import SLOT_BEGINS
 from boebot_timing.measured import Moment
@@ -94,6 +94,8 @@ def _how(report: Report) -> str:
 
 def files(report: Report, verdict: Verdict | None = None) -> dict[str, bytes]:
     """The diagram as timing.png and timing.svg."""
+    from boebot.view import figure_file
+
     drawn = figure(report, verdict)
     return {f"{NAME}.{kind}": figure_file.as_bytes(drawn, kind, "Timing of the firmware") for kind in ("png", "svg")}
 
