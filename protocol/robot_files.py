@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import schema
 
 FOLDER = Path(__file__).resolve().parent / "robots"
 NO_BOARD = "none"
@@ -126,10 +127,7 @@ def load_all() -> list[Robot]:
 
 
 def _read(path: Path, seen: tuple[Path, ...]) -> dict[str, Any]:
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path.name}: no valid TOML: {error}") from None
+    table = schema.toml(path)
     tables: dict[str, Any] = {key: table[key] for key in ("body", "supply", "device") if key in table}
     if isinstance(devices := tables.get("device"), dict):
         tables |= {f"device.{name}": device for name, device in devices.items()}

@@ -267,11 +267,15 @@ def load(path: Path = HERE / "messages.toml") -> Schema:
         ValueError: no valid TOML, an unknown key, a value of another type, a name or number that is used twice, or a
             field that names what is not there.
     """
+    return checked(toml(path), path.name)
+
+
+def toml(path: Path) -> dict[str, Any]:
+    """What a file of the protocol or of a robot says. Raises ValueError: no valid TOML."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path.name}: no valid TOML: {error}") from None
-    return checked(table, path.name)
 
 
 def checked(table: dict[str, Any], place: str) -> Schema:
