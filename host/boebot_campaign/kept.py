@@ -290,11 +290,9 @@ def _sources(plan: Plan) -> tuple[dict[str, str], dict[str, bytes]]:
                 found = sources(request, request.tasks())
             below = f"{FILES}/{kind}-{number}"
             names[name] = f"{below}/{Path(name).name}"
-            files |= {
-                f"{below}/{one.removeprefix(f'{kind}/')}": data
-                for one, data in found.items()
-                if one.startswith(f"{kind}/")
-            }
+            for one, data in found.items():
+                if one.startswith(f"{kind}/"):
+                    files[below + one.removeprefix(kind)] = data
     return names, files
 
 
