@@ -98,9 +98,8 @@ class ConstantRow:
 
 
 Row = TaskRow | InterruptRow | SensorRow | ConstantRow
-_Kind = type[TaskRow] | type[InterruptRow] | type[SensorRow] | type[ConstantRow]
 
-ROWS: dict[str, tuple[_Kind, int]] = {
+ROWS: dict[str, tuple[type[Row], int]] = {
     "TASK": (TaskRow, 3),
     "INTERRUPT": (InterruptRow, 4),
     "SENSOR": (SensorRow, 3),
@@ -174,7 +173,7 @@ def _row(path: Path, data: bytes) -> Row:
     return row(words[0], *numbers_of)
 
 
-def _contradiction(row: _Kind, numbers: list[int]) -> str | None:
+def _contradiction(row: type[Row], numbers: list[int]) -> str | None:
     """What of a row cannot be; None: nothing."""
     if max(numbers) > MOST:
         return f"{max(numbers)} is too large; expected at most {MOST}"
