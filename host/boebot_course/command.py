@@ -110,7 +110,7 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
     Raises:
         BoebotError: some are outside their criteria, or the files cannot be written.
     """
-    from boebot.record.run_folder import make_folder
+    from boebot.record.run_folder import make_folder, write_files
     from boebot_course import output_files, pages, running
 
     make_folder(out)
@@ -122,12 +122,12 @@ def _run(experiments: Sequence[Experiment], seed: int, out: Path, jobs: int, as_
     ):
         for verdict in coming:
             by_name[verdict.name] = verdict
-            files += output_files.write(out, verdict.files)
+            files += write_files(out, verdict.files)
     verdicts = [by_name[one.name] for one in experiments]
     if len(verdicts) > 1:
         met = sum(verdict.is_met for verdict in verdicts)
         index = pages.page(f"Experiments: {met} of {len(verdicts)} met, seed {seed}", experiments, by_name)
-        files = output_files.write(out, {"index.md": index.encode()}) + sorted(files)
+        files = write_files(out, {"index.md": index.encode()}) + sorted(files)
     if as_json:
         pairs = zip(experiments, verdicts, strict=True)
         found = [output_files.record(one, verdict.measured, verdict.error) for one, verdict in pairs]

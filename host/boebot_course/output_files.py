@@ -10,15 +10,12 @@ import io
 import json
 import math
 from collections.abc import Iterable
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from boebot import resources
-from boebot.record.run_folder import write_whole
 from boebot.view import figure_file, style
 from boebot_course.experiment import Experiment, Measured, Outcome
 from boebot_timing.plots import PLOTS
@@ -86,12 +83,3 @@ def record(experiment: Experiment, measured: Iterable[Measured], error: str = ""
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-def write(folder: Path, contents: dict[str, bytes]) -> list[Path]:
-    """Writes them; each file is complete or what it was before, whatever comes between.
-
-    Raises:
-        BoebotError: the folder cannot be written to.
-    """
-    return [write_whole(folder / name, partial(Path.write_bytes, data=data)) for name, data in contents.items()]

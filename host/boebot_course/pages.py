@@ -20,6 +20,7 @@ from pathlib import Path
 from PIL import Image
 
 from boebot.cli.output import progress_bar
+from boebot.record.run_folder import write_files
 from boebot_course import output_files, running
 from boebot_course.experiments import Experiment, Measured, Outcome, all_experiments
 
@@ -126,10 +127,10 @@ def main(chapters: list[str]) -> int:
     ):
         verdicts = {verdict.name: verdict for verdict in coming}
     for verdict in verdicts.values():
-        output_files.write(FOLDER, verdict.files)
+        write_files(FOLDER, verdict.files)
     pages = {f"chapter-{chapter}.md": chapter_page(chapter, verdicts) for chapter in set(map(chapter_of, chosen))}
     pages["README.md"] = listing(known)
-    output_files.write(FOLDER, {name: text.encode() for name, text in pages.items()})
+    write_files(FOLDER, {name: text.encode() for name, text in pages.items()})
     if not chapters:
         for path in FOLDER.iterdir():
             if path.name not in pages.keys() | {f"{one.name}.png" for one in known}:

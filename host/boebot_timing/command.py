@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -221,7 +220,7 @@ def _brain(brain: str | None, step_s: float | None, robot: RobotDescription, see
 def _write(answer: Answer, out: Path) -> list[Path]:
     import json
 
-    from boebot.record.run_folder import write_whole
+    from boebot.record.run_folder import write_files
 
     found: dict[str, bytes] = {}
     if answer.report is not None:
@@ -229,4 +228,4 @@ def _write(answer: Answer, out: Path) -> list[Path]:
 
         found |= diagram.files(answer.report, answer.verdict)
     found["timing.json"] = (json.dumps(answer.as_dict(), indent=1) + "\n").encode()
-    return [write_whole(out / name, partial(Path.write_bytes, data=data)) for name, data in found.items()]
+    return write_files(out, found)

@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -147,6 +148,11 @@ def write_whole(path: Path, write: Callable[[Path], object], what: str = "the ru
         with suppress(OSError):
             part.unlink(missing_ok=True)
     return path
+
+
+def write_files(folder: Path, contents: dict[str, bytes]) -> list[Path]:
+    """Each file whole or not at all, by its name. Raises as `write_whole`."""
+    return [write_whole(folder / name, partial(Path.write_bytes, data=data)) for name, data in contents.items()]
 
 
 def unwritable(folder: Path, error: OSError, what: str = "the run's files") -> BoebotError:
