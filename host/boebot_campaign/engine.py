@@ -50,8 +50,8 @@ class Workers(contextlib.ExitStack):
     def __init__(self, scheduler: str | None, count: int | None, log: Path) -> None:
         """`count`: of this computer, or one for each processor; `log`: file of what they print. Raises CallError."""
         super().__init__()
-        if count is not None and (scheduler is not None or count < 1):
-            raise CallError(f"workers is {count}; expected at least 1, and none with a scheduler")
+        if count is not None and (scheduler is not None or not isinstance(count, int) or count < 1):
+            raise CallError(f"workers is {count!r}; expected a whole number from 1 on, and none with a scheduler")
         self.is_local, self.log = scheduler is None, log
         self._address, self._count = scheduler or "", count or os.cpu_count() or 1
         self._client: Any = None

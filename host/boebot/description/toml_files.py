@@ -261,8 +261,8 @@ def _fault(value: Any, kind: Any, key: str) -> Fault | None:
     origin, inner = typing.get_origin(_plain(kind)), typing.get_args(_plain(kind))
     if origin in (types.UnionType, typing.Union) and all(_is_struct(choice) for choice in inner):
         return _union_fault(value, inner, key)
-    if _is_struct(kind) and isinstance(value, dict):
-        return _struct_fault(value, kind, key)
+    if _is_struct(kind) and isinstance(value, dict) and (fault := _struct_fault(value, kind, key)):
+        return fault
     if origin in (list, dict) and isinstance(value, origin):
         items = value.items() if isinstance(value, dict) else enumerate(value)
         places = ((_below(key, str(place)) if origin is dict else f"{key}[{place}]", item) for place, item in items)

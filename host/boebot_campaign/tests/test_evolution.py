@@ -212,6 +212,7 @@ brain = Brain([Mine()])
     [
         ({"parameters": {"avoid.utility.bb": {}}}, "no parameter 'avoid.utility.bb'"),
         ({"parameters": {"avoid.utility.b": {"from": 1, "to": -3}}}, "is from 1 to -3; expected from below to"),
+        ({"parameters": {"avoid.utility.b": {"from": 1, "to": 1}}}, "parameters.avoid.utility.b: from and to are 1"),
         ({"parameters": {"avoid.utility.b": {"from": 1, "to": 3}}}, "expected bounds around it"),
         ({"parameters": {}}, "parameters: expected object of length >= 1"),
         ({"fitness": {}}, "fitness: expected object of length >= 1"),

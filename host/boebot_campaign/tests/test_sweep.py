@@ -437,6 +437,13 @@ def test_what_a_brain_prints_and_where_it_goes_as_it_is_loaded_changes_nothing(
     assert Path.cwd() == tmp_path
 
 
+@pytest.mark.parametrize("workers", [0, 1.5, "2"])
+def test_workers_that_are_no_count_are_refused(tmp_path: Path, workers: Any) -> None:
+    with pytest.raises(BoebotError, match=f"workers is {workers!r}; expected a whole number from 1 on"):
+        boebot.sweep(saved(tmp_path, ODD), out=tmp_path / "out", workers=workers)
+    assert not (tmp_path / "out").exists()
+
+
 def test_ctrl_c_ends_a_dry_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = saved(tmp_path, ODD.replace('"well", "raises", "loops", "kills"', '"interrupts"'))  # in this process
     assert command.boebot(capsys, "sweep", str(file), "--dry-run")[0] == 130
