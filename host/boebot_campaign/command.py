@@ -62,7 +62,8 @@ def command(kind: type[_P], work: Work[_P, _T]) -> Callable[[Callable[[_T, Detai
             json: options.Json = False,
             quiet: options.Quiet = False,
         ) -> None:
-            with streams.kept(for_the_answer=json):  # here brains are loaded, too
+            check = output.progress_bar(f"{file.name} is checked", math.inf, quiet or json, "")
+            with check, streams.kept(for_the_answer=json):  # here brains are loaded, too
                 asked, path = plan.read(file, kind), out or Path(file.stem)
                 took_s = _one_worker_s(asked) if dry_run else 0.0
             if dry_run:

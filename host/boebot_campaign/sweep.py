@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -74,6 +74,7 @@ def function(name: str, kind: type[_P], work: Work[_P, _T]) -> Callable[..., _T]
         return carried_out(work, asked, path, scheduler, workers, progress or (lambda _: None))
 
     called.__name__ = called.__qualname__ = name
+    called.__annotations__["return"] = get_type_hints(work)["return"]
     return called
 
 

@@ -117,7 +117,8 @@ def progress_bar(
     below: Callable[[], RenderableType] | None = None,
 ) -> Iterator[Progress]:
     """Gives a function to call with how much of the total is done, such as the seconds that have passed; shows a bar
-    meanwhile, with `left` the time that the rest will take, and what `below` gives, often and in another thread."""
+    meanwhile, without numbers where `unit` is "", with `left` the time that the rest will take, and what `below` gives,
+    often and in another thread."""
     if quiet or not sys.stderr.isatty():
         yield lambda _: None
         return
@@ -130,7 +131,7 @@ def progress_bar(
     bar = Bar(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        TextColumn(f"{{task.completed:.0f}}{'' if math.isinf(total) else f' of {total:g}'}{unit}"),
+        *([TextColumn(f"{{task.completed:.0f}}{'' if math.isinf(total) else f' of {total:g}'}{unit}")] if unit else []),
         TimeElapsedColumn(),
         *([TextColumn("left"), TimeRemainingColumn()] if left else []),
         console=console(stderr=True),
