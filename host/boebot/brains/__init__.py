@@ -333,15 +333,15 @@ def _neighbours(path: Path) -> Iterator[None]:
     this one before, has no part in it; nor have the script's own modules of those names. They come back afterwards."""
     entry = str(path.parent)
     of = {id(module): brain.parent for brain, modules in _beside.items() for module in modules.values()}
-    scripts = {
-        name for name, module in [*sys.modules.items()] if id(module) not in of and _is_another(name, path.parent)
-    }
+    there = {one.name.partition(".")[0] for one in path.parent.iterdir()} & sys.modules.keys()
+    scripts = {name for name in there if id(sys.modules[name]) not in of and _is_another(name, path.parent)}
     hidden = {
         name: sys.modules.pop(name)
-        for name, module in [*sys.modules.items()]
+        for name, module in ([*sys.modules.items()] if of or scripts else [])
         if id(module) in of or name.partition(".")[0] in scripts
     }
-    before = {id(module): module for module in [*sys.modules.values()]}  # some have two names, as __mp_main__
+    old = [*sys.modules.values()]
+    before = {*map(id, old)}  # some have two names, as __mp_main__
     sys.path.insert(0, entry)
     importlib.invalidate_caches()
     try:
