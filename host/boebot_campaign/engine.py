@@ -1,8 +1,8 @@
 """Spreads a sweep's rows over Dask's workers: those of this computer, or of any scheduler.
 
-Tasks of about a second write parts and return only how long it took; what is done is in the folder. A few tasks for
-each worker wait at the scheduler at a time, so that memory does not grow with the sweep. A task whose worker has died,
-or whose scheduler has gone, is submitted again.
+Tasks of about a second write parts and return nothing; what is done is in the folder. A few tasks for each worker wait
+at a time, so that memory does not grow with the sweep. A task whose worker has died, or whose scheduler has gone, is
+submitted again.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ class _Work:
         self._ours, self._folder, self._told = ours, folder, told
         self._gaps = deque(folder.undone())
         self._done = folder.plan.count - sum(end - first for first, end in self._gaps)
-        self._row_s: float | None = None
         self._workers, self._looks_s, self._seen_s = 1, 0.0, time.perf_counter()
+        self._lately_rows, self._lately_s, self._settled_s = 0.0, 0.0, self._seen_s  # done, and workers' time for it
         self._pending: dict[Any, tuple[int, int]] = {}
         self._deaths: dict[tuple[int, int], int] = {}
 
@@ -123,8 +123,8 @@ class _Work:
         most = AHEAD * max(self._workers, 1)
         while self._gaps and len(self._pending) < most:
             first, end = self._gaps.popleft()
-            rows = 1 if self._row_s is None else int(min(max(PART_S / max(self._row_s, 1e-6), 1), MOST_ROWS))
-            middle = min(end, first + min(rows, max((end - first) // 8, 1) if end - first < most * rows else rows))
+            rows = int(min(max(PART_S * self._lately_rows / max(self._lately_s, 1e-6), 1), MOST_ROWS))
+            middle = min(end, first + min(rows, max((end - first) // 8, rows // 8, 1)))  # all workers end together
             if middle < end:
                 self._gaps.appendleft((middle, end))
             self._send(first, middle)
@@ -135,14 +135,17 @@ class _Work:
         self._pending[future] = first, end
 
     def _settle(self, future: Any, first: int, end: int) -> None:
+        if future.status == "finished":
+            now = time.perf_counter()
+            self._lately_rows = 0.8 * self._lately_rows + end - first
+            self._lately_s = 0.8 * self._lately_s + self._workers * (now - self._settled_s)
+            self._settled_s = now
+            self._done += end - first
+            self._deaths.clear()
+            self._told(self._done)
+            return
         error: BaseException | None = None
-        with contextlib.suppress(*_GONE):  # its status may be known, and what it gives be lost with the scheduler
-            if future.status == "finished":
-                row_s = future.result(timeout=BACK_S) / (end - first)
-                self._row_s = row_s if self._row_s is None else 0.8 * self._row_s + 0.2 * row_s
-                self._done += end - first
-                self._told(self._done)
-                return
+        with contextlib.suppress(*_GONE):
             error = future.exception(timeout=BACK_S) if future.status == "error" else None
         if isinstance(error, BoebotError):
             raise error

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 NAME, POINTS, FILES, PARTS, ROWS = "sweep.json", "points.npy", "files", "parts", "rows.parquet"
 GROUP_ROWS = 65_536  # of rows.parquet, which is written group by group
-_WHAT = "the sweep's files"
 _SAME = "expected it as it was then, or another --out"
 _P = TypeVar("_P", bound=Plan)
 
@@ -196,10 +195,8 @@ def held(path: Path, name: str, before: Collection[str] = ()) -> Iterator[bool]:
         BoebotError: another one does, or it holds other things.
     """
     make_folder(path)
-    try:
+    with writing(path):
         lock = system.lock_folder(path)
-    except OSError as error:
-        raise unwritable(path, error, _WHAT) from None
     try:
         there = {entry.name for entry in path.iterdir() if not entry.name.startswith(".")}
         if name not in there and (others := there - set(before)):
@@ -218,10 +215,8 @@ def locked(path: Path, plan: Plan, points: np.ndarray | None = None) -> Iterator
         BoebotError: another one does, or it holds other things, or a sweep of another plan, version or file.
     """
     with held(path, NAME, (FILES, POINTS, PARTS)) as is_begun:
-        try:
+        with writing(path):
             _take_up(path, plan, points) if is_begun else _make(path, plan, points)
-        except OSError as error:
-            raise unwritable(path, error, _WHAT) from None
         yield Folder(path)
 
 
@@ -323,16 +318,24 @@ def write_part(path: Path, table: Any) -> None:
     write_whole(path, lambda part: _arrow("pyarrow.parquet").write_table(table, part, write_page_checksum=True))
 
 
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Files of a sweep, into that folder. Raises BoebotError in place of an OSError."""
+    try:
+        yield
+    except OSError as error:
+        raise unwritable(path, error, "the sweep's files") from None
+
+
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Under a name that no other writer has; on the disk before it gets its own."""
     part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     try:
-        write(part)
-        with part.open("rb+") as file:
-            os.fsync(file.fileno())
-        part.replace(path)
-    except OSError as error:
-        raise unwritable(path.parent, error, _WHAT) from None
+        with writing(path.parent):
+            write(part)
+            with part.open("rb+") as file:
+                os.fsync(file.fileno())
+            part.replace(path)
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)

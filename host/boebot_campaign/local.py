@@ -19,7 +19,8 @@ QUIET = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
     "distributed.scheduler.allowed-failures": 0,  # boebot_campaign.tasks finds out which row it was
-    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.scheduler.worker-saturation": 2.0,  # tasks at a worker: one that runs, one that waits
+    "distributed.worker.memory.monitor-interval": "1s",
     "distributed.worker.multiprocessing-method": "forkserver" if FORKS else "spawn",
     "distributed.deploy.lost-worker-timeout": "3650 days",  # 15 s after a death it closes a worker that just restarts
 }

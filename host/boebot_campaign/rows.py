@@ -6,6 +6,7 @@ has no figures. Rows that are OK or RAISED are the same wherever they ran, but f
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import gc
 import math
@@ -13,7 +14,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from boebot_campaign.plan import Case, Plan
 
 OK, RAISED, TIMED_OUT, KILLED = "ok", "raised", "timed out", "killed"
 APART = ("status", "error", "wall_time_s", "worker")
-GRACE_S = 5.0  # after the limit, until a run that cannot be ended takes its process with it
+GRACE_S, LEAST_GRACE_S = 5.0, 3.0  # after the limit, until a run that cannot be ended takes its process with it
 # Of the figures of a run: what the plan says already, what is the same for all rows, and what `status` and `error` say.
 _LEFT_OUT = {"without", "imperfections", "parameters", "compiler", "program_hash", "ended"}
 _POSE = ("start_x_m", "start_y_m", "start_heading_rad")
@@ -41,7 +42,7 @@ _PLANNED = {
     **dict.fromkeys(_POSE, float),
     "seed": int,
 }
-_one_run = threading.Lock()  # at a time: the process has one timer, and one handler of a signal
+_one_part = threading.Lock()  # at a time: the process has one timer, and one handler of a signal
 
 
 class _TimeIsUpError(Exception):
@@ -111,14 +112,28 @@ def killed(case: Case) -> dict[str, Any]:
     return begun(case) | {"status": KILLED, "error": "the run has ended its worker's process, twice"}
 
 
+@contextlib.contextmanager
+def hangs_ended(limit_s: float) -> Iterator[Callable[[], None]]:
+    """The rows of a part run in the block, and those of no other part. It gives what is called before each of them,
+    so that a run which hangs ends this process; where it hung is printed."""
+    after_s, set_s = limit_s + GRACE_S, -math.inf
+
+    def begin() -> None:
+        nonlocal set_s
+        if (now := time.perf_counter()) - set_s > GRACE_S - LEAST_GRACE_S:  # seldom: each time begins a thread
+            faulthandler.dump_traceback_later(after_s, exit=True, file=2)
+            set_s = now
+
+    with _one_part:
+        try:
+            yield begin
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+
+
 def run_case(folder: Folder, case: Case) -> dict[str, Any]:
     """Runs a case. Only what the run raises becomes a row, also a KeyboardInterrupt: Ctrl-C reaches the process
     that waits for the workers, and no run of theirs."""
-    with _one_run:
-        return _run(folder, case)
-
-
-def _run(folder: Folder, case: Case) -> dict[str, Any]:
     limit_s, since = folder.plan.limit_s, time.perf_counter()
 
     def in_time(_: float) -> None:
@@ -126,19 +141,14 @@ def _run(folder: Folder, case: Case) -> dict[str, Any]:
             raise _TimeIsUpError
 
     row, error, result = begun(case), None, None
-    with (folder.path / ".hung.log").open("a") as hung:
-        if math.isfinite(limit_s):
-            faulthandler.dump_traceback_later(limit_s + GRACE_S, exit=True, file=hung)
-        try:
-            request = request_of(folder, case)
-            if (pose := request.members[0].pose) is not None:
-                row |= dict(zip(_POSE, pose, strict=True))
-            result = execute(request, in_time)
-            error = result.error
-        except (BoebotError, KeyboardInterrupt, _TimeIsUpError) as raised:
-            error = raised
-        finally:
-            faulthandler.cancel_dump_traceback_later()
+    try:
+        request = request_of(folder, case)
+        if (pose := request.members[0].pose) is not None:
+            row |= dict(zip(_POSE, pose, strict=True))
+        result = execute(request, in_time)
+        error = result.error
+    except (BoebotError, KeyboardInterrupt, _TimeIsUpError) as raised:
+        error = raised
     wall_s = time.perf_counter() - since
     status = OK if error is None else TIMED_OUT if wall_s > limit_s else RAISED
     row |= {"status": status, "wall_time_s": round(wall_s, 3), "worker": f"{socket.gethostname()}:{os.getpid()}"}
@@ -155,5 +165,7 @@ def _run(folder: Folder, case: Case) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _freeze() -> None:
-    """Once, after the first run: what it has imported and loaded stays, and need not be looked through again."""
+    """Once, after the first run: what it has imported and loaded stays, and need not be looked through again; what
+    runs leave is little."""
     gc.freeze()
+    gc.set_threshold(20_000)

@@ -10,15 +10,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import time
 import uuid
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from boebot.record.run_folder import unwritable
-from boebot_campaign.kept import Folder, opened, write_part
-from boebot_campaign.rows import columns, killed, run_case, table_of
+from boebot_campaign.kept import Folder, opened, write_part, writing
+from boebot_campaign.rows import columns, hangs_ended, killed, run_case, table_of
 
 
 def _me() -> str:
@@ -31,11 +29,9 @@ def _name(_process: int) -> str:
     return uuid.uuid4().hex
 
 
-def do_part(path: str, stamp: str, first: int, end: int) -> float:
-    """Sees to it that the rows from `first` to before `end` are in parts; returns the seconds that it took."""
-    since = time.perf_counter()
+def do_part(path: str, stamp: str, first: int, end: int) -> None:
+    """Sees to it that the rows from `first` to before `end` are in parts."""
     _do(opened(Path(path), stamp), first, end)
-    return time.perf_counter() - since
 
 
 def _do(folder: Folder, first: int, end: int) -> None:
@@ -44,40 +40,37 @@ def _do(folder: Folder, first: int, end: int) -> None:
         return
     markers = part.with_suffix(".begun")
     lines = _others(markers)
-    if not lines or (end - first == 1 and len({who for _, who in lines}) == 1):
-        try:
+    try:
+        if not lines or (end - first == 1 and len({who for _, who in lines}) == 1):
             write_part(part, table_of(_rows(folder, first, end, markers), _columns(folder)))
-        except BaseException:  # such as of a full disk: this process has not died
-            markers.unlink(missing_ok=True)
-            raise
-    elif end - first == 1:
-        case = folder.plan.case(first, folder.points)
-        write_part(part, table_of([killed(case)], _columns(folder)))
-    else:
-        suspect, who = lines[-1]
-        alone = folder.part(suspect, suspect + 1)
-        if not alone.is_file():
-            _mark(alone.with_suffix(".begun"), suspect, who)
-        for low, high in ((first, suspect), (suspect + 1, end), (suspect, suspect + 1)):
-            if folder.undone(low, high):
-                _do(folder, low, high)
-    markers.unlink(missing_ok=True)
+        elif end - first == 1:
+            case = folder.plan.case(first, folder.points)
+            write_part(part, table_of([killed(case)], _columns(folder)))
+        else:
+            suspect, who = lines[-1]
+            alone = folder.part(suspect, suspect + 1)
+            if not alone.is_file():
+                _mark(alone.with_suffix(".begun"), suspect, who)
+            for low, high in ((first, suspect), (suspect + 1, end), (suspect, suspect + 1)):
+                if folder.undone(low, high):
+                    _do(folder, low, high)
+    finally:  # also after an error, such as of a full disk: this process has not died
+        markers.unlink(missing_ok=True)
 
 
 def _rows(folder: Folder, first: int, end: int, markers: Path) -> list[dict[str, Any]]:
     rows = []
-    for row in range(first, end):
-        _mark(markers, row, _me())
-        rows.append(run_case(folder, folder.plan.case(row, folder.points)))
+    with hangs_ended(folder.plan.limit_s) as begin:
+        for row in range(first, end):
+            _mark(markers, row, _me())
+            begin()
+            rows.append(run_case(folder, folder.plan.case(row, folder.points)))
     return rows
 
 
 def _mark(markers: Path, row: int, who: str) -> None:
-    try:
-        with markers.open("a") as file:
-            file.write(f"{row} {who}\n")
-    except OSError as error:
-        raise unwritable(markers.parent, error, "the sweep's files") from None
+    with writing(markers.parent), markers.open("a") as file:
+        file.write(f"{row} {who}\n")
 
 
 def _others(markers: Path) -> list[tuple[int, str]]:

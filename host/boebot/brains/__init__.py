@@ -340,8 +340,7 @@ def _neighbours(path: Path) -> Iterator[None]:
         for name, module in ([*sys.modules.items()] if of or scripts else [])
         if id(module) in of or name.partition(".")[0] in scripts
     }
-    old = [*sys.modules.values()]
-    before = {*map(id, old)}  # some have two names, as __mp_main__
+    before, old = {*sys.modules}, [*sys.modules.values()]  # some have two names, as __mp_main__
     sys.path.insert(0, entry)
     importlib.invalidate_caches()
     try:
@@ -349,8 +348,8 @@ def _neighbours(path: Path) -> Iterator[None]:
     finally:
         with contextlib.suppress(ValueError):
             sys.path.remove(entry)
-        new = [item for item in [*sys.modules.items()] if id(item[1]) not in before and _file(item[1])]
-        _beside[path] = {name: module for name, module in new if not name.startswith("boebot_brain_")}
+        new = {name: sys.modules[name] for name in sys.modules.keys() - before if not name.startswith("boebot_brain_")}
+        _beside[path] = {name: one for name, one in new.items() if _file(one) and id(one) not in map(id, old)}
         for name, module in _beside[path].items():
             _forget(module)
             if name.partition(".")[0] in scripts:

@@ -453,7 +453,7 @@ def test_a_part_that_is_there_is_not_run_again(tmp_path: Path) -> None:
     file = saved(tmp_path, PLAN)
     with kept.locked(tmp_path / "out", plan.read(file, plan.Plan)) as folder:
         folder.part(0, 3).write_bytes(b"not looked at")
-        assert tasks.do_part(str(folder.path), folder.stamp, 0, 3) < 1.0
+        tasks.do_part(str(folder.path), folder.stamp, 0, 3)
         assert list(folder.parts.iterdir()) == [folder.part(0, 3)]
         assert folder.part(0, 3).read_bytes() == b"not looked at"
 

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -40,13 +41,25 @@ def python(code: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", f"from tools.tests.bench.sweeps import *; {code}"])
 
 
-def rate(*codes: str) -> float:
-    """Runs/s of processes that begin together, until the last has ended."""
+def took_s(*codes: str) -> float:
+    """Of processes that begin together, until the last has ended."""
     started = time.perf_counter()
     for process in [python(code) for code in codes]:
         if process.wait() != 0:
             raise RuntimeError("a process of the bench has failed")
-    return RUNS / (time.perf_counter() - started)
+    return time.perf_counter() - started
+
+
+@lru_cache(maxsize=1)
+def rates() -> dict[str, float]:
+    """Runs/s of the sweep, before and after it of two plain processes, and of joblib. A machine's speed may change
+    within these minutes."""
+    half = RUNS // 2
+    two = f"plain(1, {half + 1})", f"plain({half + 1}, {RUNS + 1})"
+    before_s, sweep_s = took_s(*two), took_s(f"swept(seeds={{'from': 1, 'to': {RUNS}}}, workers=2)")
+    mean_s = (before_s + took_s(*two)) / 2
+    times_s = {"sweep": sweep_s, "plain": mean_s, "joblib": took_s("joblib_rows()")}
+    return {name: RUNS / seconds for name, seconds in times_s.items()}
 
 
 def joblib_rows() -> None:
@@ -70,12 +83,12 @@ def swept(**keys: Any) -> None:
     "runs/s",
     times_at_least=0.93,
     peers=[
-        Peer("two plain processes", lambda: rate(f"plain(1, {RUNS // 2 + 1})", f"plain({RUNS // 2 + 1}, {RUNS + 1})")),
-        Peer("joblib", lambda: rate("joblib_rows()")),
+        Peer("two plain processes, before and after", lambda: rates()["plain"]),
+        Peer("joblib", lambda: rates()["joblib"]),
     ],
 )
 def two_workers() -> float:
-    return rate(f"swept(seeds={{'from': 1, 'to': {RUNS}}}, workers=2)")
+    return rates()["sweep"]
 
 
 @figure("sweep: processor time of a row at a worker, against a run in a plain loop", "×", at_most=1.05)
