@@ -165,7 +165,5 @@ def run_case(folder: Folder, case: Case) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _freeze() -> None:
-    """Once, after the first run: what it has imported and loaded stays, and need not be looked through again; what
-    runs leave is little."""
+    """Once, after the first run: what it has imported and loaded stays, and need not be looked through again."""
     gc.freeze()
-    gc.set_threshold(20_000)
